@@ -1,0 +1,21 @@
+"""Identification of the Karnopp model from recordings; no ROS."""
+
+from valve_friction_ros.identification.derivatives import Derivatives, differentiate
+from valve_friction_ros.identification.estimate import UNITS, Estimate
+from valve_friction_ros.identification.identify import identify
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
+from valve_friction_ros.identification.sweep import Sweep, sweep_thresholds
+
+__all__ = [
+    "FIXABLE",
+    "UNITS",
+    "Derivatives",
+    "Estimate",
+    "RefusalError",
+    "IdentificationSettings",
+    "Sweep",
+    "differentiate",
+    "identify",
+    "sweep_thresholds",
+]

@@ -1,0 +1,91 @@
+"""Static friction from the instants of breakaway, equation (9)."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.derivatives import Derivatives
+from valve_friction_ros.identification.noise import position_noise, velocity_noise
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.model.recording import Recording
+
+__all__ = ["Breakaway", "find_breakaways"]
+
+_AT_REST = 4.0
+"""A stem is at rest while its velocity is within this many standard deviations of zero …"""
+
+_AT_REST_SHARE = 1e-3
+"""… or, of a noiseless record, within this share of its top speed."""
+
+_FIRST_MARK, _SECOND_MARK = 4.0, 16.0
+"""Displacements, in standard deviations of the rest, that time the onset of motion."""
+
+_ROUNDING = 1e-12
+
+
+class Breakaway(NamedTuple):
+    """The last sample at which the stem still rests, and the way it leaves (+1 up, −1 down)."""
+
+    sample: int
+    direction: int
+
+
+def _runs(active: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and one-past-last index of each run of True."""
+    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
+    """Last index before the displacement stays beyond `mark`, −1 if it is never within."""
+    within = np.flatnonzero(displacement <= mark + _ROUNDING)
+    return int(within[-1]) if within.size else -1
+
+
+def find_breakaways(
+    recording: Recording, derivatives: Derivatives, settings: IdentificationSettings
+) -> list[Breakaway]:
+    """Find the instants at which the stem leaves a rest.
+
+    A rest is a stretch of at least two derivative windows without a speed that the noise cannot
+    explain. Its part clear of the motion that follows gives position and noise of the rest.
+    Motion under a growing force begins with the square of the time, so the instants t₁ and t₂
+    at which the displacement passes 4 and 16 standard deviations of that noise put its onset at
+    2·t₁ − t₂; without noise the three coincide.
+
+    Parameters
+    ----------
+    recording : Recording
+        Stem position and pressure.
+    derivatives : Derivatives
+        Velocity of the stem.
+    settings : IdentificationSettings
+        Window and order that gave the derivatives.
+
+    Returns
+    -------
+    list of Breakaway
+        In the order of time; indices into the samples of `recording`.
+    """
+    window = settings.window
+    speed = np.abs(derivatives.velocity)
+    noise = velocity_noise(
+        position_noise(recording.position), recording.sample_period, window, settings.order
+    )
+    still = speed <= max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
+    found = []
+    for begin, end in zip(*_runs(still), strict=True):
+        if end - begin < 2 * window or end == still.size:
+            continue
+        first_moving = int(end) + derivatives.margin
+        rest = recording.position[begin + window : first_moving - window // 2]
+        level, spread = float(np.median(rest)), float(np.std(rest))
+        stretch = recording.position[first_moving - window : first_moving + 2 * window] - level
+        first = _last_within(np.abs(stretch), _FIRST_MARK * spread)
+        second = _last_within(np.abs(stretch), _SECOND_MARK * spread)
+        onset = first_moving - window + 2 * first - second
+        if first < 0 or second == stretch.size - 1 or onset < 0:
+            continue
+        found.append(Breakaway(onset, int(np.sign(stretch[-1]))))
+    return found

@@ -1,0 +1,100 @@
+"""Settings of the published identification."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from valve_friction_ros.model.checks import (
+    require_finite,
+    require_non_negative,
+    require_positive,
+)
+
+__all__ = ["FIXABLE", "REGRESSED", "IdentificationSettings"]
+
+REGRESSED = (
+    "mass",
+    "coulomb_friction",
+    "viscous_friction",
+    "spring_constant",
+    "spring_preload",
+)
+"""Parameters of the regression: (3), and the preload F_0 beside them."""
+
+FIXABLE = (*REGRESSED, "static_friction", "limit_velocity")
+"""Parameters that can be fixed at a known value instead of being identified."""
+
+_MAY_BE_NEGATIVE = ("spring_preload",)
+
+
+@dataclass(frozen=True)
+class IdentificationSettings:
+    """How a record is identified; the defaults are the paper's.
+
+    Attributes
+    ----------
+    window : int
+        Length d of the derivative window, samples, odd (Appendix A).
+    order : int
+        Order n of the polynomial fitted to each window, at least 2 (Appendix A).
+    steps : int
+        Number S of thresholds δv in the sweep (8).
+    resolution : int
+        Divisor Z of the top speed in (8), above `steps`.
+    fixed : mapping of str to float
+        Parameters known beforehand, by name (see `FIXABLE`); they leave the regression. Fixing
+        ``limit_velocity`` sets the threshold δv instead of choosing it from the sweep.
+    position_bias : float, optional
+        Bias x̄ of (10), m. Given, the regression takes the paper's form of four columns, and the
+        preload is F_0 = k·x̄; by default the preload is a regressor of its own.
+    assumed_mass : float
+        Mass, kg, that is assumed where the record does not tell it.
+
+    Raises
+    ------
+    ValueError
+        If a setting is impossible; the message names it.
+    """
+
+    window: int = 31
+    order: int = 3
+    steps: int = 330
+    resolution: int = 350
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    position_bias: float | None = None
+    assumed_mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse settings that contradict each other."""
+        if self.order < 2:
+            raise ValueError(f"order must be at least 2 for an acceleration, got {self.order}")
+        if self.window % 2 == 0 or self.window < self.order + 2:
+            raise ValueError(
+                f"window must be odd and at least order + 2 = {self.order + 2}, got {self.window}"
+            )
+        if not 0 < self.steps < self.resolution:
+            raise ValueError(
+                f"steps ({self.steps}) must be above zero and below resolution ({self.resolution})"
+            )
+        require_non_negative("assumed_mass", self.assumed_mass)
+        object.__setattr__(self, "fixed", MappingProxyType(self._checked_fixed()))
+        if self.position_bias is not None:
+            require_finite("position_bias", self.position_bias)
+            if "spring_preload" in self.fixed:
+                raise ValueError("position_bias and a fixed spring_preload exclude each other")
+
+    def _checked_fixed(self) -> dict[str, float]:
+        checked = {}
+        for name, value in self.fixed.items():
+            if name not in FIXABLE:
+                raise ValueError(
+                    f"{name!r} is not a parameter that can be fixed; "
+                    f"choose from {', '.join(FIXABLE)}"
+                )
+            if name in _MAY_BE_NEGATIVE:
+                checked[name] = require_finite(name, value)
+            elif name == "limit_velocity":
+                checked[name] = require_positive(name, value)
+            else:
+                checked[name] = require_non_negative(name, value)
+        return checked

@@ -1,0 +1,56 @@
+"""The valve, its friction model and its simulation; no ROS."""
+
+from valve_friction_ros.model.bench import (
+    BENCH_VALVE,
+    GRAPHITE_PACKING,
+    GRAPHITE_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    PRESSURE_RANGE,
+)
+from valve_friction_ros.model.excitations import (
+    Excitation,
+    IsaSteps,
+    SampledPressure,
+    SineWave,
+    SquareWave,
+    TriangleWave,
+)
+from valve_friction_ros.model.instruments import DEFAULT_LAG, SensorNoise, converter_response
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.simulation import (
+    StemState,
+    Trajectory,
+    advance,
+    balanced_state,
+    simulate,
+)
+from valve_friction_ros.model.valve import ATMOSPHERIC_PRESSURE, Valve
+
+__all__ = [
+    "ATMOSPHERIC_PRESSURE",
+    "BENCH_VALVE",
+    "DEFAULT_LAG",
+    "GRAPHITE_PACKING",
+    "GRAPHITE_VALVE",
+    "HIGH_FRICTION",
+    "LOW_FRICTION",
+    "PRESSURE_RANGE",
+    "Excitation",
+    "IsaSteps",
+    "KarnoppParameters",
+    "Recording",
+    "SampledPressure",
+    "SensorNoise",
+    "SineWave",
+    "SquareWave",
+    "StemState",
+    "Trajectory",
+    "TriangleWave",
+    "Valve",
+    "advance",
+    "balanced_state",
+    "converter_response",
+    "simulate",
+]

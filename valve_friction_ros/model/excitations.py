@@ -1,0 +1,198 @@
+"""Pressure excitations of the paper's programme, before the V/P converter's lag.
+
+An excitation is a frozen description; `sample` evaluates it at any times, so that a node can
+publish it block by block and a script in one call. Levels are pressures in Pa.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from valve_friction_ros.model.bench import PRESSURE_RANGE
+from valve_friction_ros.model.checks import require_finite, require_positive
+
+__all__ = [
+    "ISA_STEP_SIZES",
+    "Excitation",
+    "IsaSteps",
+    "SampledPressure",
+    "SineWave",
+    "SquareWave",
+    "TriangleWave",
+    "pressure_at",
+]
+
+ISA_STEP_SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+"""Steps of the ISA test as shares of the input range."""
+
+
+def pressure_at(share: float, pressure_range: tuple[float, float] = PRESSURE_RANGE) -> float:
+    """Pressure in Pa at `share` (0 to 1) of the input range, the bench's by default."""
+    lowest, highest = pressure_range
+    return lowest + share * (highest - lowest)
+
+
+class Excitation(ABC):
+    """A pressure signal that is defined at every time."""
+
+    @abstractmethod
+    def sample(self, time: ArrayLike) -> NDArray[np.float64]:
+        """Pressure in Pa at each `time` (s since the start), in the shape of `time`."""
+
+
+@dataclass(frozen=True)
+class _Wave(Excitation):
+    """A periodic signal between two pressures, beginning at the lower one.
+
+    Attributes
+    ----------
+    low, high : float
+        Lowest and highest pressure, Pa.
+    period : float
+        Duration of one period, s.
+    """
+
+    low: float
+    high: float
+    period: float
+
+    def __post_init__(self) -> None:
+        """Refuse a wave without height or length."""
+        require_positive("period", self.period)
+        if not require_finite("low", self.low) < require_finite("high", self.high):
+            raise ValueError(f"low ({self.low:g}) must be below high ({self.high:g})")
+
+    def sample(self, time: ArrayLike) -> NDArray[np.float64]:
+        """Pressure in Pa at each `time` (s since the start), in the shape of `time`."""
+        phase = np.mod(np.asarray(time, dtype=np.float64) / self.period, 1.0)
+        return self.low + (self.high - self.low) * self._shape(phase)
+
+    @abstractmethod
+    def _shape(self, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Height, 0 to 1, at each phase, 0 to 1 of the period."""
+
+
+@dataclass(frozen=True)
+class SquareWave(_Wave):
+    """Half a period low, half a period high; the paper's identification signal by default."""
+
+    low: float = pressure_at(0.15)
+    high: float = pressure_at(0.75)
+    period: float = 10.4
+
+    def _shape(self, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(phase < 0.5, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class TriangleWave(_Wave):
+    """Up and down at a constant rate; gives the valve signature.
+
+    The paper names no period; the default of 60 s keeps the stem slow, as a signature test does.
+    """
+
+    low: float = pressure_at(0.0)
+    high: float = pressure_at(1.0)
+    period: float = 60.0
+
+    def _shape(self, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 1.0 - np.abs(1.0 - 2.0 * phase)
+
+
+@dataclass(frozen=True)
+class SineWave(_Wave):
+    """A sine that begins at its lowest point; the paper's validation signal by default."""
+
+    low: float = 63950.0
+    high: float = 160440.0
+    period: float = 35.5
+
+    def _shape(self, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 0.5 - 0.5 * np.cos(2.0 * np.pi * phase)
+
+
+@dataclass(frozen=True)
+class IsaSteps(Excitation):
+    """Steps of growing size around a middle pressure, up, back, down and back.
+
+    Attributes
+    ----------
+    centre : float
+        Pressure before each group of steps, Pa.
+    span : float
+        Input range that the step sizes are shares of, Pa.
+    sizes : tuple of float
+        Step sizes as shares of `span`. A step of 50 % around mid-range spans the whole range.
+    hold : float
+        Time at each level, s.
+    """
+
+    centre: float = pressure_at(0.5)
+    span: float = PRESSURE_RANGE[1] - PRESSURE_RANGE[0]
+    sizes: tuple[float, ...] = ISA_STEP_SIZES
+    hold: float = 10.0
+
+    def __post_init__(self) -> None:
+        """Refuse an empty sequence."""
+        require_finite("centre", self.centre)
+        require_positive("span", self.span)
+        require_positive("hold", self.hold)
+        if not self.sizes:
+            raise ValueError("sizes must hold at least one step")
+        for size in self.sizes:
+            require_positive("step size", size)
+
+    @property
+    def levels(self) -> NDArray[np.float64]:
+        """Pressure of each hold in turn, Pa, shape (1 + 4·steps,)."""
+        offsets = [0.0]
+        for size in self.sizes:
+            offsets += [size, 0.0, -size, 0.0]
+        return self.centre + self.span * np.array(offsets)
+
+    @property
+    def duration(self) -> float:
+        """Time of the whole sequence, s; the last level is held beyond it."""
+        return self.levels.size * self.hold
+
+    def sample(self, time: ArrayLike) -> NDArray[np.float64]:
+        """Pressure in Pa at each `time` (s since the start), in the shape of `time`."""
+        levels = self.levels
+        index = np.floor(np.asarray(time, dtype=np.float64) / self.hold).astype(np.intp)
+        return np.take(levels, index, mode="clip")
+
+
+@dataclass(frozen=True, eq=False)
+class SampledPressure(Excitation):
+    """A pressure read from a file: linear between its samples, held after the last.
+
+    Attributes
+    ----------
+    times : ndarray of float, shape (n,)
+        Times of the samples, s, increasing.
+    pressures : ndarray of float, shape (n,)
+        Pressure at those times, Pa.
+    """
+
+    times: NDArray[np.float64] = field(repr=False)
+    pressures: NDArray[np.float64] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be played back, and freeze the arrays."""
+        for name in ("times", "pressures"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
+                raise ValueError(f"{name} must be a row of finite numbers, at least one")
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        if self.times.shape != self.pressures.shape:
+            raise ValueError(f"{self.times.size} times for {self.pressures.size} pressures")
+        if not (np.diff(self.times) > 0).all():
+            raise ValueError("times must increase")
+
+    def sample(self, time: ArrayLike) -> NDArray[np.float64]:
+        """Pressure in Pa at each `time` (s since the first sample), in the shape of `time`."""
+        since_start = np.asarray(time, dtype=np.float64) + self.times[0]
+        return np.interp(since_start, self.times, self.pressures)

@@ -1,0 +1,194 @@
+r"""Exact motion of the sliding stem between two events.
+
+While the stem slides one way, (1) with the first line of (2) is linear,
+
+.. math:: m \ddot{x} + F_v \dot{x} + k x = f_0 + f_1 t ,
+
+with a force that is linear in time because the pressure is. The matrix exponential of such a
+second-order system has a closed form: with the impulse response :math:`h` of
+:math:`\ddot{h} + 2\beta\dot{h} + \omega_0^2 h = 0`, :math:`h(0)=0`, :math:`\dot{h}(0)=1`, its
+first integral :math:`h_1` and second integral :math:`h_2`,
+
+.. math::
+    \dot{x}(t) &= v_0 + a_0 h(t) + j_0 h_1(t) \\
+    x(t) &= x_0 + v_0 t + a_0 h_1(t) + j_0 h_2(t)
+
+where :math:`a_0` is the acceleration at t = 0 and :math:`j_0 = (f_1 - k v_0)/m` the jerk that the
+force and the spring would give without damping. No step size enters, so nothing can become
+unstable, however stiff the friction.
+"""
+
+import math
+from typing import NamedTuple
+
+from valve_friction_ros.model.compiled import compiled
+
+__all__ = ["Motion", "Response", "first_turn", "impulse_response", "motion_after"]
+
+
+class Response(NamedTuple):
+    """Impulse response at one time: its derivative, itself, its first and second integral."""
+
+    slope: float
+    value: float
+    integral: float
+    second_integral: float
+
+
+class Motion(NamedTuple):
+    """Position, velocity and acceleration of the stem."""
+
+    position: float
+    velocity: float
+    acceleration: float
+
+
+@compiled
+def _series_response(damping: float, stiffness: float, time: float) -> Response:
+    """Power series of the impulse response, for times short against both time constants."""
+    term, previous = time, 0.0
+    slope, value = 1.0, time
+    integral, second_integral = term * time / 2, term * time * time / 6
+    order = 1
+    while abs(term) > 1e-18 * time or abs(previous) > 1e-18 * time:
+        following = -(damping * time * order * term + stiffness * time * time * previous) / (
+            order * (order + 1)
+        )
+        previous, term = term, following
+        order += 1
+        value += term
+        slope += order * term / time
+        integral += term * time / (order + 1)
+        second_integral += term * time * time / ((order + 1) * (order + 2))
+    return Response(slope, value, integral, second_integral)
+
+
+@compiled
+def _decay_integrals(rate: float, time: float) -> tuple[float, float]:
+    """First and second integral from 0 to `time` of exp(rate·t)."""
+    exponent = rate * time
+    if abs(exponent) < 0.5:
+        term = 0.5
+        total = term
+        order = 3
+        while abs(term) > 1e-18:
+            term *= exponent / order
+            total += term
+            order += 1
+        second = total * time * time
+        return time + rate * second, second
+    first = math.expm1(exponent) / rate
+    return first, (first - time) / rate
+
+
+@compiled
+def _overdamped_response(
+    damping: float, discriminant: float, stiffness: float, time: float
+) -> Response:
+    """Impulse response as the divided difference of two decays with well separated rates."""
+    fast = -(damping / 2 + math.sqrt(discriminant))
+    slow = stiffness / fast
+    fast_decay, slow_decay = math.exp(fast * time), math.exp(slow * time)
+    fast_first, fast_second = _decay_integrals(fast, time)
+    slow_first, slow_second = _decay_integrals(slow, time)
+    spread = fast - slow
+    return Response(
+        (fast * fast_decay - slow * slow_decay) / spread,
+        (fast_decay - slow_decay) / spread,
+        (fast_first - slow_first) / spread,
+        (fast_second - slow_second) / spread,
+    )
+
+
+@compiled
+def _oscillating_response(
+    damping: float, discriminant: float, stiffness: float, time: float
+) -> Response:
+    """Impulse response of a damped oscillation, or of two nearly equal decays."""
+    root = math.sqrt(abs(discriminant))
+    angle = root * time
+    decay = math.exp(-damping / 2 * time)
+    if angle < 1e-8:
+        value, cosine = time * decay, decay
+    elif discriminant < 0:
+        value, cosine = decay * math.sin(angle) / root, decay * math.cos(angle)
+    else:
+        slower = math.exp((root - damping / 2) * time)
+        value = slower * -math.expm1(-2 * angle) / (2 * root)
+        cosine = slower * (1 + math.exp(-2 * angle)) / 2
+    slope = cosine - damping / 2 * value
+    integral = (1 - slope - damping * value) / stiffness
+    return Response(slope, value, integral, (time - value - damping * integral) / stiffness)
+
+
+@compiled
+def impulse_response(damping: float, stiffness: float, time: float) -> Response:
+    """Impulse response of ḧ + damping·ḣ + stiffness·h = 0, its slope and its two integrals.
+
+    Parameters
+    ----------
+    damping : float
+        F_v/m, 1/s, not negative.
+    stiffness : float
+        k/m, 1/s², not negative.
+    time : float
+        Time since the impulse, s, not negative.
+
+    Returns
+    -------
+    Response
+        ḣ (1), h (s), ∫h (s²), ∬h (s³) at `time`.
+
+    Notes
+    -----
+    Each branch is used where its formula loses no digits: the power series for short times, a
+    divided difference of two decays where their rates lie well apart (stiff friction, no spring),
+    and otherwise the oscillation, whose integrals follow from the differential equation.
+    """
+    if damping * time < 0.5 and stiffness * time * time < 0.25:
+        return _series_response(damping, stiffness, time)
+    quarter = damping * damping / 4
+    discriminant = quarter - stiffness
+    if discriminant > 0.01 * quarter:
+        return _overdamped_response(damping, discriminant, stiffness, time)
+    return _oscillating_response(damping, discriminant, stiffness, time)
+
+
+@compiled
+def motion_after(start: Motion, jerk: float, response: Response, time: float) -> Motion:
+    """Motion `time` seconds after `start`, given the impulse response at that time."""
+    return Motion(
+        start.position
+        + start.velocity * time
+        + start.acceleration * response.integral
+        + jerk * response.second_integral,
+        start.velocity + start.acceleration * response.value + jerk * response.integral,
+        start.acceleration * response.slope + jerk * response.value,
+    )
+
+
+@compiled
+def first_turn(acceleration: float, jerk: float, damping: float, stiffness: float) -> float:
+    """Time of the first zero of a₀·ḣ(t) + j₀·h(t), the acceleration, after t = 0; inf if none.
+
+    Between two such times the velocity is monotone. An oscillating stem turns again every
+    π/√(ω₀² − β²) after the first; any other turns once at the most.
+    """
+    discriminant = damping * damping / 4 - stiffness
+    if discriminant >= 0:
+        root = math.sqrt(discriminant)
+        fast = -(damping / 2 + root)
+        slow = stiffness / fast if fast != 0 else 0.0
+        weight = acceleration * slow + jerk
+        if weight == 0:
+            return math.inf
+        ratio = -acceleration / weight
+        if ratio <= 0:
+            return math.inf
+        argument = 2 * root * ratio
+        return math.log1p(argument) / (2 * root) if argument > 0 else ratio
+    frequency = math.sqrt(-discriminant)
+    angle = math.atan2(-acceleration * frequency, jerk - acceleration * damping / 2)
+    if angle <= 0:
+        angle += math.pi
+    return angle / frequency

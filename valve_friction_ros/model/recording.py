@@ -1,0 +1,70 @@
+"""A recording: pressure and stem position on one uniform time grid."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.model.checks import require_finite, require_positive
+
+__all__ = ["Recording"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Actuator pressure and stem position, sampled together at a constant period.
+
+    Attributes
+    ----------
+    sample_period : float
+        Time between two samples, s.
+    pressure : ndarray of float, shape (n,)
+        Actuator pressure, Pa. Kept as a read-only copy.
+    position : ndarray of float, shape (n,)
+        Stem position, m. Kept as a read-only copy.
+    start_time : float
+        Time of the first sample, s, on whatever clock the samples were stamped by.
+
+    Raises
+    ------
+    ValueError
+        If the arrays differ in shape, are not one-dimensional, are empty, or hold a value
+        that is not finite; the message names the array and the first such sample.
+    """
+
+    sample_period: float
+    pressure: NDArray[np.float64] = field(repr=False)
+    position: NDArray[np.float64] = field(repr=False)
+    start_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a recording, and freeze the arrays."""
+        require_positive("sample_period", self.sample_period)
+        require_finite("start_time", self.start_time)
+        for name in ("pressure", "position"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            if values.ndim != 1 or values.size == 0:
+                raise ValueError(f"{name} must be a row of samples, got shape {values.shape}")
+            finite = np.isfinite(values)
+            if not finite.all():
+                raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        if self.pressure.shape != self.position.shape:
+            raise ValueError(
+                f"pressure has {self.pressure.size} samples, position {self.position.size}"
+            )
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return self.position.size
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample, s."""
+        return (len(self) - 1) * self.sample_period
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of each sample since the first one, s, shape (n,)."""
+        return np.arange(len(self), dtype=np.float64) * self.sample_period

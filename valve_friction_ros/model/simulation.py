@@ -1,0 +1,243 @@
+"""Simulation of a valve with Karnopp friction, driven by pressure samples.
+
+Equations (1) and (2), solved without discretisation: the pressure runs linearly from sample to
+sample, and within each phase of the motion (rest, sliding up, sliding down, held by a travel
+stop) the exact solution is stepped, with breakaway and stopping located inside the sample.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.model.checks import require_finite, require_positive
+from valve_friction_ros.model.compiled import compiled
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.linear_motion import Motion, impulse_response, motion_after
+from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["StemState", "Trajectory", "advance", "balanced_state", "simulate"]
+
+
+@dataclass(frozen=True)
+class StemState:
+    """Position (m) and velocity (m/s) of the stem; a velocity of exactly zero means rest."""
+
+    position: float
+    velocity: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not finite."""
+        require_finite("position", self.position)
+        require_finite("velocity", self.velocity)
+
+
+class Trajectory(NamedTuple):
+    """Simulated stem, one value a sample.
+
+    Attributes
+    ----------
+    position : ndarray of float, shape (n,)
+        Stem position, m.
+    velocity : ndarray of float, shape (n,)
+        Stem velocity, m/s; exactly zero where the stem rests.
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    @property
+    def end(self) -> StemState:
+        """State after the last sample, to continue from."""
+        return StemState(float(self.position[-1]), float(self.velocity[-1]))
+
+
+def _dynamics(valve: Valve, parameters: KarnoppParameters) -> Dynamics:
+    return Dynamics(
+        mass=parameters.mass,
+        viscous_friction=parameters.viscous_friction,
+        coulomb_friction=parameters.coulomb_friction,
+        static_friction=parameters.static_friction,
+        spring_constant=parameters.spring_constant,
+        limit_velocity=parameters.limit_velocity,
+        travel=valve.travel,
+    )
+
+
+@compiled
+def _surely_rests(pull: float, change: float, dynamics: Dynamics) -> bool:
+    """Tell whether a resting stem stays, under a `pull` that changes linearly by `change`."""
+    return max(abs(pull), abs(pull + change)) <= dynamics.static_friction
+
+
+@compiled
+def _surely_slides(
+    start: Motion, end: Motion, side: float, turns_once: bool, dynamics: Dynamics
+) -> bool:
+    """Tell whether a stem that slides to `side` at `start` has slid all the way to `end`.
+
+    Both ends are faster than the limit velocity, the speed has no minimum between them, and no
+    travel stop has been passed.
+    """
+    fast = min(side * start.velocity, side * end.velocity) > dynamics.limit_velocity
+    no_minimum = side * start.acceleration >= 0 or side * end.acceleration <= 0
+    inside = dynamics.travel == np.inf or 0 < end.position < dynamics.travel
+    return turns_once and fast and no_minimum and inside
+
+
+@compiled
+def _run(
+    position: float,
+    velocity: float,
+    forces: NDArray[np.float64],
+    period: float,
+    dynamics: Dynamics,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> None:
+    """Step through `forces` (actuator less preload, N), writing one state a sample.
+
+    Samples in which the stem surely rests or surely slides on take a short cut; all others,
+    those with an event among them, go through `advance_stem`.
+    """
+    damping = dynamics.viscous_friction / dynamics.mass
+    stiffness = dynamics.spring_constant / dynamics.mass
+    response = impulse_response(damping, stiffness, period)
+    turns_once = (stiffness - damping * damping / 4) * period * period < math.pi**2
+    positions[0], velocities[0] = position, velocity
+    for sample in range(1, forces.size):
+        force, change = forces[sample - 1], forces[sample] - forces[sample - 1]
+        slope = change / period
+        pull = force - dynamics.spring_constant * position
+        if velocity == 0.0:
+            simple = _surely_rests(pull, change, dynamics)
+        else:
+            side = 1.0 if velocity > 0 else -1.0
+            friction = side * dynamics.coulomb_friction + dynamics.viscous_friction * velocity
+            start = Motion(position, velocity, (pull - friction) / dynamics.mass)
+            jerk = slope / dynamics.mass - stiffness * velocity
+            end = motion_after(start, jerk, response, period)
+            simple = _surely_slides(start, end, side, turns_once, dynamics)
+            if simple:
+                position, velocity = end.position, end.velocity
+        if not simple:
+            position, velocity = advance_stem(position, velocity, force, slope, period, dynamics)
+        positions[sample], velocities[sample] = position, velocity
+
+
+def balanced_state(valve: Valve, parameters: KarnoppParameters, pressure: float) -> StemState:
+    """Rest where the spring balances the actuator at `pressure` (Pa), within the travel.
+
+    Without a spring there is no such place; the stem then rests at 0.
+    """
+    if parameters.spring_constant == 0:
+        return StemState(0.0)
+    force = valve.diaphragm_area * (pressure - valve.pressure_reference)
+    balance = (force - parameters.spring_preload) / parameters.spring_constant
+    lowest = 0.0 if np.isfinite(valve.travel) else -np.inf
+    return StemState(float(np.clip(balance, lowest, valve.travel)))
+
+
+def advance(
+    state: StemState,
+    valve: Valve,
+    parameters: KarnoppParameters,
+    pressures: tuple[float, float],
+    duration: float,
+) -> StemState:
+    """Advance `state` by `duration` seconds while the pressure runs linearly between two values.
+
+    Parameters
+    ----------
+    state : StemState
+        State at the start.
+    valve : Valve
+        Geometry and travel stops.
+    parameters : KarnoppParameters
+        Mass, friction and spring during the step.
+    pressures : tuple of float
+        Actuator pressure at the start and at the end of the step, Pa.
+    duration : float
+        Length of the step, s, above zero.
+
+    Returns
+    -------
+    StemState
+        State at the end.
+    """
+    duration = require_positive("duration", duration)
+    before, after = (
+        valve.diaphragm_area * (require_finite("pressure", pressure) - valve.pressure_reference)
+        - parameters.spring_preload
+        for pressure in pressures
+    )
+    return StemState(
+        *advance_stem(
+            state.position,
+            state.velocity,
+            before,
+            (after - before) / duration,
+            duration,
+            _dynamics(valve, parameters),
+        )
+    )
+
+
+def simulate(
+    valve: Valve,
+    parameters: KarnoppParameters,
+    pressure: NDArray[np.float64],
+    sample_period: float,
+    start: StemState | None = None,
+) -> Trajectory:
+    """Simulate the stem under sampled pressure, equations (1) and (2).
+
+    Parameters
+    ----------
+    valve : Valve
+        Geometry and travel stops.
+    parameters : KarnoppParameters
+        Mass, friction and spring.
+    pressure : ndarray of float, shape (n,)
+        Actuator pressure, Pa, taken as linear between the samples.
+    sample_period : float
+        Time between two samples, s.
+    start : StemState, optional
+        State at the first sample; by default at rest in the balance of spring and actuator.
+
+    Returns
+    -------
+    Trajectory
+        Position and velocity at each sample, shape (n,) each.
+
+    Raises
+    ------
+    ValueError
+        If the pressure is empty or not finite, or the period is not above zero.
+
+    Notes
+    -----
+    The third line of (2) holds at the instant of breakaway: from there on the moving friction of
+    the first line acts. A sliding stem comes to rest when its speed falls to the limit velocity
+    DV while static friction can hold it, at the latest when its speed reaches zero.
+    """
+    period = require_positive("sample_period", sample_period)
+    samples = np.asarray(pressure, dtype=np.float64)
+    if samples.ndim != 1 or samples.size == 0 or not np.isfinite(samples).all():
+        raise ValueError("pressure must be a row of finite samples, at least one")
+    state = start or balanced_state(valve, parameters, float(samples[0]))
+    forces = valve.actuator_force(samples) - parameters.spring_preload
+    positions, velocities = np.empty_like(forces), np.empty_like(forces)
+    _run(
+        state.position,
+        state.velocity,
+        forces,
+        period,
+        _dynamics(valve, parameters),
+        positions,
+        velocities,
+    )
+    return Trajectory(positions, velocities)

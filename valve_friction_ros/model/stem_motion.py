@@ -1,0 +1,216 @@
+"""One step of the Karnopp model: rest, breakaway, sliding, stopping, travel stops.
+
+The stem is described by position and velocity alone; a velocity of exactly zero means rest.
+Sliding is treated in a mirrored frame in which the stem moves up, so each rule stands once.
+"""
+
+import math
+from typing import NamedTuple
+
+from valve_friction_ros.model.compiled import compiled
+from valve_friction_ros.model.linear_motion import (
+    Motion,
+    first_turn,
+    impulse_response,
+    motion_after,
+)
+
+__all__ = ["Dynamics", "advance_stem"]
+
+_ROOT_ITERATIONS = 100
+
+
+class Dynamics(NamedTuple):
+    """The numbers that a step needs, as plain floats for the compiled kernels (SI units)."""
+
+    mass: float
+    viscous_friction: float
+    coulomb_friction: float
+    static_friction: float
+    spring_constant: float
+    limit_velocity: float
+    travel: float
+
+
+@compiled
+def _time_of_velocity(
+    start: Motion, jerk: float, dynamics: Dynamics, target: float, early: float, late: float
+) -> float:
+    """Time in [early, late] at which the velocity, falling there, reaches `target`."""
+    damping = dynamics.viscous_friction / dynamics.mass
+    stiffness = dynamics.spring_constant / dynamics.mass
+    time = 0.5 * (early + late)
+    for _ in range(_ROOT_ITERATIONS):
+        now = motion_after(start, jerk, impulse_response(damping, stiffness, time), time)
+        if now.velocity > target:
+            early = time
+        else:
+            late = time
+        newton = (
+            time - (now.velocity - target) / now.acceleration if now.acceleration < 0 else early
+        )
+        following = newton if early < newton < late else 0.5 * (early + late)
+        if abs(following - time) <= 1e-15 * late:
+            break
+        time = following
+    return time
+
+
+@compiled
+def _time_of_position(
+    start: Motion, jerk: float, dynamics: Dynamics, target: float, late: float
+) -> float:
+    """Time in [0, late] at which the position, rising there, reaches `target`."""
+    damping = dynamics.viscous_friction / dynamics.mass
+    stiffness = dynamics.spring_constant / dynamics.mass
+    early = 0.0
+    time = 0.5 * late
+    for _ in range(_ROOT_ITERATIONS):
+        now = motion_after(start, jerk, impulse_response(damping, stiffness, time), time)
+        if now.position < target:
+            early = time
+        else:
+            late = time
+        newton = time - (now.position - target) / now.velocity if now.velocity > 0 else late
+        following = newton if early < newton < late else 0.5 * (early + late)
+        if abs(following - time) <= 1e-15 * late:
+            break
+        time = following
+    return time
+
+
+@compiled
+def _time_to_rest(
+    start: Motion, jerk: float, dynamics: Dynamics, force: float, slope: float, duration: float
+) -> float:
+    """Time at which the sliding stem comes to rest, inf if not within `duration`.
+
+    It rests where its speed falls to the limit velocity while static friction can hold it, or
+    reaches zero. `force` + `slope`·t is the actuator force less the preload.
+    """
+    damping = dynamics.viscous_friction / dynamics.mass
+    stiffness = dynamics.spring_constant / dynamics.mass
+    swing = stiffness - damping * damping / 4
+    half_period = math.pi / math.sqrt(swing) if swing > 0 else math.inf
+    early, early_velocity = 0.0, start.velocity
+    late = min(first_turn(start.acceleration, jerk, damping, stiffness), duration)
+    while True:
+        end = motion_after(start, jerk, impulse_response(damping, stiffness, late), late)
+        if early_velocity > dynamics.limit_velocity >= end.velocity:
+            time = _time_of_velocity(start, jerk, dynamics, dynamics.limit_velocity, early, late)
+            held = motion_after(start, jerk, impulse_response(damping, stiffness, time), time)
+            pull = force + slope * time - dynamics.spring_constant * held.position
+            if pull <= dynamics.static_friction:
+                return time
+        if end.velocity <= 0 and end.velocity < early_velocity:
+            return _time_of_velocity(start, jerk, dynamics, 0.0, early, late)
+        if late >= duration:
+            return math.inf
+        early, early_velocity = late, end.velocity
+        late = min(late + half_period, duration)
+
+
+@compiled
+def _slide_up(
+    start: Motion, dynamics: Dynamics, force: float, slope: float, duration: float, stop: float
+) -> tuple[float, float, float]:
+    """Slide upwards until rest, the travel stop at `stop`, or the end of `duration`.
+
+    Returns the position, the velocity (zero at rest) and the time that has passed.
+    """
+    damping = dynamics.viscous_friction / dynamics.mass
+    stiffness = dynamics.spring_constant / dynamics.mass
+    jerk = slope / dynamics.mass - stiffness * start.velocity
+    rest = _time_to_rest(start, jerk, dynamics, force, slope, duration)
+    time = min(rest, duration)
+    end = motion_after(start, jerk, impulse_response(damping, stiffness, time), time)
+    if end.position >= stop:
+        return stop, 0.0, _time_of_position(start, jerk, dynamics, stop, time)
+    if rest <= duration:
+        return end.position, 0.0, time
+    return end.position, max(end.velocity, 0.0), time
+
+
+@compiled
+def _stop_ahead(side: float, travel: float) -> float:
+    """Mirrored position of the travel stop towards `side`; inf for a machine without stops."""
+    return travel if side > 0 or travel == math.inf else 0.0
+
+
+@compiled
+def _breakaway(
+    position: float, pull: float, slope: float, dynamics: Dynamics
+) -> tuple[float, float]:
+    """Side (+1 up, −1 down) to which the resting stem leaves first, and the time until then.
+
+    `pull` + `slope`·t is the actuator force less spring and preload. The stem leaves when it
+    exceeds the static friction towards a side that no travel stop blocks; the time is inf if it
+    never does.
+    """
+    up, down = math.inf, math.inf
+    if position < dynamics.travel:
+        if pull > dynamics.static_friction:
+            up = 0.0
+        elif slope > 0:
+            up = (dynamics.static_friction - pull) / slope
+    if position > 0 or dynamics.travel == math.inf:
+        if -pull > dynamics.static_friction:
+            down = 0.0
+        elif slope < 0:
+            down = (dynamics.static_friction + pull) / -slope
+    return (1.0, up) if up < down else (-1.0, down)
+
+
+@compiled
+def advance_stem(
+    position: float,
+    velocity: float,
+    force: float,
+    slope: float,
+    duration: float,
+    dynamics: Dynamics,
+) -> tuple[float, float]:
+    """Advance the stem by `duration` under a force that is linear in time, exactly.
+
+    Parameters
+    ----------
+    position, velocity : float
+        State of the stem at the start, m and m/s.
+    force, slope : float
+        Actuator force less the spring preload at the start, N, and its rate, N/s.
+    duration : float
+        Length of the step, s.
+    dynamics : Dynamics
+        Parameters of the model.
+
+    Returns
+    -------
+    position, velocity : float
+        State of the stem at the end; the velocity is exactly zero at rest.
+    """
+    shortest_phase = 1e-12 * duration
+    elapsed = 0.0
+    while elapsed < duration:
+        pull = force + slope * elapsed - dynamics.spring_constant * position
+        if velocity == 0.0:
+            side, wait = _breakaway(position, pull, slope, dynamics)
+            elapsed += wait
+            if elapsed >= duration:
+                break
+            excess = max(side * pull, dynamics.static_friction) - dynamics.coulomb_friction
+        else:
+            side = 1.0 if velocity > 0 else -1.0
+            excess = (
+                side * pull - dynamics.coulomb_friction - dynamics.viscous_friction * abs(velocity)
+            )
+        reached, speed, time = _slide_up(
+            Motion(side * position, abs(velocity), excess / dynamics.mass),
+            dynamics,
+            side * (force + slope * elapsed),
+            side * slope,
+            duration - elapsed,
+            _stop_ahead(side, dynamics.travel),
+        )
+        position, velocity = side * reached, side * speed
+        elapsed += max(time, shortest_phase)
+    return position, velocity
