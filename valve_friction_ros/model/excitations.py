@@ -161,7 +161,7 @@ class IsaSteps(Excitation):
         """Pressure in Pa at each `time` (s since the start), in the shape of `time`."""
         levels = self.levels
         index = np.floor(np.asarray(time, dtype=np.float64) / self.hold).astype(np.intp)
-        return np.take(levels, index, mode="clip")
+        return np.asarray(np.take(levels, index, mode="clip"), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

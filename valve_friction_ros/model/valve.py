@@ -63,6 +63,10 @@ class Valve:
         """Pressure in Pa at which the actuator exerts `force` in N."""
         return force / self.diaphragm_area + self.pressure_reference
 
+    def sensor_reads(self, pressure: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell for each `pressure` in Pa whether it lies within the range of the sensor."""
+        return (pressure >= self.pressure_minimum) & (pressure <= self.pressure_maximum)
+
     def share_of_travel(self, distance: float) -> float:
         """Express `distance` in m as a share of the travel, nan for a machine without stops."""
         return distance / self.travel if math.isfinite(self.travel) else math.nan

@@ -1,0 +1,73 @@
+"""The YAML file that describes a valve."""
+
+import difflib
+from dataclasses import dataclass, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import yaml
+
+from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.model import Valve
+from valve_friction_ros.model.checks import require_finite
+
+__all__ = ["ValveFile", "read_valve_file"]
+
+_GEOMETRY = tuple(field.name for field in fields(Valve))
+
+
+@dataclass(frozen=True)
+class ValveFile:
+    """A valve, and the parameters that its file names besides the geometry.
+
+    Attributes
+    ----------
+    valve : Valve
+        Geometry and sensor range.
+    known : mapping of str to float
+        Nominal parameters by name: the mass is assumed where a record does not tell it, and
+        each can be fixed by its name alone.
+    """
+
+    valve: Valve
+    known: MappingProxyType[str, float]
+
+
+def _numbers(path: Path) -> dict[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read: {error}") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path}: expected lines such as 'diaphragm_area: 0.0445'")
+    return content
+
+
+def read_valve_file(path: Path) -> ValveFile:
+    """Read a valve from YAML: ``diaphragm_area`` and what else is known, in SI units.
+
+    Raises
+    ------
+    ValueError
+        In one line: the file, the key, and the rule that it breaks.
+    """
+    content = _numbers(path)
+    names = (*_GEOMETRY, *FIXABLE)
+    for key in content:
+        if key not in names:
+            close = difflib.get_close_matches(str(key), names, n=1)
+            hint = f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(names)}"
+            raise ValueError(f"{path}: unknown key {key!r}{hint}")
+    if "diaphragm_area" not in content:
+        raise ValueError(f"{path}: diaphragm_area is missing")
+    try:
+        known = {
+            name: require_finite(name, value) for name, value in content.items() if name in FIXABLE
+        }
+        valve = Valve(**{name: content[name] for name in content if name in _GEOMETRY})
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path}: {error}") from None
+    return ValveFile(valve, MappingProxyType(known))

@@ -1,0 +1,35 @@
+"""Monitoring of a valve: stream buffers, baseline and diagnosis; no ROS."""
+
+from valve_friction_ros.monitoring.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    Level,
+    StatusSignal,
+    dead_band,
+    diagnose,
+)
+from valve_friction_ros.monitoring.friction_monitor import (
+    FrictionMonitor,
+    MonitorSettings,
+    identify_snapshot,
+)
+from valve_friction_ros.monitoring.record_buffer import RecordBuffer, Snapshot
+from valve_friction_ros.monitoring.resampling import uniform_recording
+from valve_friction_ros.monitoring.samples import Samples, nanoseconds
+
+__all__ = [
+    "Diagnosis",
+    "FrictionLimits",
+    "FrictionMonitor",
+    "Level",
+    "MonitorSettings",
+    "RecordBuffer",
+    "Samples",
+    "Snapshot",
+    "StatusSignal",
+    "dead_band",
+    "diagnose",
+    "identify_snapshot",
+    "nanoseconds",
+    "uniform_recording",
+]

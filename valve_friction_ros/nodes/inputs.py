@@ -1,0 +1,45 @@
+"""Watching that the input topics arrive, and saying why where they do not."""
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+__all__ = ["InputWatch"]
+
+
+class InputWatch:
+    """Tells what is wrong with one subscribed topic.
+
+    Parameters
+    ----------
+    node : Node
+        The node that subscribes.
+    subscription : Subscription
+        Its subscription.
+    message_type : str
+        Type that it expects, such as ``sensor_msgs/msg/JointState``.
+    """
+
+    def __init__(self, node: Node, subscription: Subscription, message_type: str) -> None:
+        self._node = node
+        self._topic = subscription.topic_name
+        self._type = message_type
+        self._since = node.get_clock().now().nanoseconds
+
+    def arrived(self) -> None:
+        """Note that a message came."""
+        self._since = self._node.get_clock().now().nanoseconds
+
+    def problem(self, timeout: float) -> str | None:
+        """Say what is wrong if nothing has come for `timeout` seconds, else None."""
+        silence = (self._node.get_clock().now().nanoseconds - self._since) / 1e9
+        if silence <= timeout:
+            return None
+        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        others = sorted({info.topic_type for info in publishers} - {self._type})
+        if not publishers:
+            cause = "nobody publishes it"
+        elif others:
+            cause = f"it is published as {', '.join(others)}, not {self._type}"
+        else:
+            cause = "its publisher is silent or has an incompatible quality of service"
+        return f"no data on {self._topic} for {silence:.1f} s: {cause}"

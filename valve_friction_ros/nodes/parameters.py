@@ -1,0 +1,101 @@
+"""Declaration of node parameters: every one with a description, a unit and a range."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+__all__ = ["ParameterSpec", "declare_parameters", "optional", "reject_invalid", "values_of"]
+
+
+@dataclass(frozen=True)
+class ParameterSpec:
+    """One parameter of a node.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    default : bool, int, float or str
+        Its default, which also fixes its type.
+    description : str
+        What it means, with its unit.
+    limits : tuple of float, optional
+        Lowest and highest value. A parameter that may be nan ("not given") has none, because
+        ROS counts nan as outside any range; the value types check it all the same.
+    read_only : bool
+        True where it can only be given at start.
+    """
+
+    name: str
+    default: bool | int | float | str
+    description: str
+    limits: tuple[float, float] | None = None
+    read_only: bool = False
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return the ROS description of this parameter."""
+        descriptor = ParameterDescriptor(description=self.description, read_only=self.read_only)
+        if self.limits is not None:
+            lowest, highest = self.limits
+            if isinstance(self.default, int):
+                descriptor.integer_range = [
+                    IntegerRange(from_value=int(lowest), to_value=int(highest), step=0)
+                ]
+            else:
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=lowest, to_value=highest, step=0.0)
+                ]
+        return descriptor
+
+
+def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
+    """Declare `specs` on `node`; raises rclpy's parameter exceptions for a bad override."""
+    for spec in specs:
+        node.declare_parameter(spec.name, spec.default, spec.descriptor())
+
+
+def values_of(
+    node: Node, specs: Iterable[ParameterSpec], changes: Iterable[Parameter] = ()
+) -> dict[str, Any]:
+    """Values of the parameters by name, as they would be after `changes`."""
+    values = {spec.name: node.get_parameter(spec.name).value for spec in specs}
+    for parameter in changes:
+        if parameter.name in values:
+            values[parameter.name] = parameter.value
+    return values
+
+
+def optional(value: float) -> float | None:
+    """Turn the nan that stands for "not given" into None."""
+    return None if math.isnan(value) else value
+
+
+def reject_invalid(
+    node: Node,
+    specs: Iterable[ParameterSpec],
+    build: Callable[[Mapping[str, Any]], object],
+) -> None:
+    """Have `node` reject any change with which `build`, fed all values, raises ValueError."""
+    watched = tuple(specs)
+    names = {spec.name for spec in watched}
+
+    def check(changes: list[Parameter]) -> SetParametersResult:
+        if not any(parameter.name in names for parameter in changes):
+            return SetParametersResult(successful=True)
+        try:
+            build(values_of(node, watched, changes))
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(check)

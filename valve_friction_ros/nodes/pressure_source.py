@@ -1,0 +1,160 @@
+"""Node `pressure_source`: a bench's pressure signal on a topic."""
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import FluidPressure
+
+from valve_friction_ros.model import (
+    DEFAULT_LAG,
+    Excitation,
+    IsaSteps,
+    SampledPressure,
+    SineWave,
+    SquareWave,
+    TriangleWave,
+    converter_response,
+)
+from valve_friction_ros.monitoring.csv_recording import read_columns
+from valve_friction_ros.nodes.messages import time_message
+from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters, values_of
+from valve_friction_ros.nodes.running import quick_executor, run_node
+from valve_friction_ros.nodes.streams import STREAM, qos_overrides
+
+__all__ = ["PressureSource", "main"]
+
+_BLOCKS_PER_SECOND = 50.0
+_SQUARE = SquareWave()
+
+_PARAMETERS = (
+    ParameterSpec(
+        "excitation",
+        "square",
+        "Signal: square, triangle, sine, isa_steps or file [-]",
+        read_only=True,
+    ),
+    ParameterSpec("low", _SQUARE.low, "Lowest pressure of the signal [Pa]", (-1e9, 1e9), True),
+    ParameterSpec("high", _SQUARE.high, "Highest pressure of the signal [Pa]", (-1e9, 1e9), True),
+    ParameterSpec(
+        "period",
+        _SQUARE.period,
+        "Period of square, triangle and sine; hold time of each isa_steps level [s]",
+        (1e-3, 1e6),
+        True,
+    ),
+    ParameterSpec(
+        "file",
+        "",
+        "CSV file with the columns time_s and pressure_pa, for the excitation file [-]",
+        read_only=True,
+    ),
+    ParameterSpec("sample_rate", 1000.0, "Samples per second of signal [Hz]", (0.1, 1e5), True),
+    ParameterSpec(
+        "speed", 1.0, "Seconds of signal published in a second of real time [-]", (1e-3, 1e3), True
+    ),
+    ParameterSpec(
+        "converter_lag", DEFAULT_LAG, "Time constant of the V/P converter [s]", (0.0, 1e3), True
+    ),
+    ParameterSpec(
+        "pressure_noise",
+        0.0,
+        "Standard deviation of white noise on the pressure, which the stem feels too [Pa]",
+        (0.0, 1e9),
+        True,
+    ),
+    ParameterSpec("noise_seed", 0, "Seed of the noise [-]", (0, 2**31 - 1), True),
+)
+
+
+def _from_file(path: str) -> SampledPressure:
+    if not path:
+        raise ValueError("excitation is 'file' but the parameter file is empty")
+    columns = read_columns(Path(path), ("time_s", "pressure_pa"))
+    return SampledPressure(columns["time_s"], columns["pressure_pa"])
+
+
+def _excitation(kind: str, low: float, high: float, period: float, path: str) -> Excitation:
+    """Build the signal; raises ValueError for an unknown kind or impossible numbers."""
+    if kind == "file":
+        return _from_file(path)
+    if kind == "isa_steps":
+        return IsaSteps((low + high) / 2, high - low, hold=period)
+    waves: dict[str, Callable[[float, float, float], Excitation]] = {
+        "square": SquareWave,
+        "triangle": TriangleWave,
+        "sine": SineWave,
+    }
+    if kind not in waves:
+        known = ", ".join([*waves, "isa_steps", "file"])
+        raise ValueError(f"excitation {kind!r} is unknown: choose from {known}")
+    return waves[kind](low, high, period)
+
+
+class PressureSource(Node):
+    """Publishes the signal in blocks, each sample with its own stamp."""
+
+    def __init__(self) -> None:
+        super().__init__("pressure_source")
+        declare_parameters(self, _PARAMETERS)
+        values = values_of(self, _PARAMETERS)
+        self._excitation = _excitation(
+            values["excitation"], values["low"], values["high"], values["period"], values["file"]
+        )
+        self._period = 1.0 / values["sample_rate"]
+        self._speed = values["speed"]
+        self._lag = values["converter_lag"]
+        self._noise = values["pressure_noise"]
+        self._random = np.random.default_rng(values["noise_seed"])
+        self._sent = 0
+        self._before: tuple[float, float] | None = None
+        self._start: int | None = None
+        self._publisher = self.create_publisher(
+            FluidPressure, "actuator_pressure", STREAM, qos_overriding_options=qos_overrides()
+        )
+        self.create_timer(1.0 / _BLOCKS_PER_SECOND, self._publish_due)
+
+    def _publish_due(self) -> None:
+        """Publish all samples whose time has come since the last block."""
+        now = self.get_clock().now().nanoseconds
+        if self._start is None or now < self._start:
+            self._start = now
+            self._sent = 0
+        elapsed = (now - self._start) / 1e9 * self._speed
+        due = int(elapsed / self._period) + 1 - self._sent
+        if due <= 0:
+            return
+        sample = self._sent + np.arange(due)
+        pressure = self._response(self._excitation.sample(sample * self._period))
+        if self._noise > 0:
+            pressure = pressure + self._noise * self._random.standard_normal(due)
+        message = FluidPressure(variance=self._noise**2)
+        message.header.frame_id = "actuator"
+        for index, value in zip(sample, pressure, strict=True):
+            message.header.stamp = time_message(self._start + round(index * self._period * 1e9))
+            message.fluid_pressure = float(value)
+            self._publisher.publish(message)
+        self._sent += due
+
+    def _response(self, command: np.ndarray) -> np.ndarray:
+        """Pass a block through the converter, continuing from the block before."""
+        if self._before is None:
+            pressure = converter_response(command, self._period, self._lag)
+        else:
+            last_command, last_pressure = self._before
+            pressure = converter_response(
+                np.concatenate(([last_command], command)), self._period, self._lag, last_pressure
+            )[1:]
+        self._before = float(command[-1]), float(pressure[-1])
+        return pressure
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(PressureSource, arguments, quick_executor)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

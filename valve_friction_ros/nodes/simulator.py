@@ -1,0 +1,129 @@
+"""Node `simulator`: a valve with Karnopp friction on real topics."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import FluidPressure, JointState
+
+from valve_friction_ros.model import KarnoppParameters, StemState, Valve, advance, balanced_state
+from valve_friction_ros.model.checks import require_non_negative
+from valve_friction_ros.nodes.messages import stamp_of
+from valve_friction_ros.nodes.parameters import (
+    ParameterSpec,
+    declare_parameters,
+    reject_invalid,
+    values_of,
+)
+from valve_friction_ros.nodes.running import quick_executor, run_node
+from valve_friction_ros.nodes.streams import STREAM, qos_overrides
+from valve_friction_ros.nodes.valve_parameters import (
+    JOINT,
+    KARNOPP_PARAMETERS,
+    VALVE_PARAMETERS,
+    karnopp_parameters_from,
+    valve_from,
+)
+
+__all__ = ["Simulator", "main"]
+
+_NOISE_PARAMETERS = (
+    ParameterSpec(
+        "position_noise", 0.0, "Standard deviation of the stem sensor's noise [m]", (0.0, 1.0)
+    ),
+    ParameterSpec("noise_seed", 0, "Seed of the noise [-]", (0, 2**31 - 1), read_only=True),
+)
+_CHANGEABLE = (*VALVE_PARAMETERS, *KARNOPP_PARAMETERS, *_NOISE_PARAMETERS)
+
+
+class _Plant(NamedTuple):
+    valve: Valve
+    parameters: KarnoppParameters
+    position_noise: float
+
+
+def _plant(values: Mapping[str, Any]) -> _Plant:
+    return _Plant(
+        valve_from(values),
+        karnopp_parameters_from(values),
+        require_non_negative("position_noise", values["position_noise"]),
+    )
+
+
+class Simulator(Node):
+    """Steps the model by the stamps of the pressure and publishes the stem at the same stamps."""
+
+    def __init__(self) -> None:
+        super().__init__("simulator")
+        declare_parameters(self, (*_CHANGEABLE, JOINT))
+        self._plant = _plant(values_of(self, _CHANGEABLE))
+        reject_invalid(self, _CHANGEABLE, _plant)
+        self.add_post_set_parameters_callback(self._take_parameters)
+        self._joint = self.get_parameter(JOINT.name).value or "stem"
+        self._random = np.random.default_rng(self.get_parameter("noise_seed").value)
+        self._stamp: int | None = None
+        self._pressure = 0.0
+        self._state = StemState(0.0)
+        self._compile()
+        self._publisher = self.create_publisher(
+            JointState, "stem_state", STREAM, qos_overriding_options=qos_overrides()
+        )
+        self.create_subscription(
+            FluidPressure,
+            "actuator_pressure",
+            self._on_pressure,
+            STREAM,
+            qos_overriding_options=qos_overrides(),
+        )
+
+    def _compile(self) -> None:
+        """Compile the model before the first message, not in its callback."""
+        valve, parameters, _ = self._plant
+        rest = valve.pressure_reference
+        advance(balanced_state(valve, parameters, rest), valve, parameters, (rest, rest), 1e-3)
+
+    def _take_parameters(self, _: object) -> None:
+        self._plant = _plant(values_of(self, _CHANGEABLE))
+
+    def _on_pressure(self, message: FluidPressure) -> None:
+        stamp, pressure = stamp_of(message.header.stamp), message.fluid_pressure
+        valve, parameters, noise = self._plant
+        if not np.isfinite(pressure):
+            self.get_logger().warning(
+                "a pressure that is not finite was ignored", throttle_duration_sec=5.0
+            )
+            return
+        if self._stamp is not None and stamp == self._stamp:
+            return
+        if self._stamp is None or stamp < self._stamp:
+            if self._stamp is not None:
+                self.get_logger().warning("stamps went back: the stem starts anew, at rest")
+            self._state = balanced_state(valve, parameters, pressure)
+        else:
+            self._state = advance(
+                self._state,
+                valve,
+                parameters,
+                (self._pressure, pressure),
+                (stamp - self._stamp) / 1e9,
+            )
+        self._stamp, self._pressure = stamp, pressure
+        state = JointState(
+            name=[self._joint],
+            position=[self._state.position + noise * self._random.standard_normal()],
+            velocity=[self._state.velocity],
+        )
+        state.header.stamp = message.header.stamp
+        state.header.frame_id = message.header.frame_id
+        self._publisher.publish(state)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(Simulator, arguments, quick_executor)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
