@@ -161,9 +161,11 @@ def _run(options: argparse.Namespace) -> Estimate:
     recording = read_recording(options.file, description.valve, columns)
     estimate = identify(recording, description.valve, settings)
     if options.plot is not None:
-        from valve_friction_ros.plots import identification_figure  # noqa: PLC0415 - slow to import
+        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
 
-        identification_figure(recording, description.valve, estimate).savefig(options.plot)
+        drive = plots.FORCE if description is _DIRECT_DRIVE else plots.PRESSURE
+        figure = plots.identification_figure(recording, description.valve, estimate, drive)
+        figure.savefig(options.plot)
     return estimate
 
 

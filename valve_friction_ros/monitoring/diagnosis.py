@@ -1,5 +1,6 @@
 """From an estimate to a verdict: whether friction has grown or collapsed, and what it costs."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
@@ -98,7 +99,7 @@ def dead_band(estimate: Estimate, valve: Valve) -> float:
 
 def _consequence(estimate: Estimate, valve: Valve) -> str:
     share = dead_band(estimate, valve)
-    if share != share:  # noqa: PLR0124 - nan: a machine without a dead band in travel
+    if math.isnan(share):
         return f"coulomb friction {estimate.coulomb_friction:.4g} N"
     return f"the stem ignores reversals smaller than {100 * share:.2g} % of its travel"
 

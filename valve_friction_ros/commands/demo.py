@@ -1,0 +1,225 @@
+"""Command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
+
+import argparse
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import NamedTuple
+
+import rclpy
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from valve_friction_ros.commands.bench_client import BenchClient, BenchError
+from valve_friction_ros.commands.bench_processes import (
+    NodeProcess,
+    quick_discovery,
+    running_nodes,
+)
+from valve_friction_ros.identification import UNITS, RefusalError
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    KarnoppParameters,
+    SquareWave,
+)
+from valve_friction_ros.monitoring import Level, RecordBuffer
+from valve_friction_ros.plots import Case, friction_figure
+
+__all__ = ["main"]
+
+_NAMESPACE = "fv_101"
+_RECORD = 2 * SquareWave().period
+_POSITION_BIAS = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
+_TOLERANCES = {
+    "mass": 0.10,
+    "viscous_friction": 0.001,
+    "coulomb_friction": 0.001,
+    "static_friction": 0.01,
+    "spring_constant": 0.001,
+    "spring_preload": 0.001,
+}
+_START_TIMEOUT = 30.0
+_FRICTION = ("mass", "viscous_friction", "coulomb_friction", "static_friction")
+
+
+class _Outcome(NamedTuple):
+    """One identified state of the packing."""
+
+    label: str
+    truth: KarnoppParameters
+    identified: Mapping[str, float]
+    case: Case
+
+    def errors(self) -> dict[str, float]:
+        """Relative errors of the identified parameters."""
+        return {name: self.identified[name] / getattr(self.truth, name) - 1 for name in _TOLERANCES}
+
+    def missed(self) -> list[str]:
+        """Parameters whose error exceeds the tolerance."""
+        return [
+            name for name, error in self.errors().items() if not abs(error) <= _TOLERANCES[name]
+        ]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="demo",
+        description="Start a simulated valve and its monitor as processes, identify the friction, "
+        "tighten the packing while it runs, and identify again.",
+        epilog="Exit code 0: all within tolerance and the excess friction was diagnosed; "
+        "1: not so; 2: the bench did not run.",
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("valve_friction_demo.png"),
+        metavar="FILE.png",
+        help="picture of the result (%(default)s)",
+    )
+    return parser
+
+
+def _record(client: BenchClient, console: Console, label: str) -> None:
+    """Wait, with progress shown, until two periods have been recorded."""
+    client.trigger("clear")
+    client.begin_record()
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:4.1f} of {task.total:.1f} s"),
+        TimeRemainingColumn(),
+        console=console,
+    ) as progress:
+        task = progress.add_task(label, total=_RECORD)
+
+        def enough() -> bool:
+            progress.update(task, completed=min(client.recorded, _RECORD))
+            return client.recorded >= _RECORD
+
+        client.wait(enough, 3 * _RECORD, f"record of {_RECORD:g} s")
+
+
+def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Outcome:
+    """Identify the record on the running node and read the result from its topics."""
+    recording = client.recording()
+    client.trigger("identify")
+    values = client.diagnostic_values
+    client.wait(
+        lambda: (
+            client.diagnostic_values.get("estimate_valid") == "true"
+            and client.diagnostic_values is not values
+            and float(client.diagnostic_values["estimate_age [s]"]) < 2.0
+        ),
+        5.0,
+        "diagnostic of the estimate",
+    )
+    values = client.diagnostic_values
+    sweep = client.sweep_columns()
+    case = Case(
+        label,
+        recording,
+        sweep["threshold"],
+        sweep["coulomb_friction"],
+        sweep["sigma"],
+        float(values["threshold [m/s]"]),
+    )
+    identified = {name: float(values[f"{name} [{UNITS[name]}]"]) for name in _TOLERANCES}
+    return _Outcome(label, truth, identified, case)
+
+
+def _table(outcomes: Sequence[_Outcome]) -> Table:
+    table = Table("", "parameter", "unit", box=None, header_style="bold")
+    table.columns[1].no_wrap = True
+    for heading in ("true", "identified", "error", "tolerance"):
+        table.add_column(heading, justify="right")
+    for outcome in outcomes:
+        for name, error in outcome.errors().items():
+            style = "red" if name in outcome.missed() else None
+            table.add_row(
+                outcome.label,
+                name,
+                UNITS[name],
+                f"{getattr(outcome.truth, name):.6g}",
+                f"{outcome.identified[name]:.6g}",
+                f"{100 * error:+.4f} %",
+                f"±{100 * _TOLERANCES[name]:g} %",
+                style=style,
+            )
+    return table
+
+
+def _nodes() -> list[NodeProcess]:
+    simulated = {**asdict(LOW_FRICTION)}
+    monitored = {
+        "position_bias": _POSITION_BIAS,
+        "assumed_mass": 1.6,
+        "valve_tag": _NAMESPACE.upper().replace("_", "-"),
+    }
+    return [
+        NodeProcess("identifier", monitored),
+        NodeProcess("simulator", simulated),
+        NodeProcess("pressure_source", {}),
+    ]
+
+
+def _run(client: BenchClient, console: Console) -> tuple[list[_Outcome], str]:
+    """Run the story; return both outcomes and the closing diagnostic."""
+    with console.status("waiting for the nodes"):
+        client.wait(lambda: client.recorded > 0, _START_TIMEOUT, "stem position")
+    _record(client, console, "packing loose")
+    before = _identify(client, "packing loose", LOW_FRICTION)
+    console.print(f"identified; {client.trigger('set_baseline')}", highlight=False)
+    tightened = {name: getattr(HIGH_FRICTION, name) for name in _FRICTION}
+    client.set_parameters("simulator", tightened)
+    console.print("the packing is tightened while the valve runs", highlight=False)
+    _record(client, console, "packing tight")
+    after = _identify(client, "packing tight", HIGH_FRICTION)
+    client.wait(lambda: client.level == Level.ERROR, 5.0, "ERROR in /diagnostics")
+    return [before, after], client.diagnostic_message
+
+
+def _report(outcomes: Sequence[_Outcome], message: str, output: Path, console: Console) -> int:
+    console.print(_table(outcomes))
+    verdict = f"/diagnostics ERROR: {message}"
+    console.print(verdict, style="bold", highlight=False)
+    friction_figure([outcome.case for outcome in outcomes], verdict).savefig(output)
+    console.print(f"picture: {output}", highlight=False)
+    missed = [f"{name} ({outcome.label})" for outcome in outcomes for name in outcome.missed()]
+    if missed:
+        console.print(f"outside the tolerance: {', '.join(missed)}", style="bold red")
+        return 1
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demo; return its exit code."""
+    options = _parser().parse_args(arguments)
+    console = Console()
+    os.environ.update(quick_discovery())
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    window = 2 * _RECORD
+    try:
+        with running_nodes(_nodes(), _NAMESPACE):
+            rclpy.init(args=[])
+            client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, window))
+            try:
+                outcomes, message = _run(client, console)
+            finally:
+                client.close()
+                rclpy.try_shutdown()
+        return _report(outcomes, message, options.output, console)
+    except KeyboardInterrupt:
+        console.print("stopped")
+        return 130
+    except (BenchError, RefusalError, OSError) as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

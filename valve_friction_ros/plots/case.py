@@ -1,0 +1,78 @@
+"""What a figure shows of one identified record."""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification import Estimate
+from valve_friction_ros.model import Recording
+
+__all__ = ["FORCE", "PRESSURE", "Case", "DriveScale"]
+
+
+class DriveScale(NamedTuple):
+    """How the pressure of a recording is shown: the axis label, and Pa for one of its units."""
+
+    label: str
+    pascals: float
+
+
+PRESSURE = DriveScale("pressure [kPa]", 1e3)
+"""A valve's actuator pressure, in the paper's unit."""
+
+FORCE = DriveScale("drive force [N]", 1.0)
+"""A machine without a diaphragm, whose recording holds 1 Pa for 1 N."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A record with the sweep of its identification.
+
+    Attributes
+    ----------
+    label : str
+        What to call it.
+    recording : Recording
+        Pressure and stem position.
+    thresholds : ndarray of float, shape (S,)
+        δv(s), m/s.
+    coulomb_friction : ndarray of float, shape (S,)
+        F_c estimated at each threshold, N.
+    sigma : ndarray of float, shape (S,)
+        σ_s at each threshold, N.
+    threshold : float
+        The chosen threshold, m/s.
+    drive : DriveScale
+        How the pressure is shown.
+    """
+
+    label: str
+    recording: Recording = field(repr=False)
+    thresholds: NDArray[np.float64] = field(repr=False)
+    coulomb_friction: NDArray[np.float64] = field(repr=False)
+    sigma: NDArray[np.float64] = field(repr=False)
+    threshold: float
+    drive: DriveScale = PRESSURE
+
+    @classmethod
+    def of(
+        cls, label: str, recording: Recording, estimate: Estimate, drive: DriveScale = PRESSURE
+    ) -> "Case":
+        """Gather a case from an estimate."""
+        sweep = estimate.sweep
+        return cls(
+            label,
+            recording,
+            sweep.thresholds,
+            sweep.estimates["coulomb_friction"],
+            sweep.sigma,
+            estimate.threshold,
+            drive,
+        )
+
+    @property
+    def chosen_coulomb_friction(self) -> float:
+        """F_c at the chosen threshold, N."""
+        return float(self.coulomb_friction[np.argmin(np.abs(self.thresholds - self.threshold))])

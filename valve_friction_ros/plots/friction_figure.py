@@ -1,0 +1,77 @@
+"""The figure of an identification: record, sweep, signature and verdict on one page."""
+
+import math
+import textwrap
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from valve_friction_ros.identification import Estimate
+from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.monitoring import dead_band
+from valve_friction_ros.plots.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.plots.panels import (
+    draw_coulomb_sweep,
+    draw_record,
+    draw_sigma_sweep,
+    draw_signature,
+)
+
+__all__ = ["friction_figure", "identification_figure"]
+
+_VERDICT_WIDTH = 110
+
+
+def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
+    """Draw one or several identified records of a valve, and the verdict on it.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        At most four, in the order of time.
+    verdict : str
+        One sentence, printed above the panels.
+
+    Returns
+    -------
+    Figure
+        To be saved or shown; no global state of matplotlib is touched.
+    """
+    figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
+    figure.suptitle(
+        textwrap.fill(verdict, _VERDICT_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
+    )
+    panels = figure.subplot_mosaic(
+        [
+            ["pressure", "pressure"],
+            ["stem", "stem"],
+            ["coulomb", "signature"],
+            ["sigma", "signature"],
+        ],
+        height_ratios=[1, 1.2, 1.8, 1],
+    )
+    panels["stem"].sharex(panels["pressure"])
+    panels["sigma"].sharex(panels["coulomb"])
+    draw_record(panels["pressure"], panels["stem"], cases)
+    draw_coulomb_sweep(panels["coulomb"], cases)
+    draw_sigma_sweep(panels["sigma"], cases)
+    draw_signature(panels["signature"], cases)
+    if len(cases) > 1:
+        panels["signature"].legend(loc="upper left", frameon=False)
+    for axes in panels.values():
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def identification_figure(
+    recording: Recording, valve: Valve, estimate: Estimate, drive: DriveScale = PRESSURE
+) -> Figure:
+    """Draw a recording and its identification."""
+    share = dead_band(estimate, valve)
+    effect = f", dead band {100 * share:.2g} % of travel" if math.isfinite(share) else ""
+    verdict = (
+        f"F_c {estimate.coulomb_friction:.4g} N, F_v {estimate.viscous_friction:.4g} N·s/m, "
+        f"k {estimate.spring_constant:.4g} N/m{effect}"
+    )
+    return friction_figure([Case.of("recording", recording, estimate, drive)], verdict)
