@@ -118,7 +118,7 @@ class BenchClient(Node):
                 raise BenchError(f"no {what} within {timeout:g} s")
             self._executor.spin_once(timeout_sec=_POLL)
 
-    def _result(self, future: Future, timeout: float, what: str) -> object:
+    def _result(self, future: Future, timeout: float, what: str) -> Any:
         self.wait(future.done, timeout, f"answer of {what}")
         return future.result()
 

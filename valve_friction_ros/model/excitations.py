@@ -195,4 +195,5 @@ class SampledPressure(Excitation):
     def sample(self, time: ArrayLike) -> NDArray[np.float64]:
         """Pressure in Pa at each `time` (s since the first sample), in the shape of `time`."""
         since_start = np.asarray(time, dtype=np.float64) + self.times[0]
-        return np.interp(since_start, self.times, self.pressures)
+        pressure: NDArray[np.float64] = np.interp(since_start, self.times, self.pressures)
+        return pressure

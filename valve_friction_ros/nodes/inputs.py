@@ -1,7 +1,11 @@
 """Watching that the input topics arrive, and saying why where they do not."""
 
+from collections.abc import Sequence
+
 from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 __all__ = ["InputWatch"]
 
@@ -21,6 +25,7 @@ class InputWatch:
 
     def __init__(self, node: Node, subscription: Subscription, message_type: str) -> None:
         self._node = node
+        self._subscription = subscription
         self._topic = subscription.topic_name
         self._type = message_type
         self._since = node.get_clock().now().nanoseconds
@@ -28,6 +33,11 @@ class InputWatch:
     def arrived(self) -> None:
         """Note that a message came."""
         self._since = self._node.get_clock().now().nanoseconds
+
+    def _is_unreliable(self, publishers: Sequence[TopicEndpointInfo]) -> bool:
+        asked = self._subscription.qos_profile.reliability
+        offered = {info.qos_profile.reliability for info in publishers}
+        return asked == ReliabilityPolicy.RELIABLE and offered == {ReliabilityPolicy.BEST_EFFORT}
 
     def problem(self, timeout: float) -> str | None:
         """Say what is wrong if nothing has come for `timeout` seconds, else None."""
@@ -40,6 +50,11 @@ class InputWatch:
             cause = "nobody publishes it"
         elif others:
             cause = f"it is published as {', '.join(others)}, not {self._type}"
+        elif self._is_unreliable(publishers):
+            cause = (
+                "its publisher is best effort, this node asks for reliable: start it with "
+                f"qos_overrides.{self._topic}.subscription.reliability:=best_effort"
+            )
         else:
-            cause = "its publisher is silent or has an incompatible quality of service"
+            cause = "its publisher is silent"
         return f"no data on {self._topic} for {silence:.1f} s: {cause}"

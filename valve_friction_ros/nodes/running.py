@@ -1,5 +1,6 @@
 """Starting and stopping a node as a process."""
 
+import signal
 import sys
 from collections.abc import Callable, Sequence
 
@@ -73,6 +74,8 @@ def run_node(
         print(f"cannot start: {error}", file=sys.stderr)  # noqa: T201
         return 2
     finally:
+        # Under ros2 launch Ctrl-C arrives twice; the second must not disturb the stop.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()

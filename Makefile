@@ -1,0 +1,66 @@
+# `make help` lists what there is. Every target makes or reuses the virtual environment it needs.
+
+PYTHON ?= python3
+VENV ?= .venv
+PYTEST_ARGS ?=
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+
+# Nodes that a demo or a test starts are seen on this machine only.
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+# The wheels hold one middleware; a sourced ROS installation keeps its own choice.
+ifndef ROS_DISTRO
+export RMW_IMPLEMENTATION := rmw_fastrtps_cpp
+endif
+# Another environment with ROS 2 wheels, if activated, would hand down its own library path.
+ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+unexport LD_LIBRARY_PATH
+endif
+
+INSTALL = "$(PYTHON)" requirements/install.py "$(VENV)"
+
+.PHONY: help
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*##  *\(.*\)/make \1|\2/p' Makefile | while IFS='|' read -r target text; do printf '%-16s %s\n' "$$target" "$$text"; done
+
+.PHONY: demo
+demo: venv  ## friction of a simulated valve grows, and is diagnosed, in under two minutes
+	@"$(VENV)/bin/demo" $(DEMO_ARGS)
+
+.PHONY: test
+test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some
+	@"$(VENV)/bin/python" -m pytest $(PYTEST_ARGS)
+
+.PHONY: lint
+lint: venv-test  ## ruff and mypy
+	@"$(VENV)/bin/ruff" check
+	@"$(VENV)/bin/ruff" format --check
+	@"$(VENV)/bin/mypy"
+
+.PHONY: format
+format: venv-test  ## rewrite the code in ruff's format, and repair what it can
+	@"$(VENV)/bin/ruff" check --fix
+	@"$(VENV)/bin/ruff" format
+
+.PHONY: venv
+venv:  ## the virtual environment to run the package
+	@$(python-found)
+	@$(INSTALL)
+
+.PHONY: venv-test
+venv-test:  ## the same, with what checks it
+	@$(python-found)
+	@$(INSTALL) test
+
+.PHONY: clean
+clean:  ## remove what make and colcon made
+	@rm -rf -- "$(VENV)" build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	@find . -name __pycache__ -type d -prune -exec rm -rf -- {} +
+
+define python-found
+command -v "$(PYTHON)" >/dev/null || { echo "make: $(PYTHON) is not there: run \`apt install python3 python3-venv\`" >&2; exit 1; }
+endef

@@ -1,0 +1,52 @@
+"""A bench: pressure source, simulated valve and identifier in one namespace.
+
+``ros2 launch valve_friction_ros bench.launch.py valve:=fv_102 config:=/path/to/bench.yaml``
+"""
+
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.substitutions import FindPackageShare
+
+PACKAGE = "valve_friction_ros"
+
+
+def nodes(context: LaunchContext) -> list[Node]:
+    """Make the three nodes, with one parameter file."""
+    config = LaunchConfiguration("config").perform(context)
+    if not Path(config).is_file():
+        raise ValueError(f"config '{config}' is no file: give the path of a parameter file")
+    return [
+        Node(
+            package=PACKAGE,
+            executable=name,
+            name=name,
+            namespace=LaunchConfiguration("valve"),
+            parameters=[config],
+            output="screen",
+        )
+        for name in ("pressure_source", "simulator", "identifier")
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Declare the arguments and start the nodes."""
+    default_config = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", "bench_low.yaml"])
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "valve",
+                default_value="fv_101",
+                description="Namespace of the valve: letters, digits and underscores.",
+            ),
+            DeclareLaunchArgument(
+                "config",
+                default_value=default_config,
+                description="Parameter file with a section for each of the three nodes.",
+            ),
+            OpaqueFunction(function=nodes),
+        ]
+    )

@@ -1,0 +1,43 @@
+"""Installation of valve_friction_ros, for colcon and for pip."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "valve_friction_ros"
+HERE = Path(__file__).resolve().parent
+
+
+def files(pattern: str) -> list[str]:
+    """Paths matching `pattern`, relative to this file and in a fixed order."""
+    return sorted(path.relative_to(HERE).as_posix() for path in HERE.glob(pattern))
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Karnopp friction of control valves: identified and diagnosed on ROS 2 topics",
+    maintainer="valve_friction_ros developers",
+    maintainer_email="maintainers@valve-friction-ros.example",
+    license="Apache-2.0",
+    python_requires=">=3.10",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed", "*/*.xml"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", files("config/*.yaml")),
+        (f"share/{NAME}/launch", files("launch/*.launch.py")),
+    ],
+    install_requires=["setuptools", "matplotlib", "numba", "numpy", "PyYAML", "rich", "scipy"],
+    zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "identifier = valve_friction_ros.nodes.start:identifier",
+            "simulator = valve_friction_ros.nodes.start:simulator",
+            "pressure_source = valve_friction_ros.nodes.start:pressure_source",
+            "demo = valve_friction_ros.commands.demo:main",
+            "identify_recording = valve_friction_ros.commands.identify_recording:main",
+        ],
+    },
+)

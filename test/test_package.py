@@ -1,0 +1,198 @@
+"""The package as its users get it: built by colcon, started from the installed tree."""
+
+import ast
+import importlib
+import importlib.util
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from configparser import ConfigParser
+from pathlib import Path
+
+import pytest
+import rclpy
+
+PROJECT = Path(__file__).resolve().parents[1]
+NAME = "valve_friction_ros"
+EXECUTABLES = {"identifier", "simulator", "pressure_source", "demo", "identify_recording"}
+LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
+DOMAIN = 91
+PATIENCE = 30.0  # s, for one thing to happen on a loaded machine
+
+
+def setup_text():
+    return (PROJECT / "setup.py").read_text()
+
+
+def entry_points():
+    found = re.findall(rf'"(\w+) = ({NAME}[\w.]+):(\w+)"', setup_text())
+    return {name: (module, function) for name, module, function in found}
+
+
+def test_versions_agree():
+    declared = ET.parse(PROJECT / "package.xml").getroot().findtext("version")
+    assert re.search(r'version="([^"]+)"', setup_text()).group(1) == declared
+    assert declared in (PROJECT / "CHANGELOG.rst").read_text()
+
+
+def imported_modules(path):
+    """Top-level names of the modules that a source file imports absolutely."""
+    names = set()
+    for statement in ast.walk(ast.parse(path.read_text())):
+        if isinstance(statement, ast.Import):
+            names |= {alias.name for alias in statement.names}
+        elif isinstance(statement, ast.ImportFrom) and statement.level == 0:
+            names.add(statement.module)
+    return {name.partition(".")[0] for name in names}
+
+
+def test_manifest_names_every_message_package_and_library():
+    root = ET.parse(PROJECT / "package.xml").getroot()
+    declared = {element.text for element in root.iter("exec_depend")}
+    keys = {"yaml": "python3-yaml"} | {
+        name: f"python3-{name}" for name in ("matplotlib", "numba", "numpy", "rich", "scipy")
+    }
+    own = set(sys.stdlib_module_names) | {NAME}
+    for path in [*(PROJECT / NAME).rglob("*.py"), *(PROJECT / "launch").glob("*.py")]:
+        for module in imported_modules(path) - own:
+            assert keys.get(module, module) in declared, f"{path.name} imports {module}"
+
+
+def test_entry_points_exist():
+    assert set(entry_points()) == EXECUTABLES
+    for module, function in entry_points().values():
+        assert callable(getattr(importlib.import_module(module), function))
+
+
+def test_executables_go_where_ros2_run_looks():
+    parser = ConfigParser()
+    parser.read(PROJECT / "setup.cfg")
+    assert parser["develop"]["script_dir"] == f"$base/lib/{NAME}"
+    assert parser["install"]["install_scripts"] == f"$base/lib/{NAME}"
+
+
+@pytest.mark.parametrize("name", LAUNCH_FILES)
+def test_launch_file(name):
+    path = PROJECT / "launch" / name
+    code = compile(path.read_text(), str(path), "exec")
+    if importlib.util.find_spec("launch_ros") is None:
+        assert "generate_launch_description" in code.co_names  # launch comes with ROS only
+        return
+    namespace = {"__name__": path.stem}
+    exec(code, namespace)
+    assert namespace["generate_launch_description"]().entities
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """Build a copy of the sources with colcon, and return the folder it installs into."""
+    if importlib.util.find_spec("colcon_core") is None:
+        pytest.skip("colcon is not installed: run make venv-test, or apt install colcon")
+    workspace = tmp_path_factory.mktemp("workspace")
+    ignored = shutil.ignore_patterns(
+        ".*", "build", "install", "log", "__pycache__", "*.egg-info", "*.png"
+    )
+    shutil.copytree(PROJECT, workspace / "src" / NAME, ignore=ignored)
+    build = subprocess.run(
+        [sys.executable, "-m", "colcon", "--log-base", "log", "build", "--packages-select", NAME],
+        cwd=workspace,
+        env=os.environ | {"COLCON_HOME": str(workspace / "colcon")},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert build.returncode == 0, build.stdout + build.stderr
+    return workspace / "install" / NAME
+
+
+def files_below(folder):
+    """Every file, modules and data alike, but for what running them leaves behind."""
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder) for path in paths if "__pycache__" not in path.parts}
+
+
+def test_installed_tree(installed):
+    executables = installed / "lib" / NAME
+    assert {path.name for path in executables.iterdir()} == EXECUTABLES
+    assert all(os.access(path, os.X_OK) for path in executables.iterdir())
+
+    share = installed / "share"
+    assert (share / "ament_index/resource_index/packages" / NAME).is_file()
+    assert (share / NAME / "package.xml").is_file()
+    for folder, pattern in (("config", "*.yaml"), ("launch", "*.launch.py")):
+        wanted = {path.name for path in (PROJECT / folder).glob(pattern)}
+        assert wanted
+        assert {path.name for path in (share / NAME / folder).iterdir()} == wanted
+
+    library = next(installed.glob(f"lib/python*/site-packages/{NAME}"))
+    assert files_below(library) == files_below(PROJECT / NAME)
+
+
+@pytest.fixture
+def observer(monkeypatch):
+    """A node that looks at the domain of the started process."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=DOMAIN)
+    node = rclpy.create_node("observer", context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def wait_until(condition, process, output):
+    """Ask until `condition` holds; fail when `process` ends before, or patience does."""
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert process.poll() is None, output.read_text()
+        assert time.monotonic() < deadline, f"not within {PATIENCE:.0f} s: {output.read_text()}"
+        time.sleep(0.02)
+
+
+def test_node_from_the_installed_tree(installed, observer, tmp_path):
+    library = next(installed.glob("lib/python*/site-packages"))
+    environment = os.environ | {
+        "AMENT_PREFIX_PATH": os.pathsep.join(
+            filter(None, [str(installed), os.environ.get("AMENT_PREFIX_PATH")])
+        ),
+        "PYTHONPATH": os.pathsep.join(filter(None, [str(library), os.environ.get("PYTHONPATH")])),
+        "ROS_DOMAIN_ID": str(DOMAIN),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_LOG_DIR": str(tmp_path / "log"),
+    }
+    where = subprocess.run(
+        [sys.executable, "-c", f"import {NAME}; print({NAME}.__file__)"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert Path(where.stdout.strip()).is_relative_to(library)
+
+    output = tmp_path / "output.txt"
+    command = [installed / "lib" / NAME / "identifier", "--ros-args", "-r", "__ns:=/fv_101"]
+    if " " in sys.executable:  # no first line of a script can name such a Python
+        command.insert(0, sys.executable)
+    with output.open("w") as stream:
+        process = subprocess.Popen(
+            command, cwd=tmp_path, env=environment, stdout=stream, stderr=subprocess.STDOUT
+        )
+    try:
+        wait_until(
+            lambda: ("identifier", "/fv_101") in observer.get_node_names_and_namespaces(),
+            process,
+            output,
+        )
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0, output.read_text()
+    finally:
+        process.kill()
+        process.wait()
+    assert "Traceback" not in output.read_text(), output.read_text()

@@ -1,0 +1,32 @@
+"""Entry points of the nodes, light enough to be interrupted before a node is imported."""
+
+import importlib
+
+__all__ = ["identifier", "pressure_source", "simulator"]
+
+
+def _start(node: str) -> int:
+    """Import and run a node; Ctrl-C while it is still being imported ends quietly too."""
+    try:
+        module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
+        exit_code: int = module.main()
+    except KeyboardInterrupt:
+        return 0
+    return exit_code
+
+
+def identifier() -> int:
+    """Run the node `identifier`."""
+    return _start("identifier")
+
+
+def simulator() -> int:
+    """Run the node `simulator`."""
+    return _start("simulator")
+
+
+def pressure_source() -> int:
+    """Run the node `pressure_source`."""
+    return _start("pressure_source")
+
+
