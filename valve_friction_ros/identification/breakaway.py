@@ -43,6 +43,25 @@ def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
     return int(within[-1]) if within.size else -1
 
 
+def _onset(displacement: NDArray[np.float64], spread: float) -> int | None:
+    """Index of the last sample at rest of a displacement that grows, None if it cannot be told."""
+    first = _last_within(displacement, _FIRST_MARK * spread)
+    second = _last_within(displacement, _SECOND_MARK * spread)
+    if first < 0 or second == displacement.size - 1:
+        return None
+    if second <= first:
+        return first
+    place = np.arange(second + 1)
+    trials = []
+    for power in (1, 2):
+        start = first - (second - first) / ((_SECOND_MARK / _FIRST_MARK) ** (1 / power) - 1)
+        growth = (np.maximum(place - start, 0) / (second - start)) ** power
+        misfit = displacement[: second + 1] - _SECOND_MARK * spread * growth
+        trials.append((float(misfit @ misfit), start))
+    onset = round(min(trials)[1])
+    return onset if onset >= 0 else None
+
+
 def find_breakaways(
     recording: Recording, derivatives: Derivatives, settings: IdentificationSettings
 ) -> list[Breakaway]:
@@ -50,9 +69,10 @@ def find_breakaways(
 
     A rest is a stretch of at least two derivative windows without a speed that the noise cannot
     explain. Its part clear of the motion that follows gives position and noise of the rest.
-    Motion under a growing force begins with the square of the time, so the instants t₁ and t₂
-    at which the displacement passes 4 and 16 standard deviations of that noise put its onset at
-    2·t₁ − t₂; without noise the three coincide.
+    The instants t₁ and t₂ at which the displacement passes 4 and 16 standard deviations of that
+    noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows with the time to the power p:
+    p = 2 under a growing force, p = 1 after a slip jump, whichever follows the samples better.
+    Without noise the three instants coincide.
 
     Parameters
     ----------
@@ -73,7 +93,11 @@ def find_breakaways(
     noise = velocity_noise(
         position_noise(recording.position), recording.sample_period, window, settings.order
     )
-    still = speed <= max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
+    moving = speed > max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
+    for begin, end in zip(*_runs(moving), strict=True):
+        # The filter spreads any true motion over a window: a shorter burst is noise.
+        moving[begin:end] = end - begin >= window // 2
+    still = ~moving
     found = []
     for begin, end in zip(*_runs(still), strict=True):
         if end - begin < 2 * window or end == still.size:
@@ -82,10 +106,7 @@ def find_breakaways(
         rest = recording.position[begin + window : first_moving - window // 2]
         level, spread = float(np.median(rest)), float(np.std(rest))
         stretch = recording.position[first_moving - window : first_moving + 2 * window] - level
-        first = _last_within(np.abs(stretch), _FIRST_MARK * spread)
-        second = _last_within(np.abs(stretch), _SECOND_MARK * spread)
-        onset = first_moving - window + 2 * first - second
-        if first < 0 or second == stretch.size - 1 or onset < 0:
-            continue
-        found.append(Breakaway(onset, int(np.sign(stretch[-1]))))
+        onset = _onset(np.abs(stretch), spread)
+        if onset is not None:
+            found.append(Breakaway(first_moving - window + onset, int(np.sign(stretch[-1]))))
     return found

@@ -36,13 +36,38 @@ def require_motion(recording: Recording, derivatives: Derivatives) -> None:
         )
 
 
-def require_two_directions(velocity: NDArray[np.float64], threshold: float) -> None:
-    """Refuse moving samples (|velocity| > `threshold`) that hardly ever go one of the two ways."""
-    up = int(np.count_nonzero(velocity > threshold))
-    down = int(np.count_nonzero(velocity < -threshold))
-    if min(up, down) < max(1.0, _LEAST_SHARE_OF_DIRECTION * (up + down)):
+def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, float]:
+    """Distances moved up and down, turns smaller than `deadband` left out."""
+    up = down = 0.0
+    highest = lowest = turn = float(position[0])
+    direction = 0
+    for place in position.tolist():
+        highest, lowest = max(highest, place), min(lowest, place)
+        if direction >= 0 and place < highest - deadband:
+            up += highest - turn
+            turn, lowest, direction = highest, place, -1
+        elif direction <= 0 and place > lowest + deadband:
+            down += turn - lowest
+            turn, highest, direction = lowest, place, 1
+    if direction >= 0:
+        up += highest - turn
+    if direction <= 0:
+        down += turn - lowest
+    return up, down
+
+
+def require_two_directions(recording: Recording, window: int) -> None:
+    """Refuse a stem that moves one way only, or hardly ever the other.
+
+    The position is averaged over `window` samples first, and turns within its noise are ignored.
+    """
+    means = len(recording) // window
+    position = recording.position[: means * window].reshape(means, window).mean(axis=1)
+    noise = position_noise(recording.position) / np.sqrt(window)
+    up, down = _distances(position, _MOTION_OVER_NOISE * noise)
+    if min(up, down) < _LEAST_SHARE_OF_DIRECTION * (up + down):
         way = "up" if up > down else "down"
         raise RefusalError(
-            f"the stem moved {way} only ({up} samples up, {down} down): friction cannot be told "
-            "from the spring; record at least one stroke each way"
+            f"the stem moved {way} only ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
+            "friction cannot be told from the spring; record at least one stroke each way"
         )

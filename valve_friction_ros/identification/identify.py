@@ -37,7 +37,6 @@ def _sweep(
     else:
         step = float(regression.speed.max()) / settings.resolution
         thresholds = step * np.arange(1, settings.steps + 1)
-    require_two_directions(derivatives.velocity, float(thresholds[0]))
     sweep = sweep_thresholds(regression, thresholds)
     return sweep, choose_threshold(sweep, settings.window)
 
@@ -133,6 +132,7 @@ def identify(
         recording.position, recording.sample_period, settings.window, settings.order
     )
     require_motion(recording, derivatives)
+    require_two_directions(recording, settings.window)
     sweep, chosen = _sweep(recording, valve, settings, derivatives)
     if "mass" not in settings.fixed:
         reason = _why_mass_is_not_told(

@@ -191,4 +191,6 @@ def first_turn(acceleration: float, jerk: float, damping: float, stiffness: floa
     angle = math.atan2(-acceleration * frequency, jerk - acceleration * damping / 2)
     if angle <= 0:
         angle += math.pi
+    if angle == 0:
+        angle = math.pi
     return angle / frequency

@@ -28,5 +28,3 @@ def simulator() -> int:
 def pressure_source() -> int:
     """Run the node `pressure_source`."""
     return _start("pressure_source")
-
-

@@ -1,0 +1,70 @@
+"""Shared by all tests: the bench valves and their simulated records."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    GRAPHITE_PACKING,
+    GRAPHITE_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    KarnoppParameters,
+    Recording,
+    Valve,
+    converter_response,
+    simulate,
+)
+
+SAMPLE_PERIOD = 1e-3
+
+# The same examples in every run, and no deadline: the first call of a kernel compiles it.
+settings.register_profile("project", deadline=None, derandomize=True)
+settings.load_profile("project")
+
+
+class Bench(NamedTuple):
+    """A valve with the true parameters of its packing."""
+
+    valve: Valve
+    parameters: KarnoppParameters
+
+
+@pytest.fixture(scope="session")
+def benches():
+    """The simulated valves that every check uses, by name."""
+    return {
+        "low": Bench(BENCH_VALVE, LOW_FRICTION),
+        "high": Bench(BENCH_VALVE, HIGH_FRICTION),
+        "graphite": Bench(GRAPHITE_VALVE, GRAPHITE_PACKING),
+    }
+
+
+@pytest.fixture(scope="session")
+def bench_trajectory(benches):
+    """Function of valve name, excitation and duration (s): pressure and trajectory at 1 kHz."""
+
+    @cache
+    def run(name, excitation, duration):
+        time = np.arange(round(duration / SAMPLE_PERIOD) + 1) * SAMPLE_PERIOD
+        pressure = converter_response(excitation.sample(time), SAMPLE_PERIOD)
+        return pressure, simulate(*benches[name], pressure, SAMPLE_PERIOD)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def bench_record(bench_trajectory):
+    """Function of valve name, excitation, duration (s) and noise: the recording of a bench run."""
+
+    @cache
+    def record(name, excitation, duration, noise=None):
+        pressure, trajectory = bench_trajectory(name, excitation, duration)
+        recording = Recording(SAMPLE_PERIOD, pressure, trajectory.position)
+        return noise.applied_to(recording) if noise else recording
+
+    return record

@@ -1,0 +1,45 @@
+"""A real machine: the electro-mechanical positioning system, a published benchmark."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import IdentificationSettings, identify
+from valve_friction_ros.model import Recording, Valve
+
+RECORD = (
+    Path(__file__).resolve().parents[3] / "shared" / "data" / "emps" / "emps_identification.csv"
+)
+
+# Published IDIM-LS values.
+PUBLISHED = {
+    "mass": 95.1089,
+    "viscous_friction": 203.5034,
+    "coulomb_friction": 20.3935,
+    "spring_preload": -3.1648,
+}
+
+
+@pytest.fixture(scope="module")
+def estimate():
+    if not RECORD.is_file():
+        pytest.skip("the benchmark record is not the project's to distribute; it is not here")
+    time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
+    period = float(np.median(np.diff(time)))
+    assert period == pytest.approx(1e-3, rel=1e-9)
+    # No diaphragm and no spring: 1 Pa on 1 m² is 1 N.
+    record = Recording(period, force, position)
+    return identify(record, Valve(1.0), IdentificationSettings(fixed={"spring_constant": 0.0}))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_value(estimate, name):
+    assert getattr(estimate, name) == pytest.approx(PUBLISHED[name], rel=0.05)
+
+
+def test_the_rest_of_the_estimate(estimate):
+    assert estimate.spring_constant == 0.0
+    assert estimate.fixed == ("spring_constant",)
+    assert estimate.r_squared > 0.99
+    assert estimate.samples > 20_000

@@ -1,0 +1,298 @@
+"""Simulation of the Karnopp model against closed forms."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    GRAPHITE_PACKING,
+    GRAPHITE_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    KarnoppParameters,
+    SineWave,
+    StemState,
+    TriangleWave,
+    Valve,
+    advance,
+    balanced_state,
+    simulate,
+)
+
+EPS = np.finfo(float).eps
+SAMPLE_PERIOD = 1e-3
+FREE = Valve(1.0)  # no stops; 1 Pa is 1 N
+
+
+def packing(mass=1.0, viscous=0.0, coulomb=0.0, static=None, spring=0.0, limit=0.0):
+    return KarnoppParameters(
+        mass, viscous, coulomb, coulomb if static is None else static, spring, 0.0, limit
+    )
+
+
+def constant(force, samples):
+    return np.full(samples, float(force))
+
+
+class TestClosedForms:
+    @pytest.mark.parametrize("angle", [0.01, 0.7, 2.0, 3.5, 25.0])
+    def test_undamped_spring_swings_as_a_cosine(self, angle):
+        """With `angle` radians a sample: many samples a swing, or many swings a sample."""
+        frequency, force, start = 50.0, 30.0, 0.4
+        parameters = packing(mass=2.0, spring=2.0 * frequency**2)
+        samples = 2000
+        found = simulate(
+            FREE, parameters, constant(force, samples), angle / frequency, StemState(start)
+        )
+        balance = force / parameters.spring_constant
+        phase = angle * np.arange(samples)
+        expected = balance + (start - balance) * np.cos(phase)
+        speed = -frequency * (start - balance) * np.sin(phase)
+        # Each sample adds a few roundings of the position and of its own phase.
+        tolerance = 8 * EPS * samples * (1 + angle) * start
+        np.testing.assert_allclose(found.position, expected, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(found.velocity, speed, rtol=0, atol=tolerance * frequency)
+
+    def test_free_mass_under_a_ramp(self):
+        # ẍ = t: x = t³/6
+        found = simulate(FREE, packing(), np.arange(11.0), 1.0, StemState(0.0))
+        time = np.arange(11.0)
+        np.testing.assert_allclose(found.position, time**3 / 6, rtol=20 * EPS)
+        np.testing.assert_allclose(found.velocity, time**2 / 2, rtol=20 * EPS)
+
+    def test_viscous_decay(self):
+        """The 39 µs of the bench valve with high friction, stepped by 1 ms."""
+        mass, viscous, speed = 1.75, 4.48e4, 0.01
+        parameters = packing(mass=mass, viscous=viscous)
+        found = simulate(FREE, parameters, constant(0.0, 20), 1e-3, StemState(0.0, speed))
+        rate = viscous / mass
+        time = 1e-3 * np.arange(20)
+        # Velocity and position are sums of terms as large as they would be without friction.
+        expected = speed * np.exp(-rate * time)
+        np.testing.assert_allclose(found.velocity, expected, rtol=0, atol=4 * EPS * speed)
+        assert (found.velocity >= 0).all()
+        expected = -speed * np.expm1(-rate * time) / rate
+        np.testing.assert_allclose(
+            found.position, expected, rtol=0, atol=4 * EPS * speed / rate * 8
+        )
+
+    def test_coulomb_friction_takes_the_same_off_each_swing(self):
+        """Each half swing is a cosine about ±F_c/k, so its end is 2·F_c/k nearer to zero."""
+        mass, spring, coulomb, start = 2.0, 800.0, 10.0, 0.31
+        parameters = packing(mass=mass, spring=spring, coulomb=coulomb)
+        half_swing = math.pi / math.sqrt(spring / mass)
+        each = 2 * coulomb / spring
+        # At the turns: 0.31, −0.285, 0.26, … to 0.01 m, where the spring pulls less than F_c.
+        samples = 20
+        found = simulate(FREE, parameters, constant(0.0, samples), half_swing, StemState(start))
+        turns = np.arange(samples)
+        left = start - each * np.minimum(turns, 12)
+        np.testing.assert_allclose(
+            found.position, left * (-1.0) ** np.minimum(turns, 12), rtol=0, atol=1e-13
+        )
+        assert spring * abs(found.position[-1]) < coulomb < spring * (abs(left[11]))
+        assert (found.velocity[13:] == 0).all()
+
+    @pytest.mark.parametrize("limit", [0.0, 0.01, 0.2, 0.5])
+    def test_block_on_a_table_stops_at_the_limit_velocity(self, limit):
+        """From 1 m/s at −4 m/s²: it stops after (v − DV)/4 s, after (v² − DV²)/8 m."""
+        parameters = packing(mass=0.5, coulomb=2.0, limit=limit)
+        period = 1e-3
+        found = simulate(FREE, parameters, constant(0.0, 400), period, StemState(0.0, 1.0))
+        stop = (1.0 - limit) / 4.0
+        time = period * np.arange(400)
+        moving = time < stop
+        np.testing.assert_array_equal(found.velocity[~moving], 0.0)
+        np.testing.assert_allclose(found.velocity[moving], 1 - 4 * time[moving], atol=1e-13)
+        assert (found.velocity[moving] > limit).all()
+        np.testing.assert_allclose(found.position[~moving], (1 - limit**2) / 8, rtol=1e-13)
+
+    def test_limit_velocity_holds_only_what_static_friction_can_hold(self):
+        """Slowing towards a crawl below DV, the stem rests at DV if |pull| ≤ F_s, else it crawls.
+
+        ẋ = crawl + (1 − crawl)·e^−100·t with crawl = (pull − F_c)/F_v.
+        """
+        parameters = packing(viscous=100.0, coulomb=5.0, static=8.0, limit=0.1)
+        time = 1e-3 * np.arange(1000)
+        for pull, rests in ((7.99, True), (8.01, False)):
+            found = simulate(FREE, parameters, constant(pull, 1000), 1e-3, StemState(0.0, 1.0))
+            crawl = (pull - 5.0) / 100.0
+            speed = crawl + (1 - crawl) * np.exp(-100.0 * time)
+            expected = np.where(speed > 0.1, speed, 0.0) if rests else speed
+            np.testing.assert_allclose(found.velocity, expected, rtol=0, atol=1000 * EPS)
+
+    def test_the_bench_valve_rests_earlier_with_a_limit_velocity(self):
+        """On the upstroke of a sine, whose end the stem reaches ever slower.
+
+        It pulls F_c + F_v·ẋ there, which F_s holds at any speed below 277/70500 m/s.
+        """
+        pressure = SineWave(period=4.0).sample(SAMPLE_PERIOD * np.arange(3000))
+        last, speeds = [], []
+        for limit in (0.0, 1e-4, 1e-3):
+            parameters = replace(GRAPHITE_PACKING, limit_velocity=limit)
+            velocity = simulate(GRAPHITE_VALVE, parameters, pressure, SAMPLE_PERIOD).velocity
+            begin = int(np.argmax(velocity > 0))
+            last.append(begin + int(np.argmax(velocity[begin:] <= 0)) - 1)
+            speeds.append(velocity[last[-1]])
+            assert velocity[last[-1] + 1] == 0
+        assert last[0] > last[1] > last[2]
+        assert speeds[0] > 0
+        assert 1e-3 > speeds[1] > 1e-4
+        assert speeds[2] > 1e-3
+
+
+class TestSlipJump:
+    def test_viscous_stem_jumps_onto_the_sliding_line(self):
+        """Under a slow ramp the jump is (F_s − F_c)/k.
+
+        Before the breakaway at F_s the stem rests at x₀. Long after, with the transient of
+        F_v/k = 0.34 s gone, it slides at dF/dt/k with k·x = F − F_c − F_v·ẋ. The jump is what
+        it has moved beyond the growth of the force since the breakaway over k.
+        """
+        p, rate = GRAPHITE_PACKING, 2000.0
+        pressure = 8e4 + rate * SAMPLE_PERIOD * np.arange(30001)
+        force = GRAPHITE_VALVE.actuator_force(pressure) - p.spring_preload
+        found = simulate(GRAPHITE_VALVE, p, pressure, SAMPLE_PERIOD)
+        start = force[0] / p.spring_constant
+        np.testing.assert_allclose(found.position[0], start, rtol=1e-14)
+        speed = 0.0445 * rate / p.spring_constant
+        assert found.velocity[-1] == pytest.approx(speed, rel=1e-9)
+        jump = (p.static_friction - p.coulomb_friction) / p.spring_constant
+        lag = p.viscous_friction * speed / p.spring_constant
+        growth = (force[-1] - p.spring_constant * start - p.static_friction) / p.spring_constant
+        assert found.position[-1] - start == pytest.approx(jump + growth - lag, rel=1e-9)
+        # It breaks away at F_s: 942.4 N at 89 N/s, within the sample before the first motion.
+        first = int(np.flatnonzero(found.velocity)[0])
+        due = p.static_friction / (0.0445 * rate) / SAMPLE_PERIOD
+        assert first - 1 <= due < first
+
+    def test_undamped_stem_overshoots_to_twice_the_jump(self):
+        """From the breakaway at pull it swings by 2·(pull − F_c)/k and rests there."""
+        spring, coulomb, static, pull = 1000.0, 20.0, 30.0, 30.0 + 1e-6
+        parameters = packing(mass=3.0, spring=spring, coulomb=coulomb, static=static)
+        found = simulate(FREE, parameters, constant(pull, 1000), 1e-3, StemState(0.0))
+        assert found.velocity[-1] == 0
+        assert found.position[-1] == pytest.approx(2 * (pull - coulomb) / spring, rel=1e-12)
+
+    def test_stick_slip_limit_cycle(self):
+        """A slow ramp moves an undamped stem in equal jumps of 2·(F_s − F_c)/k.
+
+        Each begins at F_s and, as the ramp hardly moves during a jump, ends at 2·F_c − F_s.
+        """
+        spring, coulomb, static, rate = 1e4, 20.0, 30.0, 0.5
+        parameters = packing(spring=spring, coulomb=coulomb, static=static)
+        time = 1e-2 * np.arange(20001)
+        found = simulate(FREE, parameters, rate * time, 1e-2, StemState(0.0))
+        resting = found.velocity == 0
+        levels = np.unique(found.position[resting])
+        assert levels.size == 1 + math.floor((100.0 - static) / (2 * (static - coulomb)) + 1)
+        # The force grows by rate · π·√(m/k) = 0.016 N during the jump of 20 N, at most.
+        share = rate * math.pi * math.sqrt(1.0 / spring) / (2 * (static - coulomb))
+        jump = 2 * (static - coulomb) / spring
+        np.testing.assert_allclose(np.diff(levels), jump, rtol=2 * share)
+
+    @pytest.mark.parametrize("p", [LOW_FRICTION, HIGH_FRICTION])
+    def test_no_jump_where_static_is_coulomb_friction(self, p):
+        pressure = 8e4 + 2.0 * np.arange(20001)
+        velocity = simulate(BENCH_VALVE, p, pressure, SAMPLE_PERIOD).velocity
+        # The speed of the sliding line is approached from below.
+        assert (np.diff(velocity) >= -1e-15).all()
+        assert velocity[-1] == pytest.approx(0.0445 * 2000.0 / p.spring_constant, rel=1e-9)
+
+
+class TestTravelStops:
+    def test_hit_and_left(self):
+        """Full strokes: the stem is held at each stop until the spring can move it off.
+
+        At the top it leaves when F − F_0 − k·travel = −F_s, at the bottom when F − F_0 = F_s.
+        """
+        p, travel = LOW_FRICTION, BENCH_VALVE.travel
+        pressure = TriangleWave(period=20.0).sample(SAMPLE_PERIOD * np.arange(40001))
+        position, velocity = simulate(BENCH_VALVE, p, pressure, SAMPLE_PERIOD)
+        force = BENCH_VALVE.actuator_force(pressure) - p.spring_preload
+        assert (position.min(), position.max()) == (0.0, travel)
+        for stop, leaving in (
+            (travel, p.spring_constant * travel - p.static_friction),
+            (0.0, p.static_friction),
+        ):
+            held = position == stop
+            np.testing.assert_array_equal(velocity[held], 0.0)
+            edges = np.diff(held.astype(int))
+            hits, departures = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+            assert hits.size == 2
+            assert departures.size == 2
+            assert (np.abs(velocity[hits]) > 1e-3).all()  # it arrives sliding
+            for last in departures:
+                # held at the last sample, beyond balance at the next one
+                assert min(force[last : last + 2]) <= leaving <= max(force[last : last + 2])
+
+    @pytest.mark.parametrize("speed", [0.1, 50.0])
+    def test_no_rebound(self, speed):
+        valve = Valve(1.0, travel=0.02)
+        found = simulate(valve, packing(), constant(0.0, 1000), 1e-3, StemState(0.00955, speed))
+        reached = math.ceil(0.01045 / speed / 1e-3)
+        np.testing.assert_array_equal(found.position[reached:], 0.02)
+        np.testing.assert_array_equal(found.velocity[reached:], 0.0)
+        below = simulate(valve, packing(), constant(0.0, 1000), 1e-3, StemState(0.01045, -speed))
+        np.testing.assert_array_equal(below.position[reached:], 0.0)
+
+    def test_static_friction_holds_at_the_stop_too(self):
+        valve = Valve(1.0, travel=0.02)
+        parameters = packing(coulomb=5.0)
+        force = np.concatenate([constant(100.0, 10), constant(-5.0, 10), constant(-5.1, 10)])
+        found = simulate(valve, parameters, force, 1.0, StemState(0.02))
+        np.testing.assert_array_equal(found.position[:20], 0.02)
+        assert found.position[-1] == 0.0
+
+
+class TestStart:
+    def test_balance_within_the_travel(self):
+        p = LOW_FRICTION
+        middle = balanced_state(BENCH_VALVE, p, 1e5)
+        force = 0.0445 * (1e5 - 41740.0)
+        assert middle.velocity == 0
+        assert middle.position == pytest.approx((force - 231.65) / 2.05e5, rel=1e-14)
+        assert balanced_state(BENCH_VALVE, p, 0.0) == StemState(0.0)
+        assert balanced_state(BENCH_VALVE, p, 2.5e5) == StemState(BENCH_VALVE.travel)
+
+    def test_balance_without_stops_or_spring(self):
+        assert balanced_state(FREE, packing(spring=10.0), -5.0) == StemState(-0.5)
+        assert balanced_state(FREE, packing(), 5.0) == StemState(0.0)
+
+    def test_simulation_begins_there_by_default(self):
+        pressure = np.linspace(1e5, 1.2e5, 50)
+        found = simulate(BENCH_VALVE, LOW_FRICTION, pressure, SAMPLE_PERIOD)
+        start = balanced_state(BENCH_VALVE, LOW_FRICTION, 1e5)
+        assert StemState(found.position[0], found.velocity[0]) == start
+        again = simulate(BENCH_VALVE, LOW_FRICTION, pressure, SAMPLE_PERIOD, start)
+        np.testing.assert_array_equal(again.position, found.position)
+
+    def test_single_sample(self):
+        state = StemState(0.004, 0.01)
+        found = simulate(BENCH_VALVE, LOW_FRICTION, np.array([1e5]), SAMPLE_PERIOD, state)
+        assert found.end == state
+
+
+class TestRefusals:
+    @pytest.mark.parametrize("pressure", [[], [[1e5]], [1e5, math.nan], [math.inf, 1e5]])
+    def test_pressure(self, pressure):
+        with pytest.raises(ValueError, match=r"^pressure must be a row of finite samples"):
+            simulate(BENCH_VALVE, LOW_FRICTION, np.array(pressure), SAMPLE_PERIOD)
+
+    @pytest.mark.parametrize("period", [0.0, -1e-3, math.nan, math.inf])
+    def test_sample_period(self, period):
+        with pytest.raises(ValueError, match=r"^sample_period must be"):
+            simulate(BENCH_VALVE, LOW_FRICTION, np.array([1e5, 1e5]), period)
+
+    @pytest.mark.parametrize("duration", [0.0, -1e-3, math.nan, math.inf])
+    def test_duration(self, duration):
+        with pytest.raises(ValueError, match=r"^duration must be"):
+            advance(StemState(0.0), BENCH_VALVE, LOW_FRICTION, (1e5, 1e5), duration)
+
+    @pytest.mark.parametrize("pressures", [(math.nan, 1e5), (1e5, math.inf)])
+    def test_pressures_of_a_step(self, pressures):
+        with pytest.raises(ValueError, match=r"^pressure must be finite"):
+            advance(StemState(0.0), BENCH_VALVE, LOW_FRICTION, pressures, 1e-3)
