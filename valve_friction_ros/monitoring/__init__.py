@@ -7,6 +7,7 @@ from valve_friction_ros.monitoring.diagnosis import (
     StatusSignal,
     dead_band,
     diagnose,
+    percentage,
 )
 from valve_friction_ros.monitoring.friction_monitor import (
     FrictionMonitor,
@@ -31,5 +32,6 @@ __all__ = [
     "diagnose",
     "identify_snapshot",
     "nanoseconds",
+    "percentage",
     "uniform_recording",
 ]

@@ -8,7 +8,15 @@ from valve_friction_ros.identification.estimate import Estimate
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["Diagnosis", "FrictionLimits", "Level", "StatusSignal", "dead_band", "diagnose"]
+__all__ = [
+    "Diagnosis",
+    "FrictionLimits",
+    "Level",
+    "StatusSignal",
+    "dead_band",
+    "diagnose",
+    "percentage",
+]
 
 
 class Level(IntEnum):
@@ -97,11 +105,17 @@ def dead_band(estimate: Estimate, valve: Valve) -> float:
     return valve.share_of_travel(friction / estimate.spring_constant)
 
 
+def percentage(share: float) -> str:
+    """Write a share in percent for people: two digits, or whole percents from 100 % on."""
+    percent = 100 * share
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
+
+
 def _consequence(estimate: Estimate, valve: Valve) -> str:
     share = dead_band(estimate, valve)
     if math.isnan(share):
         return f"coulomb friction {estimate.coulomb_friction:.4g} N"
-    return f"the stem ignores reversals smaller than {100 * share:.2g} % of its travel"
+    return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
 
 
 def diagnose(

@@ -73,6 +73,7 @@ class RecordBuffer:
         self._pressure = SampleBuffer(window)
         self._position = SampleBuffer(window)
         self._rejections: deque[Rejection] = deque(maxlen=_REJECTIONS_KEPT)
+        self._first_stamp: int | None = None
         self._cleared_because: str | None = None
 
     def __len__(self) -> int:
@@ -111,6 +112,7 @@ class RecordBuffer:
         if cause is not None:
             return self._reject(stamp, cause)
         buffer.append(stamp, value)
+        self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
         return None
 
     def _reject(self, stamp: int, cause: str) -> str:
@@ -122,15 +124,15 @@ class RecordBuffer:
         self._pressure.clear()
         self._position.clear()
         self._rejections.clear()
+        self._first_stamp = None
         self._cleared_because = cause
 
     def snapshot(self) -> Snapshot:
         """Copy the samples and the rejections of the last window."""
         pressure, position = self._pressure.samples(), self._position.samples()
-        stamps = np.concatenate((pressure.stamps, position.stamps))
-        newest = int(stamps.max(initial=0))
+        newest = int(np.concatenate((pressure.stamps, position.stamps)).max(initial=0))
         rejections = tuple(
             rejection for rejection in self._rejections if rejection.stamp >= newest - self._window
         )
-        is_full = stamps.size > 0 and newest - int(stamps.min()) >= self._window
+        is_full = self._first_stamp is not None and newest - self._first_stamp >= self._window
         return Snapshot(pressure, position, rejections, None if is_full else self._cleared_because)

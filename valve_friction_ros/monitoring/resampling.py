@@ -6,10 +6,40 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.monitoring.samples import Samples
 
-__all__ = ["uniform_recording"]
+__all__ = ["GapError", "uniform_recording"]
 
 _LARGEST_GAP = 10
 """Longer pauses, in sampling periods of the signal, are gaps; shorter ones are interpolated."""
+
+
+class GapError(RefusalError):
+    """A signal has a gap.
+
+    Parameters
+    ----------
+    name : str
+        What to call the signal.
+    samples : Samples
+        The signal.
+    sample : int
+        Number of the first sample after the gap.
+
+    Attributes
+    ----------
+    sample : int
+        As above.
+    seconds : float
+        Length of the gap, s.
+    """
+
+    def __init__(self, name: str, samples: Samples, sample: int) -> None:
+        self.sample = sample
+        self.seconds = float(samples.stamps[sample] - samples.stamps[sample - 1]) / 1e9
+        since_start = float(samples.stamps[sample - 1] - samples.stamps[0]) / 1e9
+        super().__init__(
+            f"gap of {self.seconds:.3g} s in {name}, {since_start:.3f} s after its first "
+            "sample: use a record without it, or clear the buffer and gather anew"
+        )
 
 
 def _checked(name: str, samples: Samples) -> int:
@@ -22,11 +52,7 @@ def _checked(name: str, samples: Samples) -> int:
     period = int(np.median(pauses))
     longest = int(np.argmax(pauses))
     if pauses[longest] > _LARGEST_GAP * period:
-        since_start = (samples.stamps[longest] - samples.stamps[0]) / 1e9
-        raise RefusalError(
-            f"gap of {pauses[longest] / 1e9:.3g} s in {name}, {since_start:.3f} s after its first "
-            "sample: use a record without it, or clear the buffer and gather anew"
-        )
+        raise GapError(name, samples, longest + 1)
     return period
 
 
@@ -59,8 +85,8 @@ def uniform_recording(
     Raises
     ------
     RefusalError
-        If a signal is empty or has a gap of more than ten of its periods, or the two do not
-        overlap in time.
+        If a signal is empty or has a gap of more than ten of its periods (a `GapError`), or the
+        two do not overlap in time.
     """
     _checked(names[0], pressure)
     period = _checked(names[1], position)
