@@ -158,11 +158,16 @@ def _run(options: argparse.Namespace) -> Estimate:
         position_bias=options.position_bias,
         assumed_mass=description.known.get("mass", 0.0),
     )
-    recording = read_recording(options.file, description.valve, columns)
-    estimate = identify(recording, description.valve, settings)
     if options.plot is not None:
         from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
 
+        plots.require_picture_file(options.plot)
+    recording = read_recording(options.file, description.valve, columns)
+    try:
+        estimate = identify(recording, description.valve, settings)
+    except RefusalError as refusal:
+        raise RefusalError(f"{options.file}: {refusal}") from None
+    if options.plot is not None:
         drive = plots.FORCE if description is _DIRECT_DRIVE else plots.PRESSURE
         figure = plots.identification_figure(recording, description.valve, estimate, drive)
         figure.savefig(options.plot)
@@ -175,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         estimate = _run(options)
     except (ValueError, RefusalError, OSError) as error:
-        print(f"identify_recording: {error}", file=sys.stderr)
+        print("identify_recording:", *str(error).splitlines(), file=sys.stderr)
         return _EXIT_REFUSED
     if options.json:
         print(json.dumps(_as_json(estimate), ensure_ascii=False, allow_nan=False))

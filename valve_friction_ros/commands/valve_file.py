@@ -1,6 +1,7 @@
 """The YAML file that describes a valve."""
 
 import difflib
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import MappingProxyType
@@ -9,8 +10,7 @@ from typing import Any
 import yaml
 
 from valve_friction_ros.identification import FIXABLE
-from valve_friction_ros.model import Valve
-from valve_friction_ros.model.checks import require_finite
+from valve_friction_ros.model import KarnoppParameters, Valve
 
 __all__ = ["ValveFile", "read_valve_file"]
 
@@ -38,12 +38,35 @@ def _numbers(path: Path) -> dict[str, Any]:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read: {error}") from None
+        cause = (isinstance(error, OSError) and error.strerror) or error
+        raise ValueError(f"{path}: cannot be read: {cause}") from None
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
     if not isinstance(content, dict):
         raise ValueError(f"{path}: expected lines such as 'diaphragm_area: 0.0445'")
     return content
+
+
+def _number(key: str, value: object) -> float:
+    """Return a value as a float; YAML takes 2e5 for text and only 2.0e+5 for a number."""
+    if not isinstance(value, bool):
+        try:
+            return float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            pass
+    raise ValueError(f"{key} must be a number, got {value!r}")
+
+
+def _require_possible(known: Mapping[str, float]) -> None:
+    """Apply the rules of the model to the nominal parameters; what is not given is harmless."""
+    harmless = {
+        "mass": 1.0,
+        "viscous_friction": 0.0,
+        "coulomb_friction": 0.0,
+        "static_friction": max(0.0, known.get("coulomb_friction", 0.0)),
+        "spring_constant": 0.0,
+    }
+    KarnoppParameters(**{**harmless, **known})
 
 
 def read_valve_file(path: Path) -> ValveFile:
@@ -64,10 +87,10 @@ def read_valve_file(path: Path) -> ValveFile:
     if "diaphragm_area" not in content:
         raise ValueError(f"{path}: diaphragm_area is missing")
     try:
-        known = {
-            name: require_finite(name, value) for name, value in content.items() if name in FIXABLE
-        }
-        valve = Valve(**{name: content[name] for name in content if name in _GEOMETRY})
-    except (ValueError, TypeError) as error:
+        numbers = {name: _number(name, value) for name, value in content.items()}
+        known = {name: value for name, value in numbers.items() if name in FIXABLE}
+        _require_possible(known)
+        valve = Valve(**{name: value for name, value in numbers.items() if name in _GEOMETRY})
+    except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     return ValveFile(valve, MappingProxyType(known))

@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 
 from valve_friction_ros.identification import Estimate
 from valve_friction_ros.model import Recording, Valve
-from valve_friction_ros.monitoring import dead_band
+from valve_friction_ros.monitoring import dead_band, percentage
 from valve_friction_ros.plots.case import PRESSURE, Case, DriveScale
 from valve_friction_ros.plots.panels import (
+    COLOURS,
     draw_coulomb_sweep,
     draw_record,
     draw_sigma_sweep,
@@ -28,7 +29,7 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
     Parameters
     ----------
     cases : sequence of Case
-        At most four, in the order of time.
+        One to four, in the order of time.
     verdict : str
         One sentence, printed above the panels.
 
@@ -36,7 +37,14 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
     -------
     Figure
         To be saved or shown; no global state of matplotlib is touched.
+
+    Raises
+    ------
+    ValueError
+        If there is no case, or more than can be told apart.
     """
+    if not 0 < len(cases) <= len(COLOURS):
+        raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
     figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
     figure.suptitle(
         textwrap.fill(verdict, _VERDICT_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
@@ -69,7 +77,7 @@ def identification_figure(
 ) -> Figure:
     """Draw a recording and its identification."""
     share = dead_band(estimate, valve)
-    effect = f", dead band {100 * share:.2g} % of travel" if math.isfinite(share) else ""
+    effect = f", dead band {percentage(share)} of travel" if math.isfinite(share) else ""
     verdict = (
         f"F_c {estimate.coulomb_friction:.4g} N, F_v {estimate.viscous_friction:.4g} N·s/m, "
         f"k {estimate.spring_constant:.4g} N/m{effect}"
