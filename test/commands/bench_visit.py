@@ -1,0 +1,63 @@
+"""What a client of the bench is told when things go wrong, printed as one JSON object."""
+
+import json
+import os
+import sys
+
+import rclpy
+
+from valve_friction_ros.commands.bench_client import BenchClient, BenchError
+from valve_friction_ros.commands.bench_processes import (
+    NodeProcess,
+    quick_discovery,
+    running_nodes,
+)
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.monitoring import Level, RecordBuffer
+
+NODES = [NodeProcess("identifier", {"input_timeout": 0.5}), NodeProcess("simulator", {})]
+
+
+def error_of(call, *arguments):
+    try:
+        call(*arguments)
+    except BenchError as error:
+        return str(error)
+    return None
+
+
+def visit(client):
+    """Call everything that must fail while no pressure is published."""
+    seen = {
+        "before": [client.recorded, client.level, client.diagnostic_message],
+        "identify": error_of(client.trigger, "identify"),
+        "clear": client.trigger("clear"),
+        "impossible": error_of(client.set_parameters, "simulator", {"coulomb_friction": 1e6}),
+        "possible": error_of(
+            client.set_parameters,
+            "simulator",
+            {"coulomb_friction": 700.0, "static_friction": 800.0},
+        ),
+        "absent node": error_of(client.set_parameters, "nobody", {"mass": 1.0}, 0.1),
+        "absent service": error_of(client.trigger, "dance", 0.1),
+        "sweep": error_of(client.sweep_columns, 0.1),
+    }
+    client.wait(lambda: client.level == Level.WARN, 30.0, "warning")
+    return seen | {
+        "message": client.diagnostic_message,
+        "estimate_valid": client.diagnostic_values["estimate_valid"],
+    }
+
+
+if __name__ == "__main__":
+    os.environ.update(quick_discovery())
+    with running_nodes(NODES, "fv_7") as processes:
+        rclpy.init(args=[])
+        client = BenchClient("fv_7", RecordBuffer(BENCH_VALVE, 1.0))
+        try:
+            answers = visit(client)
+        finally:
+            client.close()
+            rclpy.try_shutdown()
+    answers["exit codes"] = [process.returncode for process in processes]
+    json.dump(answers, sys.stdout)

@@ -1,0 +1,87 @@
+"""Recorded files of the bench valve, and the description of that valve."""
+
+import contextlib
+import os
+import socket
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.model import Recording, SineWave, SquareWave, simulate
+
+PROJECT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def bench_yaml():
+    """The valve file that the package brings."""
+    return PROJECT / "config" / "valve_bench.yaml"
+
+
+@pytest.fixture(scope="session")
+def square_record(bench_record):
+    """Two periods of the paper's square wave at 1 kHz, low friction."""
+    return bench_record("low", SquareWave(), 20.8)
+
+
+@pytest.fixture(scope="session")
+def quick_record(benches):
+    """Ten seconds of a sine at 100 Hz, low friction: a small file."""
+    pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
+    return Recording(0.01, pressure, simulate(*benches["low"], pressure, 0.01).position)
+
+
+@pytest.fixture
+def write_csv(tmp_path):
+    """Function of columns by header: a CSV file with every number to the last digit."""
+
+    def write(columns, name="record.csv"):
+        path = tmp_path / name
+        table = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+        lines = [",".join(columns), *(",".join(map(repr, row)) for row in table)]
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def columns_of():
+    """Function of a recording: its columns by the headers that the command expects."""
+
+    def columns(record):
+        return {
+            "time_s": np.round(record.time, 9),
+            "position_m": record.position,
+            "pressure_pa": record.pressure,
+        }
+
+    return columns
+
+
+@pytest.fixture
+def ros_environment(tmp_path):
+    """Environment of a ROS domain that no other test uses, here or in another run.
+
+    An abstract socket of the domain's number is held as long as the domain is in use.
+    """
+    with contextlib.ExitStack() as stack:
+        for number in range(92, 101):
+            claim = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            with contextlib.suppress(OSError):
+                claim.bind(f"\0valve_friction_ros/domain/{number}")
+                break
+        else:
+            raise RuntimeError("all domains are in use")
+        inherited = {
+            name: value
+            for name, value in os.environ.items()
+            if name not in {"ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"}
+        }
+        path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
+        yield inherited | {
+            "ROS_DOMAIN_ID": str(number),
+            "ROS_LOG_DIR": str(tmp_path),
+            "PYTHONPATH": path,
+        }

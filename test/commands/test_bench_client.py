@@ -1,0 +1,72 @@
+"""The client of the bench and the processes around it."""
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from valve_friction_ros.commands.bench_processes import (
+    NodeProcess,
+    quick_discovery,
+    running_nodes,
+)
+
+NAMES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+
+
+def test_what_a_client_is_told(ros_environment):
+    """Two nodes and a client as processes: every failure has its reason, and all end well."""
+    done = subprocess.run(
+        [sys.executable, Path(__file__).with_name("bench_visit.py")],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+        env=ros_environment,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    told = json.loads(done.stdout)
+    assert told["before"] == [0.0, None, ""]
+    assert told["identify"].startswith("identify: no samples of actuator_pressure")
+    assert told["clear"]
+    assert told["impossible"].startswith("simulator refused: ")
+    assert "static_friction" in told["impossible"]
+    assert told["possible"] is None
+    assert told["absent node"] == "no service /fv_7/nobody/set_parameters_atomically within 0.1 s"
+    assert told["absent service"] == "no service dance within 0.1 s"
+    assert told["sweep"] == "no sweep within 0.1 s"
+    assert "actuator_pressure" in told["message"]
+    assert told["estimate_valid"] == "false"
+    assert told["exit codes"] == [0, 0]
+
+
+class TestQuickDiscovery:
+    def test_stays_on_this_machine(self, monkeypatch):
+        for name in NAMES:
+            monkeypatch.delenv(name, raising=False)
+        found = quick_discovery()
+        assert set(found) == set(NAMES)
+        assert found["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+        assert Path(found["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
+
+    @pytest.mark.parametrize("name", NAMES)
+    def test_what_the_user_has_set_stays(self, monkeypatch, name):
+        for other in NAMES:
+            monkeypatch.delenv(other, raising=False)
+        monkeypatch.setenv(name, "of the user")
+        assert set(quick_discovery()) == set(NAMES) - {name}
+        assert os.environ[name] == "of the user"
+
+
+def test_processes_end_with_the_context_even_after_an_error():
+    """An unknown node ends by itself at once, or is ended."""
+    node = NodeProcess("no_such_node", {})
+    with contextlib.suppress(ZeroDivisionError), running_nodes([node, node], "fv_7") as processes:
+        1 / 0  # noqa: B018
+    assert len(processes) == 2
+    assert all(process.returncode is not None for process in processes)
