@@ -20,7 +20,7 @@ from valve_friction_ros.model import Recording
 from valve_friction_ros.monitoring import RecordBuffer
 from valve_friction_ros.monitoring.record_buffer import Snapshot
 from valve_friction_ros.nodes.messages import position_of, stamp_of
-from valve_friction_ros.nodes.streams import LATCHED, STREAM
+from valve_friction_ros.nodes.streams import LATCHED, stream
 
 __all__ = ["BenchClient", "BenchError"]
 
@@ -52,8 +52,8 @@ class BenchClient(Node):
         self._sweep: Float64MultiArray | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
-        self.create_subscription(FluidPressure, "actuator_pressure", self._on_pressure, STREAM)
-        self.create_subscription(JointState, "stem_state", self._on_stem, STREAM)
+        self.create_subscription(FluidPressure, "actuator_pressure", self._on_pressure, stream())
+        self.create_subscription(JointState, "stem_state", self._on_stem, stream())
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
         self.create_subscription(
             Float64MultiArray, f"{self._identifier}/sweep", self._on_sweep, LATCHED

@@ -48,7 +48,7 @@ class MonitorSettings:
         """Refuse a window or a baseline that cannot be."""
         require_positive("window", self.window)
         if self.baseline is not None:
-            require_positive("baseline", self.baseline)
+            require_positive("baseline_coulomb_friction", self.baseline)
 
 
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Estimate:

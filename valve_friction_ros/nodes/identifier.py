@@ -6,6 +6,7 @@ from concurrent.futures import Future as ThreadFuture
 from concurrent.futures import ThreadPoolExecutor
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -27,7 +28,7 @@ from valve_friction_ros.nodes.inputs import InputWatch
 from valve_friction_ros.nodes.messages import position_of, stamp_of, sweep_message
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
 from valve_friction_ros.nodes.running import run_node
-from valve_friction_ros.nodes.streams import LATCHED, STREAM, qos_overrides
+from valve_friction_ros.nodes.streams import LATCHED, qos_overrides, stream
 from valve_friction_ros.nodes.valve_parameters import JOINT
 
 __all__ = ["Identifier", "main"]
@@ -59,7 +60,10 @@ class Identifier(Node):
             FluidPressure, "actuator_pressure", self._on_pressure
         )
         self._stem_watch = self._subscribe(JointState, "stem_state", self._on_stem)
-        self.create_service(Trigger, "~/identify", self._identify)
+        # While an identification is awaited, its group is taken: the default one has to go on.
+        self.create_service(
+            Trigger, "~/identify", self._identify, callback_group=ReentrantCallbackGroup()
+        )
         self.create_service(Trigger, "~/set_baseline", self._set_baseline)
         self.create_service(Trigger, "~/clear", self._clear)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
@@ -80,7 +84,7 @@ class Identifier(Node):
 
     def _subscribe(self, message_type: type, topic: str, callback: object) -> InputWatch:
         subscription: Subscription = self.create_subscription(
-            message_type, topic, callback, STREAM, qos_overriding_options=qos_overrides()
+            message_type, topic, callback, stream(), qos_overriding_options=qos_overrides()
         )
         package, name = message_type.__module__.split(".")[0], message_type.__name__
         return InputWatch(self, subscription, f"{package}/msg/{name}")
@@ -101,22 +105,28 @@ class Identifier(Node):
 
     def _on_pressure(self, message: FluidPressure) -> None:
         self._pressure_watch.arrived()
-        self._report(
-            self._monitor.buffer.add_pressure(
-                stamp_of(message.header.stamp), message.fluid_pressure
-            )
-        )
+        buffer = self._monitor.buffer
+        held = len(buffer)
+        problem = buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
+        self._report(problem, held)
 
     def _on_stem(self, message: JointState) -> None:
         self._stem_watch.arrived()
-        self._report(
-            self._monitor.buffer.add_position(
-                stamp_of(message.header.stamp), position_of(message, self._joint)
-            )
+        buffer = self._monitor.buffer
+        held = len(buffer)
+        problem = buffer.add_position(
+            stamp_of(message.header.stamp), position_of(message, self._joint)
         )
+        self._report(problem, held)
 
-    def _report(self, problem: str | None) -> None:
-        if problem is not None:
+    def _report(self, problem: str | None, held: int) -> None:
+        """Log what was wrong with a sample that came when the buffer held `held` samples."""
+        if problem is None:
+            return
+        # Each call is throttled for itself, so bad samples do not hide that the buffer was cleared.
+        if len(self._monitor.buffer) < held:
+            self.get_logger().warning(problem, throttle_duration_sec=_LOG_EVERY)
+        else:
             self.get_logger().warning(problem, throttle_duration_sec=_LOG_EVERY)
 
     async def _identify(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

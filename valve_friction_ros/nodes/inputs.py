@@ -52,7 +52,8 @@ class InputWatch:
             cause = f"it is published as {', '.join(others)}, not {self._type}"
         elif self._is_unreliable(publishers):
             cause = (
-                "its publisher is best effort, this node asks for reliable: start it with "
+                "the quality of service does not match, its publisher is best effort and this "
+                "node asks for reliable: start this node with "
                 f"qos_overrides.{self._topic}.subscription.reliability:=best_effort"
             )
         else:

@@ -22,7 +22,7 @@ from valve_friction_ros.monitoring.csv_recording import read_columns
 from valve_friction_ros.nodes.messages import time_message
 from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters, values_of
 from valve_friction_ros.nodes.running import quick_executor, run_node
-from valve_friction_ros.nodes.streams import STREAM, qos_overrides
+from valve_friction_ros.nodes.streams import qos_overrides, stream
 
 __all__ = ["PressureSource", "main"]
 
@@ -112,7 +112,7 @@ class PressureSource(Node):
         self._before: tuple[float, float] | None = None
         self._start: int | None = None
         self._publisher = self.create_publisher(
-            FluidPressure, "actuator_pressure", STREAM, qos_overriding_options=qos_overrides()
+            FluidPressure, "actuator_pressure", stream(), qos_overriding_options=qos_overrides()
         )
         self.create_timer(1.0 / _BLOCKS_PER_SECOND, self._publish_due)
 

@@ -5,11 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 import rclpy
-from rclpy.exceptions import (
-    InvalidParameterTypeException,
-    InvalidParameterValueException,
-    ParameterUninitializedException,
-)
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
@@ -17,6 +13,8 @@ from rclpy.task import Future
 __all__ = ["quick_executor", "run_node"]
 
 _WAKE_UP_PERIOD = 0.5
+_WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
+"""What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
 
 
 def quick_executor() -> Executor:
@@ -32,6 +30,12 @@ def quick_executor() -> Executor:
     return EventsExecutor()
 
 
+def _cannot_start(error: Exception) -> int:
+    """Say on one line what was wrong, and return the exit code."""
+    print(f"cannot start: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
+    return 2
+
+
 def run_node(
     create: Callable[[], Node],
     arguments: Sequence[str] | None = None,
@@ -42,7 +46,7 @@ def run_node(
     Parameters
     ----------
     create : callable
-        Builds the node; what it refuses by ValueError is told in one line.
+        Builds the node; what it or rclpy refuses is told in one line.
     arguments : sequence of str, optional
         ROS arguments, by default those of the process.
     create_executor : callable
@@ -51,28 +55,32 @@ def run_node(
     Returns
     -------
     int
-        Exit code: 0 after a clean stop, 2 if the node cannot start with its parameters.
+        Exit code: 0 after a clean stop, 2 if arguments or parameters do not let it start.
     """
-    rclpy.init(args=arguments)
+    # rclpy chains its handler before this one, and shuts the context down, which ends the loop
+    # below. A KeyboardInterrupt could strike within rclpy's own code, which then fails.
+    signal.signal(signal.SIGINT, lambda *_: None)
     node = None
     try:
-        node = create()
+        rclpy.init(args=arguments)
+    except _WRONG_REQUESTS as error:
+        return _cannot_start(error)
+    try:
+        try:
+            node = create()
+        except _WRONG_REQUESTS as error:
+            return _cannot_start(error) if rclpy.ok() else 0
         executor = create_executor()
         executor.add_node(node)
         never = Future()
         # An unlimited wait is no option: the events executor would turn without a pause.
         while rclpy.ok():
             executor.spin_until_future_complete(never, _WAKE_UP_PERIOD)
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
-    except (
-        ValueError,
-        InvalidParameterTypeException,
-        InvalidParameterValueException,
-        ParameterUninitializedException,
-    ) as error:
-        print(f"cannot start: {error}", file=sys.stderr)  # noqa: T201
-        return 2
+    except RuntimeError:
+        if rclpy.ok():  # else a callback was still at work when the context was shut down
+            raise
     finally:
         # Under ros2 launch Ctrl-C arrives twice; the second must not disturb the stop.
         signal.signal(signal.SIGINT, signal.SIG_IGN)

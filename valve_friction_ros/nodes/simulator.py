@@ -18,7 +18,7 @@ from valve_friction_ros.nodes.parameters import (
     values_of,
 )
 from valve_friction_ros.nodes.running import quick_executor, run_node
-from valve_friction_ros.nodes.streams import STREAM, qos_overrides
+from valve_friction_ros.nodes.streams import qos_overrides, stream
 from valve_friction_ros.nodes.valve_parameters import (
     JOINT,
     KARNOPP_PARAMETERS,
@@ -28,6 +28,9 @@ from valve_friction_ros.nodes.valve_parameters import (
 )
 
 __all__ = ["Simulator", "main"]
+
+_HIGHEST_PRESSURE = 1e9
+"""Pressure, Pa, above which a number is none that a valve can meet, and may overflow the model."""
 
 _NOISE_PARAMETERS = (
     ParameterSpec(
@@ -68,13 +71,13 @@ class Simulator(Node):
         self._state = StemState(0.0)
         self._compile()
         self._publisher = self.create_publisher(
-            JointState, "stem_state", STREAM, qos_overriding_options=qos_overrides()
+            JointState, "stem_state", stream(), qos_overriding_options=qos_overrides()
         )
         self.create_subscription(
             FluidPressure,
             "actuator_pressure",
             self._on_pressure,
-            STREAM,
+            stream(),
             qos_overriding_options=qos_overrides(),
         )
 
@@ -90,9 +93,9 @@ class Simulator(Node):
     def _on_pressure(self, message: FluidPressure) -> None:
         stamp, pressure = stamp_of(message.header.stamp), message.fluid_pressure
         valve, parameters, noise = self._plant
-        if not np.isfinite(pressure):
+        if not abs(pressure) <= _HIGHEST_PRESSURE:
             self.get_logger().warning(
-                "a pressure that is not finite was ignored", throttle_duration_sec=5.0
+                f"a pressure of {pressure:g} Pa was ignored", throttle_duration_sec=5.0
             )
             return
         if self._stamp is not None and stamp == self._stamp:

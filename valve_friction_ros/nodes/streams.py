@@ -3,15 +3,7 @@
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-__all__ = ["LATCHED", "STREAM", "qos_overrides"]
-
-STREAM = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=20_000,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
-"""Sensor streams: deep enough for 20 s at 1 kHz while the receiver is busy."""
+__all__ = ["LATCHED", "qos_overrides", "stream"]
 
 LATCHED = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
@@ -20,6 +12,20 @@ LATCHED = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 """Results: a late subscriber receives the last one."""
+
+
+def stream() -> QoSProfile:
+    """Return the quality of service of a sensor stream.
+
+    Deep enough for 20 s at 1 kHz while the receiver is busy. Every topic needs a profile of its
+    own, because rclpy writes a topic's overrides into the profile that it is given.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=20_000,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.VOLATILE,
+    )
 
 
 def qos_overrides() -> QoSOverridingOptions:

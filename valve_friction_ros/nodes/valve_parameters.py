@@ -15,7 +15,10 @@ __all__ = [
 ]
 
 JOINT = ParameterSpec(
-    "joint", "stem", "Name of the stem's joint in stem_state; empty: the first joint", None, True
+    "joint",
+    "stem",
+    "Name of the stem's joint in stem_state [-]; empty: the first joint",
+    read_only=True,
 )
 
 VALVE_PARAMETERS = (
