@@ -33,7 +33,7 @@ demo: venv  ## friction of a simulated valve grows, and is diagnosed, in under t
 
 .PHONY: test
 test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some
-	@"$(VENV)/bin/python" -m pytest $(PYTEST_ARGS)
+	@"$(VENV)/bin/python" -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
 
 .PHONY: lint
 lint: venv-test  ## ruff and mypy

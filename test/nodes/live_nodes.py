@@ -1,0 +1,418 @@
+"""Nodes as processes of their own, and a client that talks to them over DDS."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import Float64, Float64MultiArray
+from std_srvs.srv import Trigger
+
+PROJECT = Path(__file__).resolve().parents[2]
+NAMESPACE = "/fv_101"
+PATIENCE = 40.0
+"""Time for one thing to happen on a loaded machine, s."""
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+"""Stamp of the first sample of most records, ns: any time but the present."""
+
+STREAM = QoSProfile(depth=60_000, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+_AHEAD = 20_000
+"""Messages that may be under way; the identifier holds as many of each topic."""
+_BURST = 200
+"""Messages that are published at once; a transport's queue holds 512."""
+
+
+class Domain:
+    """A ROS domain that no other test uses, in this run or another on the same machine.
+
+    An abstract socket of the domain's number is held as long as the domain is in use.
+    """
+
+    _last = os.getpid() % 90
+
+    def __init__(self):
+        for _ in range(90):
+            Domain._last = Domain._last % 90 + 1
+            self.number = Domain._last
+            self._claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            try:
+                self._claim.bind(f"\0valve_friction_ros/domain/{self.number}")
+            except OSError:
+                self._claim.close()
+            else:
+                return
+        raise RuntimeError("all domains are in use")
+
+    def release(self):
+        self._claim.close()
+
+
+class NodeProcess:
+    """A node, started as a person would start it."""
+
+    def __init__(self, name, domain, folder, parameters=None, arguments=(), script=None):
+        self.name = f"{NAMESPACE}/{name}"
+        self._output = folder / f"{name}-{time.monotonic_ns()}.out"
+        self._errors = self._output.with_suffix(".err")
+        what = ["-m", f"valve_friction_ros.nodes.{name}"] if script is None else [str(script)]
+        command = [sys.executable, *what, "--ros-args", "-r", f"__ns:={NAMESPACE}", *arguments]
+        for key, value in (parameters or {}).items():
+            command += ["-p", f"{key}:={value}"]
+        path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
+        environment = os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path}
+        with self._output.open("w") as output, self._errors.open("w") as errors:
+            self._process = subprocess.Popen(
+                command, cwd=folder, env=environment, stdout=output, stderr=errors
+            )
+        self._has_stopped = False
+
+    @property
+    def errors(self):
+        return self._errors.read_text()
+
+    @property
+    def output(self):
+        return self._output.read_text()
+
+    def is_running(self):
+        return self._process.poll() is None
+
+    def require_running(self):
+        assert self.is_running(), f"{self.name} ended: {self._process.returncode}\n{self.errors}"
+
+    def interrupt(self):
+        """Press Ctrl-C."""
+        self._process.send_signal(signal.SIGINT)
+
+    def exit_code(self, timeout=PATIENCE):
+        """Wait for the end of the process."""
+        try:
+            return self._process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise AssertionError(f"{self.name} did not end\n{self.errors}") from None
+
+    def stop(self):
+        """Press Ctrl-C; the node must end well, and must never have shown a traceback."""
+        if self._has_stopped:
+            return
+        self.require_running()
+        self.interrupt()
+        self.require_good_end()
+
+    def require_good_end(self):
+        """Wait for the end of an interrupted node, and look at how it ended."""
+        code = self.exit_code()
+        self._has_stopped = True
+        assert "Traceback" not in self.errors, self.errors
+        assert code == 0, self.errors
+
+    def kill(self):
+        if self.is_running():
+            self._process.kill()
+            self._process.wait()
+
+
+class Client:
+    """What people and programs do with the nodes: publish, listen, call, set parameters."""
+
+    def __init__(self, domain):
+        self.context = rclpy.Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain.number)
+        self.node = rclpy.create_node("tester", context=self.context, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._callers = {}
+        self.watched = []
+        self.statuses = []
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 100)
+        self._pressure = self._stem = None
+
+    def close(self):
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    # Waiting
+
+    def wait_until(self, condition, what, timeout=PATIENCE):
+        """Spin until `condition()` is true, and return it; the watched processes must live."""
+        deadline = time.monotonic() + timeout
+        while not (met := condition()):
+            for process in self.watched:
+                process.require_running()
+            assert time.monotonic() < deadline, f"not within {timeout:g} s: {what}"
+            self._executor.spin_once(timeout_sec=0.02)
+        return met
+
+    def call(self, kind, name, request):
+        """Call a service and return its response."""
+        return self.wait_until_answered(self.request(kind, name, request), name)
+
+    def request(self, kind, name, request):
+        """Call a service and return the future of its response."""
+        if name not in self._callers:
+            self._callers[name] = self.node.create_client(kind, name)
+        caller = self._callers[name]
+        self.wait_until(caller.service_is_ready, f"service {name}")
+        return caller.call_async(request)
+
+    def wait_until_answered(self, future, what="an answer"):
+        self.wait_until(future.done, f"answer of {what}")
+        return future.result()
+
+    # The identifier's services
+
+    def trigger(self, service, node=f"{NAMESPACE}/identifier"):
+        return self.call(Trigger, f"{node}/{service}", Trigger.Request())
+
+    def identify_all(self, count):
+        """Identify once the buffer holds exactly `count` samples of both signals; the response.
+
+        Each identification ends with a diagnostic, so this is quicker than waiting for the timer.
+        """
+        had_all = False
+
+        def answered():
+            nonlocal had_all
+            before = len(self.statuses)
+            response = self.trigger("identify")
+            self.wait_until(lambda: len(self.statuses) > before, "the diagnostic")
+            complete = had_all
+            had_all = all(buffered(status) == count for _, status in self.statuses[before:])
+            return response if complete else None
+
+        try:
+            return self.wait_until(answered, f"{count} samples in the buffer")
+        except AssertionError as error:
+            raise AssertionError(f"{error}; the last was {self.statuses[-1:]}") from None
+
+    def identified_whole(self, count):
+        """Identify `count` samples of both signals; the message."""
+        response = self.identify_all(count)
+        assert response.success, response.message
+        return response.message
+
+    def empty_the_buffer(self):
+        """Clear the buffer until nothing comes from a test before any more."""
+
+        def is_empty():
+            assert self.trigger("clear").success
+            before = len(self.statuses)
+            self.trigger("identify")
+            self.wait_until(lambda: len(self.statuses) > before, "the diagnostic")
+            return self.last_values()["buffered_samples"] == "0"
+
+        self.wait_until(is_empty, "an empty buffer")
+
+    def identified(self, record, start=START):
+        """Clear the buffer, publish a short record and identify all of it; the message."""
+        assert self.trigger("clear").success
+        self.send_record(record, start)
+        return self.identified_whole(2 * len(record))
+
+    # Diagnostics
+
+    def _on_diagnostics(self, message):
+        self.statuses += [(message.header.stamp, status) for status in message.status]
+
+    def next_status(self, condition=lambda _: True, what="a diagnostic"):
+        """Wait for a diagnostic, published from now on, that meets `condition(status)`."""
+        seen = len(self.statuses)
+
+        def met():
+            return next((s for _, s in self.statuses[seen:] if condition(s)), None)
+
+        try:
+            return self.wait_until(met, what)
+        except AssertionError as error:
+            raise AssertionError(f"{error}; the last was {self.statuses[-1:]}") from None
+
+    def last_values(self):
+        """Values of the newest diagnostic."""
+        return values_of(self.statuses[-1][1])
+
+    def status_values(self, condition=lambda _: True, what="a diagnostic"):
+        return values_of(self.next_status(condition, what))
+
+    def wait_for_buffered(self, count):
+        """Wait until the identifier's buffer holds exactly `count` samples of both signals."""
+        self.next_status(
+            lambda status: values_of(status)["buffered_samples"] == str(count),
+            f"buffered_samples {count}",
+        )
+
+    # Topics
+
+    def listen(self, kind, topic, qos=LATCHED):
+        """Subscribe; return the list that received messages are appended to."""
+        received = []
+        self.node.create_subscription(kind, topic, received.append, qos)
+        return received
+
+    def latched(self, kind, topic):
+        """Return the last message of a latched topic, as a late subscriber gets it."""
+        received = []
+        subscription = self.node.create_subscription(kind, topic, received.append, LATCHED)
+        self.wait_until(lambda: received, f"a message on {topic}")
+        self.node.destroy_subscription(subscription)
+        return received[-1]
+
+    def friction(self, *names):
+        """Return the latched results of these names."""
+        topic = f"{NAMESPACE}/identifier/friction/"
+        return {name: self.latched(Float64, topic + name).data for name in names}
+
+    def sweep(self):
+        """Return the latched sweep as a table and the labels of its columns."""
+        message = self.latched(Float64MultiArray, f"{NAMESPACE}/identifier/sweep")
+        rows, columns = message.layout.dim
+        table = np.array(message.data).reshape(rows.size, columns.size)
+        return message.layout, dict(zip(columns.label.split(","), table.T, strict=True))
+
+    def connect(self, readers=1, qos=STREAM):
+        """Create the publishers of pressure and stem, and wait until the nodes take them."""
+        self._pressure = self.node.create_publisher(
+            FluidPressure, f"{NAMESPACE}/actuator_pressure", qos
+        )
+        self._stem = self.node.create_publisher(JointState, f"{NAMESPACE}/stem_state", qos)
+        self.wait_until(
+            lambda: all(
+                publisher.get_subscription_count() >= readers
+                for publisher in (self._pressure, self._stem)
+            ),
+            "subscriptions of the node",
+        )
+
+    def connect_pressure(self):
+        """Create the publisher of the pressure alone, and wait until a node takes it."""
+        self._pressure = self.node.create_publisher(
+            FluidPressure, f"{NAMESPACE}/actuator_pressure", STREAM
+        )
+        self.wait_until(self._pressure.get_subscription_count, "a subscription to the pressure")
+
+    def send_pressure(self, stamp, pressure):
+        message = FluidPressure(fluid_pressure=float(pressure))
+        message.header.stamp = time_of(stamp)
+        self._pressure.publish(message)
+
+    def send_stem(self, stamp, position):
+        self.send_joints(stamp, name=["stem"], position=[float(position)])
+
+    def send_joints(self, stamp, **fields):
+        message = JointState(**fields)
+        message.header.stamp = time_of(stamp)
+        self._stem.publish(message)
+
+    def send(self, pressure=None, position=None, may_send=lambda _: True):
+        """Publish samples (stamps, values) of either signal or both, in the order of time.
+
+        They go in bursts that no queue of the transport is overrun by, each once the one before
+        has been acknowledged. `may_send(count)` holds the next burst back after `count` messages.
+        """
+        events = sorted(
+            (int(stamp), publish is self.send_stem, float(value), publish)
+            for publish, samples in ((self.send_pressure, pressure), (self.send_stem, position))
+            if samples is not None
+            for stamp, value in zip(*samples, strict=True)
+        )
+        publishers = [publisher for publisher in (self._pressure, self._stem) if publisher]
+        for begin in range(0, len(events), _BURST):
+            self.wait_until(
+                lambda sent=begin: may_send(sent), f"room for more than {begin} messages"
+            )
+            for stamp, _, value, publish in events[begin : begin + _BURST]:
+                publish(stamp, value)
+            for publisher in publishers:
+                assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE)), "not acknowledged"
+
+    def send_record(self, record, start=START):
+        """Publish both signals of `record` at its own stamps, the first at `start` ns."""
+        stamps = stamps_of(record, start)
+        self.send((stamps, record.pressure), (stamps, record.position))
+
+    def send_without_loss(self, pressure, position):
+        """Publish long signals to the identifier, whose empty buffer then holds all of them."""
+
+        def has_room(sent):
+            taken = buffered(self.statuses[-1][1]) if self.statuses else 0
+            return sent < _AHEAD + taken
+
+        self.send(pressure, position, has_room)
+        self.wait_for_buffered(len(pressure[0]) + len(position[0]))
+
+    # Parameters
+
+    def parameter_names(self, node):
+        response = self.call(ListParameters, f"{node}/list_parameters", ListParameters.Request())
+        return list(response.result.names)
+
+    def describe(self, node, names):
+        request = DescribeParameters.Request(names=names)
+        return self.call(DescribeParameters, f"{node}/describe_parameters", request).descriptors
+
+    def parameters(self, node, *names):
+        request = GetParameters.Request(names=names)
+        response = self.call(GetParameters, f"{node}/get_parameters", request)
+        return [parameter_value_to_python(value) for value in response.values]
+
+    def set_parameters(self, node, values):
+        """Set parameters one after the other; return the results."""
+        request = SetParameters.Request(parameters=_parameter_messages(values))
+        return self.call(SetParameters, f"{node}/set_parameters", request).results
+
+    def set_together(self, node, values):
+        """Set parameters all at once; return the result."""
+        request = SetParametersAtomically.Request(parameters=_parameter_messages(values))
+        name = f"{node}/set_parameters_atomically"
+        return self.call(SetParametersAtomically, name, request).result
+
+
+def _parameter_messages(values):
+    return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+
+
+def time_of(stamp):
+    seconds, nanoseconds = divmod(int(stamp), SECOND)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def stamp_of(time_message):
+    return time_message.sec * SECOND + time_message.nanosec
+
+
+def values_of(status):
+    return {entry.key: entry.value for entry in status.values}
+
+
+def buffered(status):
+    return int(values_of(status)["buffered_samples"])
+
+
+def stamps_of(record, start=START):
+    period = round(record.sample_period * SECOND)
+    return start + period * np.arange(len(record), dtype=np.int64)

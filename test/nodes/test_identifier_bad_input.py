@@ -1,0 +1,230 @@
+"""Bad input through the topics: each is refused with its cause, and the next record identifies."""
+
+import math
+
+import numpy as np
+import pytest
+from live_nodes import SECOND, stamps_of
+from records import quick_record
+
+from valve_friction_ros.identification import identify
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
+
+RECORD = quick_record()
+STAMPS = stamps_of(RECORD)
+ONE_HOUR = 3600 * SECOND
+
+
+@pytest.fixture(scope="module")
+def identifier(shared):
+    shared.start_identifier({"input_timeout": 600.0})
+    return shared.client
+
+
+@pytest.fixture
+def client(identifier):
+    identifier.empty_the_buffer()
+    return identifier
+
+
+def with_value(values, index, value):
+    changed = np.array(values)
+    changed[index] = value
+    return changed
+
+
+def send(client, part=slice(None), pressure=None, position=None, stamps=STAMPS):
+    """Publish the record with other values in place of its own."""
+    values = (
+        RECORD.pressure if pressure is None else pressure,
+        RECORD.position if position is None else position,
+    )
+    client.send(*((stamps[part], signal[part]) for signal in values))
+
+
+def nothing(_):
+    pass
+
+
+def short(client):
+    send(client, slice(100))
+
+
+def still(client):
+    send(client, position=np.full(len(RECORD), 0.01))
+
+
+def upwards(client):
+    send(client, pressure=np.sort(RECORD.pressure), position=np.sort(RECORD.position))
+
+
+def downwards(client):
+    send(client, pressure=-np.sort(-RECORD.pressure), position=-np.sort(-RECORD.position))
+
+
+def bad_pressure(value):
+    return lambda client: send(client, pressure=with_value(RECORD.pressure, 321, value))
+
+
+def bad_position(value):
+    return lambda client: send(client, position=with_value(RECORD.position, 321, value))
+
+
+def with_joints(**fields):
+    def publish(client):
+        send(client, slice(250))
+        client.send_joints(STAMPS[250], **fields)
+        client.send_pressure(STAMPS[250], RECORD.pressure[250])
+        send(client, slice(251, 500))
+
+    return publish
+
+
+def repeated_pressure(client):
+    send(client, slice(250))
+    client.send_pressure(STAMPS[249], RECORD.pressure[249])
+    send(client, slice(250, 500))
+
+
+def repeated_position(client):
+    send(client, slice(250))
+    client.send_stem(STAMPS[249], RECORD.position[249])
+    send(client, slice(250, 500))
+
+
+def no_stamps(client):
+    for pressure, position in zip(RECORD.pressure, RECORD.position, strict=True):
+        client.send_pressure(0, pressure)
+        client.send_stem(0, position)
+    client.send_pressure(SECOND, RECORD.pressure[0])  # tells by its count that all have arrived
+    client.send_stem(SECOND, RECORD.position[0])
+
+
+def gap(client):
+    send(client, slice(150))
+    send(client, slice(225, 500))
+
+
+def gap_of_stem(client):
+    client.send((STAMPS, RECORD.pressure), (STAMPS[:150], RECORD.position[:150]))
+    client.send(position=(STAMPS[225:], RECORD.position[225:]))
+
+
+def only_pressure(client):
+    client.send(pressure=(STAMPS, RECORD.pressure))
+
+
+def only_stem(client):
+    client.send(position=(STAMPS, RECORD.position))
+
+
+def apart(client):
+    client.send((STAMPS, RECORD.pressure), (STAMPS + ONE_HOUR, RECORD.position))
+
+
+OUTSIDE = ("actuator_pressure outside the sensor's range", "0 to 250000 Pa", "(1 samples)")
+BAD_INPUTS = {  # what is published, how many samples of it are taken, words of the refusal
+    "empty": (nothing, 0, "no samples of actuator_pressure"),
+    "short": (short, 200, "too short", "100 samples", "310"),
+    "still": (still, 1000, "did not move"),
+    "upwards only": (upwards, 1000, "moved up only"),
+    "downwards only": (downwards, 1000, "moved down only"),
+    "nan pressure": (bad_pressure(math.nan), 999, "actuator_pressure is not finite (1 samples)"),
+    "inf pressure": (bad_pressure(math.inf), 999, "actuator_pressure is not finite (1 samples)"),
+    "nan position": (bad_position(math.nan), 999, "stem_state is not finite (1 samples)"),
+    "inf position": (bad_position(-math.inf), 999, "stem_state is not finite (1 samples)"),
+    "no position": (
+        with_joints(name=["stem"]),
+        999,
+        "without a position of the joint (1 samples)",
+    ),
+    "other joint": (
+        with_joints(name=["arm"], position=[0.01]),
+        999,
+        "without a position of the joint (1 samples)",
+    ),
+    "too few positions": (
+        with_joints(name=["arm", "stem"], position=[1.0]),
+        999,
+        "without a position of the joint (1 samples)",
+    ),
+    "pressure repeats": (repeated_pressure, 1000, "actuator_pressure repeats a stamp (1 samples)"),
+    "position repeats": (repeated_position, 1000, "stem_state repeats a stamp (1 samples)"),
+    "no stamps": (no_stamps, 4, "actuator_pressure repeats a stamp (499 samples)"),
+    "gap": (gap, 850, "gap of 0.76 s in actuator_pressure", "1.490 s after"),
+    "gap of stem": (gap_of_stem, 925, "gap of 0.76 s in stem_state", "1.490 s after"),
+    "pressure too high": (bad_pressure(260e3), 999, *OUTSIDE),
+    "pressure too low": (bad_pressure(-1.0), 999, *OUTSIDE),
+    "only pressure": (only_pressure, 500, "no samples of stem_state"),
+    "only stem": (only_stem, 500, "no samples of actuator_pressure"),
+    "apart in time": (apart, 1000, "do not overlap", "3.6e+03 s later"),
+}
+
+
+def identifies_the_next_record(client):
+    client.identified(RECORD)
+    expected = identify(RECORD, BENCH_VALVE).coulomb_friction
+    assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
+
+
+def test_the_good_record_is_good():
+    estimate = identify(RECORD, BENCH_VALVE)
+    assert estimate.coulomb_friction == pytest.approx(LOW_FRICTION.coulomb_friction, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", BAD_INPUTS)
+def test_is_refused_with_its_cause_and_the_next_record_identifies(client, name):
+    publish, count, *words = BAD_INPUTS[name]
+    publish(client)
+    response = client.identify_all(count)
+    assert not response.success, response.message
+    for word in words:
+        assert word in response.message
+    values = client.last_values()
+    assert values["estimate_valid"] == "false"
+    assert values["reason"] == response.message
+    identifies_the_next_record(client)
+
+
+@pytest.mark.parametrize("signal", ["pressure", "stem"])
+def test_stamps_that_go_back_clear_the_buffer(client, signal):
+    send(client)
+    assert client.identify_all(2 * len(RECORD)).success
+    back = STAMPS[0] - SECOND
+    if signal == "pressure":
+        client.send_pressure(back, RECORD.pressure[0])
+    else:
+        client.send_stem(back, RECORD.position[0])
+    topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[signal]
+    reason = client.identify_all(0).message
+    assert "no samples" in reason
+    assert f"the buffer was cleared: stamps of {topic} went back by 5.99 s" in reason
+    identifies_the_next_record(client)
+
+
+def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
+    process = live.start_identifier()
+    client = live.client
+    client.send_pressure(STAMPS[0], math.nan)
+    client.wait_until(lambda: "actuator_pressure is not finite" in process.errors, "a warning")
+    client.send_pressure(STAMPS[1], RECORD.pressure[0])
+    client.send_pressure(STAMPS[0], RECORD.pressure[1])  # at once: no other warning may hide it
+    client.wait_for_buffered(0)
+    client.wait_until(
+        lambda: (
+            "stamps of actuator_pressure went back by 0.01 s: the buffer was cleared"
+            in process.errors
+        ),
+        "the warning",
+    )
+
+
+def test_bad_samples_are_forgotten_once_they_have_left_the_window(live):
+    live.start_identifier({"window": 5.0})
+    client = live.client
+    send(client, pressure=with_value(RECORD.pressure, 100, math.nan))
+    response = client.identify_all(999)
+    assert not response.success
+    assert "not finite" in response.message
+    send(client, stamps=STAMPS + round(len(RECORD) * RECORD.sample_period * SECOND))
+    client.wait_until(lambda: client.trigger("identify").success, "success")

@@ -1,0 +1,91 @@
+"""A missing or mismatched input is a warning that names the topic and the cause."""
+
+import contextlib
+
+import pytest
+from live_nodes import NAMESPACE, START, STREAM, values_of
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import String
+
+WARN = b"\x01"
+PRESSURE, STEM = f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"
+
+
+@pytest.fixture(scope="module")
+def client(shared):
+    shared.start("identifier", {"input_timeout": 0.5})
+    return shared.client
+
+
+@contextlib.contextmanager
+def publisher(client, kind, topic, qos=STREAM):
+    made = client.node.create_publisher(kind, topic, qos)
+    try:
+        yield made
+    finally:
+        client.node.destroy_publisher(made)
+
+
+def warned_of(client, topic, cause):
+    """Wait for a warning of one cause for one topic."""
+    return client.next_status(
+        lambda status: any(
+            f"no data on {topic} for" in part and cause in part
+            for part in status.message.split("; ")
+        ),
+        f"a warning that {topic}: {cause}",
+    )
+
+
+def test_nobody_publishes(client):
+    for topic in (PRESSURE, STEM):
+        status = warned_of(client, topic, "nobody publishes it")
+        assert status.level == WARN
+    values = values_of(status)
+    assert values["NE 107"] == "C"
+    assert values["estimate_valid"] == "false"
+    assert "nothing has been identified yet" in status.message
+
+
+def test_wrong_type(client):
+    with publisher(client, String, STEM) as wrong:
+        status = warned_of(client, STEM, "it is published as std_msgs/msg/String")
+        wrong.publish(String(data="0.01"))
+        assert "not sensor_msgs/msg/JointState" in status.message
+        assert status.level == WARN
+        warned_of(client, PRESSURE, "nobody publishes it")
+
+
+def test_silent_publisher(client):
+    with publisher(client, FluidPressure, PRESSURE):
+        status = warned_of(client, PRESSURE, "its publisher is silent")
+        assert status.level == WARN
+        warned_of(client, STEM, "nobody publishes it")
+
+
+def test_incompatible_quality_of_service(client):
+    best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    with publisher(client, JointState, STEM, best_effort) as lossy:
+        lossy.publish(JointState(name=["stem"], position=[0.0]))
+        status = warned_of(client, STEM, "quality of service")
+        assert status.level == WARN
+        remedy = f"qos_overrides.{STEM}.subscription.reliability:=best_effort"
+        assert remedy in status.message
+
+
+def test_data_end_the_warning(client):
+    with publisher(client, FluidPressure, PRESSURE) as pressure:
+        client.wait_until(pressure.get_subscription_count, "the subscription")
+        seen, stamp = len(client.statuses), START
+
+        def is_quiet():
+            nonlocal stamp
+            stamp += 20_000_000
+            message = FluidPressure(fluid_pressure=1e5)
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+            pressure.publish(message)
+            return any(PRESSURE not in status.message for _, status in client.statuses[seen:])
+
+        client.wait_until(is_quiet, "a diagnostic without a warning of the pressure")
+    warned_of(client, PRESSURE, "nobody publishes it")

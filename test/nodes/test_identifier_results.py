@@ -1,0 +1,246 @@
+"""The main job over topics: samples in, friction out, to the last bit what the core computes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_nodes import (
+    NAMESPACE,
+    SECOND,
+    START,
+    STREAM,
+    buffered,
+    stamp_of,
+    stamps_of,
+    time_of,
+    values_of,
+)
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from records import bench_record, simulated
+from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import Float64, Header
+
+from valve_friction_ros.identification import (
+    UNITS,
+    IdentificationSettings,
+    differentiate,
+    identify,
+)
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SineWave,
+)
+
+EMPS = Path(__file__).parents[3] / "shared/data/emps/emps_identification.csv"
+BIAS = 1.13e-3
+
+
+@pytest.fixture(scope="module")
+def bench(shared):
+    """Identify two periods of a square wave; return client, core's estimate, answers."""
+    shared.start_identifier({"position_bias": BIAS, "input_timeout": 600.0})
+    client = shared.client
+    early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
+    record = bench_record()
+    stamps = stamps_of(record)
+    client.send_without_loss((stamps, record.pressure), (stamps, record.position))
+    response = client.trigger("identify")
+    estimate = identify(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
+    return client, estimate, response, early
+
+
+def test_bench_record_is_identified(bench):
+    client, estimate, response, early = bench
+    assert response.success, response.message
+    client.wait_until(lambda: early, "the result")
+    assert [message.data for message in early] == [estimate.coulomb_friction]
+    truth = {name: getattr(LOW_FRICTION, name) for name in UNITS}
+    assert estimate.mass == pytest.approx(truth.pop("mass"), rel=0.1)
+    assert {name: getattr(estimate, name) for name in truth} == pytest.approx(truth, rel=1e-3)
+
+
+def test_late_subscriber_gets_every_number_to_the_last_bit(bench):
+    client, estimate, *_ = bench
+    dead_band = (estimate.coulomb_friction + estimate.static_friction) / estimate.spring_constant
+    expected = {
+        **estimate.values,
+        "dead_band": dead_band / BENCH_VALVE.travel,
+        "threshold": estimate.threshold,
+        "sigma": estimate.sigma,
+        "r_squared": estimate.r_squared,
+    }
+    ratio = client.friction("coulomb_friction_ratio")["coulomb_friction_ratio"]
+    assert client.friction(*expected) == expected
+    assert np.isnan(ratio)  # no baseline
+
+
+def test_sweep_is_labelled_and_holds_the_estimate(bench):
+    client, estimate, *_ = bench
+    layout, columns = client.sweep()
+    sweep = estimate.sweep
+    rows, width = sweep.thresholds.size, len(columns)
+    assert [(dim.label, dim.size, dim.stride) for dim in layout.dim] == [
+        ("threshold", rows, rows * width),
+        (",".join(columns), width, width),
+    ]
+    expected = {
+        "threshold": sweep.thresholds,
+        **sweep.estimates,
+        "sigma": sweep.sigma,
+        "r_squared": sweep.r_squared,
+        "samples": sweep.samples,
+    }
+    assert list(columns) == list(expected)
+    for name, values in expected.items():
+        np.testing.assert_array_equal(columns[name], values, err_msg=name)
+
+    (row,) = np.flatnonzero(columns["threshold"] == estimate.threshold)
+    at_row = {name: values[row] for name, values in columns.items()}
+    regressed = {name: value for name, value in estimate.values.items() if name in at_row}
+    assert len(regressed) == 5
+    assert {name: at_row[name] for name in regressed} == regressed
+    assert at_row["samples"] == estimate.samples
+    assert at_row["sigma"] == estimate.sigma
+    assert at_row["r_squared"] == estimate.r_squared
+
+
+def test_diagnostics(bench):
+    client, estimate, response, _ = bench
+    begun = len(client.statuses)
+    client.wait_until(lambda: len(client.statuses) >= begun + 4, "four diagnostics")
+    stamps = [stamp_of(stamp) for stamp, _ in client.statuses[begun:]]
+    assert np.median(np.diff(stamps)) == pytest.approx(SECOND, rel=0.25)
+
+    status = client.next_status()
+    assert status.name == f"{NAMESPACE}/identifier: friction"
+    assert status.hardware_id == "fv_101"
+    values = values_of(status)
+    for name, value in estimate.values.items():
+        assert float(values[f"{name} [{UNITS[name]}]"]) == pytest.approx(value, rel=1e-8)
+    assert float(values["threshold [m/s]"]) == pytest.approx(estimate.threshold, rel=1e-8)
+    assert float(values["sigma [N]"]) == pytest.approx(estimate.sigma, rel=1e-8)
+    assert float(values["r_squared"]) == pytest.approx(estimate.r_squared, rel=1e-8)
+    # 2·152.7 N over 2.05e5 N/m, over 28.575 mm
+    assert float(values["dead_band [%]"]) == pytest.approx(5.213, rel=1e-3)
+    assert int(values["samples"]) == estimate.samples
+    assert float(values["estimate_age [s]"]) > 0
+    assert values["estimate_valid"] == "true"
+    assert values["reason"] == ""
+    assert values["NE 107"] == ""
+    assert response.message in status.message
+
+
+@pytest.mark.timeout(100)
+def test_real_machine_gives_the_numbers_of_the_command(live):
+    if not EMPS.is_file():
+        pytest.skip(f"the EMPS record is not here ({EMPS.name}): it may not be redistributed")
+    command = [sys.executable, "-m", "valve_friction_ros.commands.identify_recording", str(EMPS)]
+    told = subprocess.run(
+        [*command, "--fix", "spring_constant=0", "--json"],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    expected = json.loads(told.stdout)
+
+    time, force, position = np.loadtxt(EMPS, delimiter=",", skiprows=1, unpack=True)
+    live.start_identifier(
+        {
+            "diaphragm_area": 1.0,
+            "pressure_reference": 0.0,
+            "travel": ".inf",
+            "pressure_minimum": "-.inf",
+            "pressure_maximum": ".inf",
+            "fixed.spring_constant": 0.0,
+            "window": 60.0,
+        }
+    )
+    client = live.client
+    stamps = np.rint(time * SECOND).astype(np.int64)
+    client.send_without_loss((stamps, force), (stamps, position))
+    response = client.trigger("identify")
+    assert response.success, response.message
+    figures = ("threshold", "sigma", "r_squared")
+    assert client.friction(*UNITS, *figures) == {
+        **{name: expected["parameters"][name]["value"] for name in UNITS},
+        **{name: expected[name] for name in figures},
+    }
+    status = client.status_values(lambda s: "samples" in values_of(s))
+    assert int(status["samples"]) == expected["samples"]
+
+
+def test_signals_of_different_rates(live):
+    """Stem at 1 kHz, pressure at 250 Hz and 0.4 ms late, against one record of both.
+
+    Linear interpolation over h = 4 ms misses a sine of amplitude A and angular frequency ω by
+    A·(ωh)²/8 at most. As the force enters the regression linearly, F_c is then off by at most
+    that force times the sum of magnitudes of its row of the pseudo-inverse.
+    """
+    settings = {"mass": LOW_FRICTION.mass, "limit_velocity": 2e-3}
+    wave = SineWave(period=10.0)
+    live.start_identifier({f"fixed.{name}": value for name, value in settings.items()})
+    client = live.client
+
+    milliseconds = np.arange(10_000)
+    record = simulated(wave.sample(milliseconds / 1000), 1e-3)
+    late = np.arange(400_000, 10_000 * 1_000_000, 4_000_000)  # ns
+    client.send_without_loss(
+        (START + late, wave.sample(late / SECOND)),
+        (START + 1_000_000 * milliseconds, record.position),
+    )
+    response = client.trigger("identify")
+    assert response.success, response.message
+
+    both = slice(1, int(late[-1] // 1_000_000) + 1)  # the grid: positions that pressure surrounds
+    together = Recording(1e-3, record.pressure[both], record.position[both])
+    expected = identify(together, BENCH_VALVE, IdentificationSettings(fixed=settings))
+    derivatives = differentiate(together.position, 1e-3)
+    velocity = derivatives.velocity
+    fast = np.abs(velocity) > settings["limit_velocity"]
+    columns = [np.sign(velocity), velocity, derivatives.inner(together.position)]
+    regressors = np.column_stack([*columns, np.ones_like(velocity)])[fast]
+    amplification = np.abs(np.linalg.pinv(regressors)[0]).sum()
+    amplitude = (wave.high - wave.low) / 2
+    force = BENCH_VALVE.diaphragm_area * amplitude * (2 * np.pi / wave.period * 4e-3) ** 2 / 8
+    assert amplification * force < 0.01  # N: the bound says something
+
+    identified = client.friction("coulomb_friction")["coulomb_friction"]
+    assert identified != expected.coulomb_friction  # it was interpolated
+    assert abs(identified - expected.coulomb_friction) <= amplification * force
+    assert identified == pytest.approx(LOW_FRICTION.coulomb_friction, rel=1e-3)
+
+
+def test_stream_is_received_by_the_quality_of_service_of_the_parameters(live):
+    topic = f"{NAMESPACE}/actuator_pressure"
+    prefix = f"qos_overrides.{topic}.subscription"
+    live.start("identifier", {f"{prefix}.reliability": "best_effort", f"{prefix}.depth": 777})
+    client = live.client
+    node = f"{NAMESPACE}/identifier"
+    (pressure,) = client.wait_until(
+        lambda: client.node.get_subscriptions_info_by_topic(topic), "subscription"
+    )
+    (stem,) = client.wait_until(
+        lambda: client.node.get_subscriptions_info_by_topic(f"{NAMESPACE}/stem_state"), "the other"
+    )
+    assert pressure.qos_profile.reliability.name == "BEST_EFFORT"
+    assert stem.qos_profile.reliability == STREAM.reliability
+    other = f"qos_overrides.{NAMESPACE}/stem_state.subscription.depth"
+    assert client.parameters(node, f"{prefix}.depth", other) == [777, 20_000]
+
+    lossy = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publisher = client.node.create_publisher(FluidPressure, topic, lossy)
+    stamp, seen = START, len(client.statuses)
+
+    def has_arrived():
+        nonlocal stamp
+        stamp += SECOND // 50
+        publisher.publish(FluidPressure(header=Header(stamp=time_of(stamp)), fluid_pressure=1e5))
+        return any(buffered(status) > 0 for _, status in client.statuses[seen:])
+
+    client.wait_until(has_arrived, "a sample in the buffer")

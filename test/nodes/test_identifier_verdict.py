@@ -1,0 +1,96 @@
+"""Excess and collapsed friction against a baseline, on /diagnostics."""
+
+from dataclasses import replace
+
+import pytest
+from live_nodes import NAMESPACE, values_of
+from records import quick_record
+
+from valve_friction_ros.model import HIGH_FRICTION, LOW_FRICTION
+
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
+RATIO = 606 / 152.7
+
+
+@pytest.fixture(scope="module")
+def healthy(shared):
+    """An identifier whose baseline is its own estimate of the healthy valve."""
+    shared.start_identifier({"input_timeout": 600.0})
+    client = shared.client
+    refused = client.trigger("set_baseline")
+    client.identified(quick_record())
+    accepted = client.trigger("set_baseline")
+    return client, refused, accepted
+
+
+@pytest.fixture
+def client(healthy):
+    client, *_ = healthy
+    assert client.set_together(NODE, LIMITS).successful
+    return client
+
+
+def valve_with(coulomb_friction):
+    return replace(
+        LOW_FRICTION, coulomb_friction=coulomb_friction, static_friction=coulomb_friction
+    )
+
+
+def test_baseline_needs_an_estimate(healthy):
+    _, refused, accepted = healthy
+    assert not refused.success
+    assert "there is no estimate" in refused.message
+    assert accepted.success
+    assert "152.7" in accepted.message
+
+
+@pytest.mark.parametrize(
+    ("parameters", "ratio", "level", "signal", "words"),
+    [
+        (HIGH_FRICTION, RATIO, ERROR, "F", "excess friction"),
+        (valve_with(0.3 * 152.7), 0.3, ERROR, "S", "friction collapsed"),
+        (valve_with(1.7 * 152.7), 1.7, WARN, "M", "friction has grown"),
+        (valve_with(1.2 * 152.7), 1.2, OK, "", "friction normal"),
+    ],
+    ids=["tightened", "worn", "growing", "healthy"],
+)
+def test_verdict(client, parameters, ratio, level, signal, words):
+    message = client.identified(quick_record(parameters))
+    status = client.statuses[-1][1]
+    assert status.level == level
+    assert words in status.message
+    assert f"{ratio:.2f} times its baseline" in status.message
+    assert status.message == message
+    values = values_of(status)
+    assert values["NE 107"] == signal
+    assert float(values["coulomb_friction_ratio"]) == pytest.approx(ratio, rel=2e-3)
+    assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(152.7, rel=1e-3)
+    published = client.friction("coulomb_friction_ratio")["coulomb_friction_ratio"]
+    assert published == pytest.approx(float(values["coulomb_friction_ratio"]), rel=1e-8)
+
+
+def test_limits_are_parameters_and_judge_at_once(client):
+    client.identified(quick_record(HIGH_FRICTION))
+    assert client.statuses[-1][1].level == ERROR
+    for limits, level in (
+        ({"error_ratio": 5.0}, WARN),
+        ({"warn_ratio": 4.5}, OK),
+        ({"warn_ratio": 1.1, "error_ratio": 1.2}, ERROR),
+    ):
+        assert client.set_together(NODE, limits).successful
+        client.next_status(lambda status, wanted=level: status.level == wanted, str(level))
+
+
+def test_baseline_is_a_parameter(live):
+    live.start_identifier({"baseline_coulomb_friction": 300.0, "valve_tag": "FV-101/A"})
+    live.client.identified(quick_record(HIGH_FRICTION))
+    status = live.client.statuses[-1][1]
+    assert status.level == ERROR
+    assert status.hardware_id == "FV-101/A"
+    assert float(values_of(status)["coulomb_friction_ratio"]) == pytest.approx(2.02, rel=1e-3)
+
+    assert live.client.set_together(NODE, {"baseline_coulomb_friction": 600.0}).successful
+    values = live.client.status_values(lambda status: status.level == OK, "OK")
+    assert float(values["coulomb_friction_ratio"]) == pytest.approx(1.01, rel=1e-3)

@@ -1,0 +1,123 @@
+"""Starting with impossible parameters, and stopping by Ctrl-C."""
+
+import numpy as np
+import pytest
+from live_nodes import NAMESPACE, Domain, NodeProcess, buffered, stamps_of
+from records import quick_record, simulated
+from slow_identifier import FINISH, SCRIPT
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.identification import identify
+from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
+
+IDENTIFY = f"{NAMESPACE}/identifier/identify"
+NODES = ("identifier", "simulator", "pressure_source")
+BAD_STARTS = {  # node, parameters, words of the only line
+    "even window": ("identifier", {"derivative_window": 30}, "window must be odd"),
+    "limits": ("identifier", {"warn_ratio": 3.0}, "warn_ratio < error_ratio"),
+    "range": ("identifier", {"diaphragm_area": -1.0}, "diaphragm_area"),
+    "integer": ("identifier", {"diaphragm_area": 1}, "diaphragm_area"),
+    "friction": ("simulator", {"coulomb_friction": 600.0}, "static_friction"),
+    "quality": (
+        "simulator",
+        {f"qos_overrides.{NAMESPACE}/stem_state.publisher.reliability": "perhaps"},
+        "reliability",
+    ),
+    "excitation": ("pressure_source", {"excitation": "noise"}, "'noise' is unknown"),
+    "levels": ("pressure_source", {"low": 2e5}, "low (200000) must be below high"),
+    "no file": ("pressure_source", {"excitation": "file", "file": "no.csv"}, "no.csv"),
+    "no file name": ("pressure_source", {"excitation": "file"}, "file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_STARTS)
+def test_impossible_parameter_ends_the_start_with_one_line(tmp_path, name):
+    node, parameters, words = BAD_STARTS[name]
+    domain = Domain()
+    process = NodeProcess(node, domain, tmp_path, parameters)
+    try:
+        code = process.exit_code()
+    finally:
+        process.kill()
+        domain.release()
+    assert code == 2, process.errors
+    (line,) = process.errors.splitlines()
+    assert words in line
+    assert process.output == ""
+
+
+@pytest.mark.parametrize("arguments", [["-p", "window"], ["--params-file", "missing.yaml"]])
+def test_malformed_arguments_end_the_start_without_a_traceback(tmp_path, arguments):
+    domain = Domain()
+    process = NodeProcess("simulator", domain, tmp_path, arguments=arguments)
+    try:
+        code = process.exit_code()
+    finally:
+        process.kill()
+        domain.release()
+    assert code == 2, process.errors
+    assert "Traceback" not in process.errors
+    assert arguments[-1] in process.errors
+
+
+def test_ctrl_c_stops_every_node(live):
+    processes = [live.start(name) for name in NODES]
+    live.client.wait_until(lambda: nodes_of(live.client).issuperset(NODES), "the nodes")
+    live.client.wait_until(lambda: live.client.statuses, "a diagnostic")
+    for process in processes:
+        live.client.watched.remove(process)
+        process.stop()
+
+
+def nodes_of(client):
+    """Names of the nodes in the valve's namespace."""
+    found = client.node.get_node_names_and_namespaces()
+    return {name for name, namespace in found if namespace == NAMESPACE}
+
+
+def begin_identification(client):
+    """Request an identification, and return its future once it is under way."""
+    running = client.request(Trigger, IDENTIFY, Trigger.Request())
+    second = client.call(Trigger, IDENTIFY, Trigger.Request())
+    assert not second.success
+    assert "already running" in second.message
+    assert not running.done()
+    return running
+
+
+def test_ctrl_c_during_an_identification(live, tmp_path):
+    process = live.start_identifier({"input_timeout": 600.0}, script=SCRIPT)
+    client = live.client
+    client.send_record(quick_record())
+    client.wait_for_buffered(1000)
+    begin_identification(client)
+    client.watched.remove(process)
+    process.interrupt()
+    client.wait_until(lambda: "identifier" not in nodes_of(client), "the end of the node")
+    (tmp_path / FINISH).touch()
+    process.require_good_end()
+
+
+def test_long_identification_loses_no_sample(live, tmp_path):
+    """What arrives while an identification runs is taken at once, and identified by the next."""
+    live.start_identifier({"input_timeout": 600.0}, script=SCRIPT)
+    client = live.client
+    whole = simulated(SineWave(period=5.0).sample(np.arange(1000) / 100), 0.01)
+    begin, rest = slice(500), slice(500, 1000)
+    stamps = stamps_of(whole)
+    client.send(*((stamps[begin], signal[begin]) for signal in (whole.pressure, whole.position)))
+    client.wait_for_buffered(1000)
+    running = begin_identification(client)
+    client.send(*((stamps[rest], signal[rest]) for signal in (whole.pressure, whole.position)))
+    client.next_status(lambda status: buffered(status) == 2000, "all samples")
+    assert not running.done()
+
+    (tmp_path / FINISH).touch()
+    response = client.wait_until_answered(running)
+    assert response.success, response.message
+    half = identify(Recording(0.01, whole.pressure[begin], whole.position[begin]), BENCH_VALVE)
+    assert client.friction("sigma") == {"sigma": half.sigma}
+    assert client.trigger("identify").success
+    sigma = identify(whole, BENCH_VALVE).sigma
+    assert sigma != half.sigma
+    assert client.friction("sigma") == {"sigma": sigma}

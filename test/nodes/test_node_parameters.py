@@ -1,0 +1,152 @@
+"""Parameters through the parameter services: described, checked, and refused with a reason."""
+
+import math
+import re
+
+import pytest
+from live_nodes import NAMESPACE, SECOND, STREAM, buffered, stamp_of, time_of
+from rcl_interfaces.msg import ParameterType
+from records import quick_record
+from rosgraph_msgs.msg import Clock
+
+NODES = ("identifier", "simulator", "pressure_source")
+NODE = f"{NAMESPACE}/identifier"
+OF_ROS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
+CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so have no range
+    "travel": -0.01,
+    "pressure_minimum": 3e5,
+    "pressure_maximum": -1.0,
+    "position_bias": math.inf,
+    "baseline_coulomb_friction": 0.0,
+    "fixed.mass": -1.0,
+    "fixed.coulomb_friction": -1.0,
+    "fixed.viscous_friction": -1.0,
+    "fixed.spring_constant": -1.0,
+    "fixed.spring_preload": math.inf,
+    "fixed.static_friction": -1.0,
+    "fixed.limit_velocity": 0.0,
+}
+BAD_CHANGES = [  # changes, words of the reason
+    *(({name: value}, name.removeprefix("fixed.")) for name, value in CHECKED_BY_RULE.items()),
+    ({"travel": math.nan}, "travel must be finite"),
+    ({"pressure_minimum": math.nan}, "pressure_minimum (nan) must be below pressure_maximum"),
+    ({"diaphragm_area": 0.0}, "diaphragm_area"),
+    ({"diaphragm_area": math.nan}, "diaphragm_area"),
+    ({"diaphragm_area": 1}, "expected 'Type.DOUBLE' got 'Type.INTEGER'"),  # the words are rclpy's
+    ({"diaphragm_area": "large"}, "expected 'Type.DOUBLE' got 'Type.STRING'"),
+    ({"window": -1.0}, "window"),
+    ({"input_timeout": 0.0}, "input_timeout"),
+    ({"derivative_window": 30}, "window must be odd"),
+    ({"polynomial_order": 30}, "polynomial_order"),
+    ({"polynomial_order": 20, "derivative_window": 21}, "at least order + 2 = 22"),
+    ({"warn_ratio": 2.5}, "warn_ratio < error_ratio"),
+    ({"warn_ratio": 1.0}, "1 < warn_ratio"),
+    ({"low_ratio": 1.0}, "low_ratio < 1"),
+    ({"assumed_mass": -1.0}, "assumed_mass"),
+    ({"position_bias": 1e-3, "fixed.spring_preload": 200.0}, "exclude each other"),
+    ({"joint": "arm"}, "joint"),
+    ({"valve_tag": "FV-102"}, "valve_tag"),
+]
+
+
+@pytest.fixture(scope="module")
+def client(shared):
+    shared.start_identifier({"input_timeout": 600.0})
+    return shared.client
+
+
+def range_of(descriptor):
+    ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
+    return (ranges[0].from_value, ranges[0].to_value) if ranges else None
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
+    live.start(name)
+    client, node = live.client, f"{NAMESPACE}/{name}"
+    names = [name for name in client.parameter_names(node) if not OF_ROS.fullmatch(name)]
+    assert len(names) >= 10
+    for descriptor in client.describe(node, names):
+        assert re.search(r"\w.*\[[^\]]+\]", descriptor.description), (
+            f"{descriptor.name}: no unit in {descriptor.description!r}"
+        )
+        if descriptor.type == ParameterType.PARAMETER_STRING:
+            continue
+        limits = range_of(descriptor)
+        assert (limits is None) == (descriptor.name in CHECKED_BY_RULE), descriptor.name
+        if limits is not None:
+            assert limits[0] < limits[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"), BAD_CHANGES, ids=["-".join(map(str, c.items())) for c, _ in BAD_CHANGES]
+)
+def test_bad_change_is_refused_with_the_rule(client, changes, words):
+    before = client.parameters(NODE, *changes)
+    result = client.set_together(NODE, changes)
+    assert not result.successful
+    assert words in result.reason
+    after = client.parameters(NODE, *changes)
+    assert [str(value) for value in after] == [str(value) for value in before]
+
+
+def test_good_changes_take_effect_and_unrelated_parameters_stay_settable(client):
+    changes = {"fixed.coulomb_friction": 100.0, "derivative_window": 21, "travel": 0.05}
+    assert [r.successful for r in client.set_parameters(NODE, changes)] == [True] * 3
+    client.identified(quick_record())
+    results = client.friction("coulomb_friction", "static_friction", "spring_constant", "dead_band")
+    assert results["coulomb_friction"] == 100.0
+    width = (100.0 + results["static_friction"]) / results["spring_constant"]
+    assert results["dead_band"] == pytest.approx(width / 0.05, rel=1e-12)
+    assert "coulomb_friction" in client.last_values()["fixed"].split(", ")
+    back = {"fixed.coulomb_friction": math.nan, "derivative_window": 31, "travel": 0.028575}
+    assert client.set_together(NODE, back).successful
+
+
+def test_new_window_empties_the_buffer_and_says_so(client):
+    client.identified(quick_record())
+    assert client.set_together(NODE, {"window": 50.0}).successful
+    reason = client.identify_all(0).message
+    assert "no samples" in reason
+    assert "parameters were changed" in reason
+    assert client.set_together(NODE, {"window": 60.0}).successful
+
+
+def test_simulated_time(live):
+    live.start_identifier()
+    client = live.client
+    clock = client.node.create_publisher(Clock, "/clock", STREAM)
+    (result,) = client.set_parameters(NODE, {"use_sim_time": True})
+    assert result.successful, result.reason
+    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+
+    def run_clock_until(start, condition, what):
+        now = start
+
+        def met():
+            nonlocal now
+            now += SECOND // 20
+            clock.publish(Clock(clock=time_of(now)))
+            return condition()
+
+        client.wait_until(met, what)
+
+    def stamped_by(begin, end):
+        seen = len(client.statuses)
+        return lambda: any(begin <= stamp_of(stamp) < end for stamp, _ in client.statuses[seen:])
+
+    run_clock_until(
+        5000 * SECOND, stamped_by(5000 * SECOND, 6000 * SECOND), "a diagnostic by the clock"
+    )
+    client.send_record(quick_record())
+    seen = len(client.statuses)
+    run_clock_until(
+        6000 * SECOND,
+        lambda: any(buffered(status) == 1000 for _, status in client.statuses[seen:]),
+        "all samples",
+    )
+    run_clock_until(1000 * SECOND, stamped_by(1000 * SECOND, 2000 * SECOND), "the clock set back")
+    response = client.trigger("identify")
+    assert not response.success
+    assert "no samples" in response.message
+    assert "the buffer was cleared: ROS time jumped by -" in response.message
