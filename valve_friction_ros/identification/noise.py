@@ -1,10 +1,12 @@
 """Sensor noise, read from the record itself."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_coeffs
 
-__all__ = ["position_noise", "velocity_noise"]
+__all__ = ["position_noise", "quantisation_step", "sensor_noise", "velocity_noise"]
 
 _MEDIAN_TO_DEVIATION = 0.6745 * np.sqrt(6.0)
 
@@ -18,6 +20,27 @@ def position_noise(position: NDArray[np.float64]) -> float:
     if position.size < 3:
         return 0.0
     return float(np.median(np.abs(np.diff(position, 2))) / _MEDIAN_TO_DEVIATION)
+
+
+def quantisation_step(signal: NDArray[np.float64]) -> float:
+    """Estimate the step of a converter: the smallest distance between two values of `signal`.
+
+    Zero where hardly any two samples are equal, as in a signal that was never quantised.
+    """
+    values = np.unique(signal)
+    if values.size < 2 or values.size > 0.5 * signal.size:
+        return 0.0
+    gaps = np.diff(values)
+    return float(gaps[gaps > 1e-6 * gaps.max()].min())
+
+
+def sensor_noise(signal: NDArray[np.float64]) -> float:
+    """Standard deviation of a sensor's noise, in the unit of `signal`, rounding included.
+
+    The larger of what the second differences show (`position_noise`) and of the rounding error,
+    1/√12 of the converter's step, which they miss where the signal hardly changes.
+    """
+    return max(position_noise(signal), quantisation_step(signal) / math.sqrt(12.0))
 
 
 def velocity_noise(noise: float, sample_period: float, window: int, order: int) -> float:

@@ -1,6 +1,9 @@
-"""Parameters of the Karnopp friction model, equations (1) and (2)."""
+"""Parameters of the Karnopp friction model, equations (1) and (2), and of its two extensions."""
 
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.model.checks import (
     require_finite,
@@ -35,6 +38,13 @@ class KarnoppParameters:
     limit_velocity : float
         Speed DV, m/s, at which a sliding stem comes to rest if the static friction can
         hold it. Zero is the exact limit: it rests when its speed reaches zero.
+    stribeck_velocity : float
+        Speed v_s, m/s, over which the friction of the moving stem falls from F_s to F_c,
+        ``F_c + (F_s − F_c)·exp(−(ẋ/v_s)²)``. Zero, as published: it falls at once.
+    coulomb_asymmetry, viscous_asymmetry : float
+        Shares a, between −1 and 1, by which the friction is larger on the way up (1 + a) and
+        smaller on the way down (1 − a). The first scales F_c and F_s, the second F_v.
+        Zero, as published: both ways alike.
 
     Raises
     ------
@@ -49,6 +59,9 @@ class KarnoppParameters:
     spring_constant: float
     spring_preload: float = 0.0
     limit_velocity: float = 0.0
+    stribeck_velocity: float = 0.0
+    coulomb_asymmetry: float = 0.0
+    viscous_asymmetry: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot exist."""
@@ -59,8 +72,26 @@ class KarnoppParameters:
         require_non_negative("spring_constant", self.spring_constant)
         require_finite("spring_preload", self.spring_preload)
         require_non_negative("limit_velocity", self.limit_velocity)
+        require_non_negative("stribeck_velocity", self.stribeck_velocity)
+        for name in ("coulomb_asymmetry", "viscous_asymmetry"):
+            if not abs(require_finite(name, getattr(self, name))) < 1:
+                raise ValueError(f"{name} must lie between -1 and 1, got {getattr(self, name):g}")
         if self.static_friction < self.coulomb_friction:
             raise ValueError(
                 f"static_friction ({self.static_friction:g}) must not be below "
                 f"coulomb_friction ({self.coulomb_friction:g})"
             )
+
+    def sliding_friction(self, velocity: ArrayLike) -> NDArray[np.float64]:
+        """Friction force in N on a stem that slides at `velocity` (m/s), against its motion.
+
+        Zero where the velocity is zero: there the stem rests, and friction is what holds it.
+        """
+        speed = np.abs(np.asarray(velocity, dtype=np.float64))
+        side = np.sign(velocity)
+        excess = self.static_friction - self.coulomb_friction
+        fall = np.exp(-((speed / self.stribeck_velocity) ** 2)) if self.stribeck_velocity else 0.0
+        dry = (self.coulomb_friction + excess * fall) * (1 + side * self.coulomb_asymmetry)
+        viscous = self.viscous_friction * speed * (1 + side * self.viscous_asymmetry)
+        force: NDArray[np.float64] = side * (dry + viscous)
+        return force

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.checks import require_finite, require_positive
 from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.linear_motion import Motion, impulse_response, motion_after
+from valve_friction_ros.model.linear_motion import (
+    Motion,
+    Response,
+    impulse_response,
+    motion_after,
+)
 from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
 from valve_friction_ros.model.valve import Valve
 
@@ -55,22 +60,38 @@ class Trajectory(NamedTuple):
         return StemState(float(self.position[-1]), float(self.velocity[-1]))
 
 
-def _dynamics(valve: Valve, parameters: KarnoppParameters) -> Dynamics:
-    return Dynamics(
-        mass=parameters.mass,
-        viscous_friction=parameters.viscous_friction,
-        coulomb_friction=parameters.coulomb_friction,
-        static_friction=parameters.static_friction,
-        spring_constant=parameters.spring_constant,
-        limit_velocity=parameters.limit_velocity,
-        travel=valve.travel,
+class _Ways(NamedTuple):
+    """The dynamics of either way of motion."""
+
+    upward: Dynamics
+    downward: Dynamics
+
+
+def _dynamics(valve: Valve, parameters: KarnoppParameters) -> _Ways:
+    upward, downward = (
+        Dynamics(
+            mass=parameters.mass,
+            viscous_friction=parameters.viscous_friction * (1 + viscous),
+            coulomb_friction=parameters.coulomb_friction * (1 + coulomb),
+            static_friction=parameters.static_friction * (1 + coulomb),
+            spring_constant=parameters.spring_constant,
+            limit_velocity=parameters.limit_velocity,
+            travel=valve.travel,
+            stribeck_velocity=parameters.stribeck_velocity,
+        )
+        for coulomb, viscous in (
+            (parameters.coulomb_asymmetry, parameters.viscous_asymmetry),
+            (-parameters.coulomb_asymmetry, -parameters.viscous_asymmetry),
+        )
     )
+    return _Ways(upward, downward)
 
 
 @compiled
-def _surely_rests(pull: float, change: float, dynamics: Dynamics) -> bool:
+def _surely_rests(pull: float, change: float, upward: Dynamics, downward: Dynamics) -> bool:
     """Tell whether a resting stem stays, under a `pull` that changes linearly by `change`."""
-    return max(abs(pull), abs(pull + change)) <= dynamics.static_friction
+    highest, lowest = max(pull, pull + change), min(pull, pull + change)
+    return highest <= upward.static_friction and -lowest <= downward.static_friction
 
 
 @compiled
@@ -89,12 +110,28 @@ def _surely_slides(
 
 
 @compiled
+def _response(dynamics: Dynamics, period: float) -> Response:
+    """Impulse response of the sliding stem after one period."""
+    damping = dynamics.viscous_friction / dynamics.mass
+    return impulse_response(damping, dynamics.spring_constant / dynamics.mass, period)
+
+
+@compiled
+def _turns_once(dynamics: Dynamics, period: float) -> bool:
+    """Tell whether the velocity can turn once at the most within a period."""
+    damping = dynamics.viscous_friction / dynamics.mass
+    stiffness = dynamics.spring_constant / dynamics.mass
+    return (stiffness - damping * damping / 4) * period * period < math.pi**2
+
+
+@compiled
 def _run(
     position: float,
     velocity: float,
     forces: NDArray[np.float64],
     period: float,
-    dynamics: Dynamics,
+    upward: Dynamics,
+    downward: Dynamics,
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
 ) -> None:
@@ -103,28 +140,31 @@ def _run(
     Samples in which the stem surely rests or surely slides on take a short cut; all others,
     those with an event among them, go through `advance_stem`.
     """
-    damping = dynamics.viscous_friction / dynamics.mass
-    stiffness = dynamics.spring_constant / dynamics.mass
-    response = impulse_response(damping, stiffness, period)
-    turns_once = (stiffness - damping * damping / 4) * period * period < math.pi**2
+    responses = _response(upward, period), _response(downward, period)
+    turns_once = _turns_once(upward, period), _turns_once(downward, period)
+    straight = upward.stribeck_velocity == 0.0
     positions[0], velocities[0] = position, velocity
     for sample in range(1, forces.size):
         force, change = forces[sample - 1], forces[sample] - forces[sample - 1]
         slope = change / period
-        pull = force - dynamics.spring_constant * position
+        pull = force - upward.spring_constant * position
+        simple = False
         if velocity == 0.0:
-            simple = _surely_rests(pull, change, dynamics)
-        else:
-            side = 1.0 if velocity > 0 else -1.0
+            simple = _surely_rests(pull, change, upward, downward)
+        elif straight:
+            way = 0 if velocity > 0 else 1
+            side, dynamics = (1.0, upward) if velocity > 0 else (-1.0, downward)
             friction = side * dynamics.coulomb_friction + dynamics.viscous_friction * velocity
             start = Motion(position, velocity, (pull - friction) / dynamics.mass)
-            jerk = slope / dynamics.mass - stiffness * velocity
-            end = motion_after(start, jerk, response, period)
-            simple = _surely_slides(start, end, side, turns_once, dynamics)
+            jerk = (slope - dynamics.spring_constant * velocity) / dynamics.mass
+            end = motion_after(start, jerk, responses[way], period)
+            simple = _surely_slides(start, end, side, turns_once[way], dynamics)
             if simple:
                 position, velocity = end.position, end.velocity
         if not simple:
-            position, velocity = advance_stem(position, velocity, force, slope, period, dynamics)
+            position, velocity = advance_stem(
+                position, velocity, force, slope, period, upward, downward
+            )
         positions[sample], velocities[sample] = position, velocity
 
 
@@ -181,7 +221,7 @@ def advance(
             before,
             (after - before) / duration,
             duration,
-            _dynamics(valve, parameters),
+            *_dynamics(valve, parameters),
         )
     )
 
@@ -236,7 +276,7 @@ def simulate(
         state.velocity,
         forces,
         period,
-        _dynamics(valve, parameters),
+        *_dynamics(valve, parameters),
         positions,
         velocities,
     )

@@ -1,7 +1,9 @@
 """One step of the Karnopp model: rest, breakaway, sliding, stopping, travel stops.
 
 The stem is described by position and velocity alone; a velocity of exactly zero means rest.
-Sliding is treated in a mirrored frame in which the stem moves up, so each rule stands once.
+Sliding is treated in a mirrored frame in which the stem moves up, so each rule stands once; the
+friction of the two ways may differ. Friction that falls with the speed (Stribeck) is followed by
+its tangent, which is a Coulomb and a viscous friction, in steps short enough for it to hold.
 """
 
 import math
@@ -19,9 +21,12 @@ __all__ = ["Dynamics", "advance_stem"]
 
 _ROOT_ITERATIONS = 100
 
+_STRIBECK_STEP = 0.02
+"""Share of the Stribeck velocity by which the speed may change while one tangent is used."""
+
 
 class Dynamics(NamedTuple):
-    """The numbers that a step needs, as plain floats for the compiled kernels (SI units)."""
+    """The numbers that one way of motion needs, plain floats for compiled kernels (SI units)."""
 
     mass: float
     viscous_friction: float
@@ -30,6 +35,7 @@ class Dynamics(NamedTuple):
     spring_constant: float
     limit_velocity: float
     travel: float
+    stribeck_velocity: float
 
 
 @compiled
@@ -104,7 +110,7 @@ def _time_to_rest(
                 return time
         if end.velocity <= 0 and end.velocity < early_velocity:
             return _time_of_velocity(start, jerk, dynamics, 0.0, early, late)
-        if late >= duration:
+        if not late < duration:  # so that an overflow ends here, too
             return math.inf
         early, early_velocity = late, end.velocity
         late = min(late + half_period, duration)
@@ -132,6 +138,60 @@ def _slide_up(
 
 
 @compiled
+def _tangent(dynamics: Dynamics, speed: float) -> Dynamics:
+    """Linearise Stribeck friction at `speed`: Coulomb and viscous friction of its tangent.
+
+    Where friction falls faster with the speed than the viscous part rises, the tangent is
+    taken level, which keeps the motion within a step monotone.
+    """
+    excess = dynamics.static_friction - dynamics.coulomb_friction
+    if dynamics.stribeck_velocity == 0.0 or excess == 0.0:
+        return dynamics
+    ratio = speed / dynamics.stribeck_velocity
+    fall = excess * math.exp(-ratio * ratio)
+    friction = dynamics.coulomb_friction + fall + dynamics.viscous_friction * speed
+    slope = max(dynamics.viscous_friction - 2 * ratio / dynamics.stribeck_velocity * fall, 0.0)
+    return Dynamics(
+        dynamics.mass,
+        slope,
+        friction - slope * speed,
+        dynamics.static_friction,
+        dynamics.spring_constant,
+        dynamics.limit_velocity,
+        dynamics.travel,
+        dynamics.stribeck_velocity,
+    )
+
+
+@compiled
+def _slide_one_way(
+    position: float,
+    speed: float,
+    dynamics: Dynamics,
+    force: float,
+    slope: float,
+    duration: float,
+    stop: float,
+) -> tuple[float, float, float]:
+    """Slide upwards as `_slide_up`, for no longer than the tangent of the friction holds."""
+    local = _tangent(dynamics, speed)
+    pull = force - dynamics.spring_constant * position
+    if speed == 0.0:
+        pull = max(pull, dynamics.static_friction)
+    excess = pull - local.coulomb_friction - local.viscous_friction * speed
+    start = Motion(position, speed, excess / dynamics.mass)
+    step = duration
+    while True:
+        reached, final, time = _slide_up(start, local, force, slope, step, stop)
+        change = abs(final - speed)
+        if dynamics.stribeck_velocity == 0.0 or final == 0.0 or step < 1e-9 * duration:
+            return reached, final, time
+        if change <= _STRIBECK_STEP * dynamics.stribeck_velocity:
+            return reached, final, time
+        step *= max(0.5 * _STRIBECK_STEP * dynamics.stribeck_velocity / change, 0.01)
+
+
+@compiled
 def _stop_ahead(side: float, travel: float) -> float:
     """Mirrored position of the travel stop towards `side`; inf for a machine without stops."""
     return travel if side > 0 or travel == math.inf else 0.0
@@ -139,7 +199,7 @@ def _stop_ahead(side: float, travel: float) -> float:
 
 @compiled
 def _breakaway(
-    position: float, pull: float, slope: float, dynamics: Dynamics
+    position: float, pull: float, slope: float, upward: Dynamics, downward: Dynamics
 ) -> tuple[float, float]:
     """Side (+1 up, −1 down) to which the resting stem leaves first, and the time until then.
 
@@ -148,16 +208,16 @@ def _breakaway(
     never does.
     """
     up, down = math.inf, math.inf
-    if position < dynamics.travel:
-        if pull > dynamics.static_friction:
+    if position < upward.travel:
+        if pull > upward.static_friction:
             up = 0.0
         elif slope > 0:
-            up = (dynamics.static_friction - pull) / slope
-    if position > 0 or dynamics.travel == math.inf:
-        if -pull > dynamics.static_friction:
+            up = (upward.static_friction - pull) / slope
+    if position > 0 or upward.travel == math.inf:
+        if -pull > downward.static_friction:
             down = 0.0
         elif slope < 0:
-            down = (dynamics.static_friction + pull) / -slope
+            down = (downward.static_friction + pull) / -slope
     return (1.0, up) if up < down else (-1.0, down)
 
 
@@ -168,7 +228,8 @@ def advance_stem(
     force: float,
     slope: float,
     duration: float,
-    dynamics: Dynamics,
+    upward: Dynamics,
+    downward: Dynamics,
 ) -> tuple[float, float]:
     """Advance the stem by `duration` under a force that is linear in time, exactly.
 
@@ -180,8 +241,8 @@ def advance_stem(
         Actuator force less the spring preload at the start, N, and its rate, N/s.
     duration : float
         Length of the step, s.
-    dynamics : Dynamics
-        Parameters of the model.
+    upward, downward : Dynamics
+        Parameters of the model for either way.
 
     Returns
     -------
@@ -191,25 +252,22 @@ def advance_stem(
     shortest_phase = 1e-12 * duration
     elapsed = 0.0
     while elapsed < duration:
-        pull = force + slope * elapsed - dynamics.spring_constant * position
+        pull = force + slope * elapsed - upward.spring_constant * position
         if velocity == 0.0:
-            side, wait = _breakaway(position, pull, slope, dynamics)
+            side, wait = _breakaway(position, pull, slope, upward, downward)
             elapsed += wait
             if elapsed >= duration:
                 break
-            excess = max(side * pull, dynamics.static_friction) - dynamics.coulomb_friction
         else:
             side = 1.0 if velocity > 0 else -1.0
-            excess = (
-                side * pull - dynamics.coulomb_friction - dynamics.viscous_friction * abs(velocity)
-            )
-        reached, speed, time = _slide_up(
-            Motion(side * position, abs(velocity), excess / dynamics.mass),
-            dynamics,
+        reached, speed, time = _slide_one_way(
+            side * position,
+            abs(velocity),
+            upward if side > 0 else downward,
             side * (force + slope * elapsed),
             side * slope,
             duration - elapsed,
-            _stop_ahead(side, dynamics.travel),
+            _stop_ahead(side, upward.travel),
         )
         position, velocity = side * reached, side * speed
         elapsed += max(time, shortest_phase)
