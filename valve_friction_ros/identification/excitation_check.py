@@ -7,11 +7,24 @@ from valve_friction_ros.identification.derivatives import Derivatives
 from valve_friction_ros.identification.noise import position_noise
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
 
-__all__ = ["require_enough_samples", "require_motion", "require_two_directions"]
+__all__ = [
+    "require_enough_samples",
+    "require_motion",
+    "require_related_signals",
+    "require_stem_between_stops",
+    "require_travel",
+    "require_two_directions",
+]
 
 _MOTION_OVER_NOISE = 10.0
 _LEAST_SHARE_OF_DIRECTION = 0.02
+_LEAST_TRAVEL = 0.01
+_MOST_AT_A_STOP = 0.5
+_OUTSIDE = 0.05
+_LEAST_CORRELATION = 0.5
+_LEAST_SAMPLES_A_STROKE = 10
 
 
 def require_enough_samples(recording: Recording, window: int) -> None:
@@ -70,4 +83,66 @@ def require_two_directions(recording: Recording, window: int) -> None:
         raise RefusalError(
             f"the stem moved {way} only ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
             "friction cannot be told from the spring; record at least one stroke each way"
+        )
+
+
+def require_travel(recording: Recording, valve: Valve) -> None:
+    """Refuse a stem that leaves the travel, or moves over hardly any of it."""
+    travel = valve.travel
+    lowest, highest = float(recording.position.min()), float(recording.position.max())
+    if not np.isfinite(travel):
+        return
+    if lowest < -_OUTSIDE * travel or highest > (1 + _OUTSIDE) * travel:
+        raise RefusalError(
+            f"the stem position runs from {lowest:.4g} to {highest:.4g} m, the travel from 0 to "
+            f"{travel:.4g} m: check for swapped signals, the unit (m), the zero and the travel"
+        )
+    if highest - lowest < _LEAST_TRAVEL * travel:
+        raise RefusalError(
+            f"too little travel: the stem moved {(highest - lowest) * 1e3:.3g} mm, "
+            f"{100 * (highest - lowest) / travel:.2g} % of its travel; "
+            "excite the valve over several percent of it"
+        )
+
+
+def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
+    """Refuse a stem that lies at a travel stop for most of the record."""
+    travel = valve.travel
+    if not np.isfinite(travel):
+        return
+    reach = max(5 * position_noise(recording.position), 1e-3 * travel)
+    for name, distance in (
+        ("lower", np.abs(recording.position)),
+        ("upper", np.abs(recording.position - travel)),
+    ):
+        share = float(np.mean(distance < reach))
+        if share > _MOST_AT_A_STOP:
+            raise RefusalError(
+                f"the stem lies at its {name} stop for {100 * share:.0f} % of the record, where "
+                "pressure says nothing about friction: excite the valve around mid-travel"
+            )
+
+
+def require_related_signals(recording: Recording) -> None:
+    """Refuse pressure and stem that do not move together, or move too fast for the sampling."""
+    pressure, position = recording.pressure, recording.position
+    if np.ptp(pressure) == 0:
+        raise RefusalError("the pressure did not change: excite the valve, or check its sensor")
+    correlation = float(np.corrcoef(pressure, position)[0, 1])
+    if correlation < -_LEAST_CORRELATION:
+        raise RefusalError(
+            f"the stem moves against the pressure (correlation {correlation:.2f}): count the "
+            "position in the direction in which pressure pushes the stem"
+        )
+    if correlation < _LEAST_CORRELATION:
+        raise RefusalError(
+            f"pressure and stem do not move together (correlation {correlation:.2f}): check for "
+            "the wrong valve, a dead sensor, swapped signals or clocks far apart"
+        )
+    step = float(np.max(np.abs(np.diff(position))))
+    span = float(np.ptp(position))
+    if step * _LEAST_SAMPLES_A_STROKE > span:
+        raise RefusalError(
+            f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
+            f"its range between two samples, {recording.sample_period:.3g} s apart; sample faster"
         )

@@ -1,0 +1,112 @@
+"""Records to be identified: excitation, noise, sampling and quantisation of the sensors."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from benchmark.plants import PLANTS, Plant
+from numpy.typing import NDArray
+
+from valve_friction_ros.model import (
+    Recording,
+    SensorNoise,
+    SineWave,
+    SquareWave,
+    TriangleWave,
+    converter_response,
+)
+from valve_friction_ros.model.excitations import pressure_at
+
+__all__ = ["CONDITIONS", "EXCITATIONS", "NOISES", "Case", "Condition"]
+
+PERIOD = 1e-3
+"""Sample period of the simulation and of the fast sensors, s."""
+
+NOISES = {
+    "clean": SensorNoise(),
+    "10 µm": SensorNoise(10e-6, 100.0),
+    "28.6 µm": SensorNoise(28.6e-6, 165.0),
+    "60 µm": SensorNoise(60e-6, 400.0),
+}
+"""White noise of stem and pressure sensor."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """How the sensors sample: every `stride` ms, with 12 bits or without quantisation."""
+
+    name: str
+    stride: int
+    quantised: bool
+
+    def sampled(self, recording: Recording) -> Recording:
+        """Return every `stride`-th sample, quantised over 0–30 mm and 0–250 kPa."""
+        pressure = recording.pressure[:: self.stride]
+        position = recording.position[:: self.stride]
+        if self.quantised:
+            pressure, position = _quantised(pressure, 250e3), _quantised(position, 30e-3)
+        return Recording(self.stride * recording.sample_period, pressure, position)
+
+
+def _quantised(values: NDArray[np.float64], span: float) -> NDArray[np.float64]:
+    """Round to the codes of a 12-bit converter from 0 to `span`."""
+    unit = span / 2**12
+    rounded: NDArray[np.float64] = np.round(values / unit) * unit
+    return rounded
+
+
+CONDITIONS = {
+    "1 kHz": Condition("1 kHz", 1, quantised=False),
+    "100 Hz": Condition("100 Hz", 10, quantised=True),
+}
+"""Sampling by name; the slow one has 12 bits."""
+
+
+def _in_service(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Moves of ±3 % of the range every 4 s around mid-range, as a controller makes them.
+
+    A random walk; of most such walks the stem of a tight packing follows one way only, which is
+    refused. This seed moves the graphite valve 4 mm up and 5 mm down.
+    """
+    steps = np.random.default_rng(138).choice([-0.03, 0.03], int(time[-1] / 4) + 1)
+    levels = 0.5 + np.clip(np.cumsum(steps), -0.3, 0.3)
+    return np.array([pressure_at(level) for level in levels])[(time / 4).astype(int)]
+
+
+EXCITATIONS = {
+    "square": (lambda time: SquareWave().sample(time), 52.0),
+    "triangle": (lambda time: TriangleWave().sample(time), 120.0),
+    "sine": (lambda time: SineWave().sample(time), 71.0),
+    "in service": (_in_service, 120.0),
+}
+"""Commanded pressure as a function of time, and the duration of the record, s."""
+
+
+@cache
+def _clean(plant_name: str, excitation: str) -> Recording:
+    command, duration = EXCITATIONS[excitation]
+    time = np.arange(round(duration / PERIOD)) * PERIOD
+    pressure = converter_response(command(time), PERIOD)
+    return Recording(PERIOD, pressure, PLANTS[plant_name].respond(pressure, PERIOD))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One combination of everything, by name."""
+
+    plant_name: str
+    excitation: str
+    noise: str
+    condition: str
+
+    @property
+    def plant(self) -> Plant:
+        """The valve and the truth about it."""
+        return PLANTS[self.plant_name]
+
+    def record(self, seed: int) -> Recording:
+        """Return the record as the sensors see it, reproducible by its seed."""
+        noise = NOISES[self.noise]
+        seeded = SensorNoise(noise.position, noise.pressure, seed)
+        noisy = seeded.applied_to(_clean(self.plant_name, self.excitation))
+        return CONDITIONS[self.condition].sampled(noisy)

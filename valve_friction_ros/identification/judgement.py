@@ -1,0 +1,145 @@
+"""Verdicts on the parameters of a refinement or of a regression."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.estimate import UNITS, Estimate
+from valve_friction_ros.identification.model_honesty import Misfit
+from valve_friction_ros.identification.output_error import OFFSET, SLIP, START
+from valve_friction_ros.identification.refinement import Refinement
+from valve_friction_ros.identification.regression_uncertainty import RegressionUncertainty
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.uncertainty import (
+    block_covariance,
+    half_width,
+    stroke_length,
+    worst_case,
+)
+from valve_friction_ros.identification.verdict import (
+    AssessedParameter,
+    fixed,
+    judged,
+    not_identifiable,
+)
+
+__all__ = ["FALL_SPEED", "FEWEST_STROKES", "judge_refinement", "judge_regression"]
+
+FALL_SPEED = 6.5e-3
+"""Speed, m/s, up to which the friction of a packing is known to fall: twice the v_s = 3.26 mm/s
+that was published for graphite. Slower records cannot tell F_c from the friction at low speed."""
+
+FEWEST_STROKES = 4
+"""Strokes below which the scatter between them is not known, and nothing is more than weak."""
+
+_FRICTION = ("viscous_friction", "coulomb_friction", "static_friction")
+_FINEST = 5e-4
+"""No interval is narrower than this share of the value, however quiet the record is: smoothing
+and sampling leave no more."""
+
+_NO_SLIP = "no slip jump seen: F_s cannot be told from F_c"
+
+
+def judge_refinement(
+    refinement: Refinement, misfit: Misfit, settings: IdentificationSettings
+) -> dict[str, AssessedParameter]:
+    """Judge every parameter of a refined model.
+
+    The half width of an interval is the t-quantile of the scatter between strokes, and, where
+    the misfit is more than noise, what it can have done at the worst (`worst_case`).
+    """
+    stroke = stroke_length(refinement.simulated)
+    covariance, freedom = block_covariance(*refinement.equation, stroke)
+    samples = refinement.simulated.size
+    systematic = worst_case(refinement.equation.curvature, samples, misfit.excess)
+    values = {
+        **vars(refinement.problem.model(refinement.coordinates)),
+        OFFSET: refinement.coordinates[OFFSET],
+    }
+    few = _too_few(samples // max(stroke, 1))
+    doubt = _doubt(refinement, misfit)
+    extras = (name for name in refinement.names if name not in (*UNITS, SLIP, START))
+    judgements = {}
+    for name in (*UNITS, *extras):
+        gradient = _gradient(refinement, name, settings)
+        if name in settings.fixed:
+            judgements[name] = fixed(name, settings.fixed[name])
+        elif name == "mass" and name not in refinement.names:
+            assumed = refinement.coordinates["mass"]
+            judgements[name] = not_identifiable(
+                name, f"inertia is too small a part of the force to be seen; {assumed:g} kg assumed"
+            )
+        elif name == "static_friction" and SLIP not in refinement.names:
+            judgements[name] = not_identifiable(name, _NO_SLIP)
+        else:
+            error = _root(float(gradient @ covariance @ gradient))
+            bound = _root(float(gradient @ systematic @ gradient))
+            width = max(half_width(error, freedom) + bound, _FINEST * abs(values[name]))
+            reason = few or (doubt if name in _FRICTION else "")
+            judgements[name] = judged(name, values[name], error, width, reason)
+    return judgements
+
+
+def judge_regression(
+    estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
+) -> dict[str, AssessedParameter]:
+    """Judge every parameter of a regression, for a machine without a spring."""
+    covariance, freedom = regression.covariance
+    few = _too_few(regression.strokes)
+    judgements = {}
+    for name, value in estimate.values.items():
+        if name in settings.fixed:
+            judgements[name] = fixed(name, settings.fixed[name])
+        elif name == "static_friction":
+            judgements[name] = not_identifiable(name, _NO_SLIP)
+        elif name not in regression.names:
+            judgements[name] = not_identifiable(name, "the record does not tell it")
+        else:
+            index = regression.names.index(name)
+            error = _root(covariance[index, index])
+            width = max(half_width(error, freedom), _FINEST * abs(value))
+            judgements[name] = judged(name, value, error, width, few)
+    return judgements
+
+
+def _root(variance: float) -> float:
+    return math.sqrt(variance) if variance >= 0 else math.nan
+
+
+def _too_few(strokes: int) -> str:
+    if strokes >= FEWEST_STROKES:
+        return ""
+    return f"{strokes} strokes only: record at least {FEWEST_STROKES}, up and down"
+
+
+def _doubt(refinement: Refinement, misfit: Misfit) -> str:
+    """Say why the friction cannot be more than weak, or nothing."""
+    if not misfit.describes:
+        return (
+            "the Karnopp model does not describe this valve: "
+            f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
+        )
+    speed = refinement.top_speed
+    if speed < FALL_SPEED:
+        return (
+            f"holds up to {speed * 1e3:.2g} mm/s, the fastest here: "
+            f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
+        )
+    return ""
+
+
+def _gradient(
+    refinement: Refinement, name: str, settings: IdentificationSettings
+) -> NDArray[np.float64]:
+    """Differentiate a parameter by the free coordinates of the refinement."""
+    gradient = np.zeros(len(refinement.names))
+    if name == "static_friction":
+        for part in ("coulomb_friction", SLIP):
+            if part in refinement.names:
+                gradient[refinement.names.index(part)] = 1.0
+    elif name == "spring_preload" and settings.position_bias is not None:
+        gradient[refinement.names.index("spring_constant")] = settings.position_bias
+    elif name in refinement.names:
+        gradient[refinement.names.index(name)] = 1.0
+    return gradient

@@ -1,0 +1,190 @@
+"""Which parts of the model a record demands: each is tested before it is estimated."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from valve_friction_ros.identification.model_honesty import misfit_of
+from valve_friction_ros.identification.output_error import OFFSET, SLIP, Coordinates, OutputError
+from valve_friction_ros.identification.refinement import (
+    Refinement,
+    estimating_equation,
+    least_squares_fit,
+    refine,
+)
+from valve_friction_ros.identification.uncertainty import block_covariance, stroke_length
+
+__all__ = ["SIGNIFICANCE", "demanded", "deviation", "one_step", "with_demanded"]
+
+SIGNIFICANCE = 4.0
+"""Standard errors by which a part of the model must differ from nothing to be estimated."""
+
+_DROPS = (0.15, 0.35)
+"""Starts for F_s − F_c, as shares of F_c."""
+
+_SLIP_BIAS = 0.2
+"""Share of a slip jump by which a model without one sees too much Coulomb friction, about."""
+
+_STRIBECK_SHARES = (0.5, 0.7)
+"""Starts for the Stribeck velocity, as shares of the top speed."""
+
+_OFFSETS = (-2.0, -1.0, -0.5, -0.2, -0.1, 0.1, 0.2, 0.5, 1.0, 2.0)
+"""Starts for the clock offset, s."""
+
+_IMPROVEMENT = 0.5
+"""Share of its misfit to which a falling friction curve, or another clock, must bring it."""
+
+_LEAST_MASS = 0.01
+
+
+def deviation(refinement: Refinement, name: str) -> float:
+    """Distance of a free coordinate from zero, in standard errors."""
+    block = stroke_length(refinement.simulated)
+    covariance = block_covariance(*refinement.equation, block).matrix
+    index = refinement.names.index(name)
+    error = math.sqrt(float(covariance[index, index]))
+    return refinement.coordinates[name] / error if error > 0 else 0.0
+
+
+def one_step(refinement: Refinement, name: str) -> tuple[float, float]:
+    """Estimate what a coordinate that is not free would become if it were, in one Newton step.
+
+    A score test: the model is refined without the coordinate, and the residual that this leaves
+    is asked whether it is correlated with the motion that the coordinate would add.
+
+    Returns
+    -------
+    value, standard_error : float
+        Estimate of the coordinate, and its standard error, in its own unit.
+    """
+    problem, at = refinement.problem, refinement.coordinates
+    units = problem.units((*refinement.names, name), {**at, name: at[name] or 0.0})
+    equation = estimating_equation(problem, at, units)
+    covariance = block_covariance(*equation, stroke_length(refinement.simulated)).matrix
+    step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
+    error = math.sqrt(max(float(covariance[-1, -1]), 0.0))
+    return at[name] + float(step[-1]) * units[name], error * units[name]
+
+
+def demanded(refinement: Refinement, candidates: Sequence[str]) -> tuple[str, float] | None:
+    """Return the candidate that the residual asks for most, and its value, if it does at all."""
+    best, largest = None, SIGNIFICANCE
+    for name in candidates:
+        value, error = one_step(refinement, name)
+        change = abs(value - refinement.coordinates[name])
+        if error > 0 and change > largest * error:
+            best, largest = (name, value), change / error
+    return best
+
+
+def with_demanded(
+    problem: OutputError, start: Coordinates, names: tuple[str, ...], candidates: Sequence[str]
+) -> Refinement:
+    """Refine `names`, and beside them what the record demands.
+
+    A slip jump (F_s above F_c) is tried first, then, if the model still does not describe the
+    record, a friction that falls from F_s to F_c over a range of speeds. The `candidates` follow
+    one after the other, each only if its score test asks for it.
+
+    Parameters
+    ----------
+    problem : OutputError
+        Record and valve.
+    start : mapping of str to float
+        All coordinates to start from.
+    names : tuple of str
+        The coordinates that are free in any case.
+    candidates : sequence of str
+        Coordinates to be tested; `SLIP` among them, if F_s is not fixed.
+
+    Returns
+    -------
+    Refinement
+        With as many free coordinates as the record demands.
+    """
+    refinement = refine(problem, {**start, SLIP: 0.0}, names)
+    if OFFSET in candidates and not misfit_of(refinement).describes:
+        refinement = _with_offset(refinement, start)
+    if SLIP in candidates:
+        refinement = _with_slip(refinement, start)
+    left = [name for name in candidates if name != SLIP and name not in refinement.names]
+    while left and (found := demanded(refinement, left)):
+        name, value = found
+        left.remove(name)
+        at = {**refinement.coordinates, name: _moderate(name, value)}
+        trial = refine(problem, at, (*refinement.names, name))
+        if trial.rms < refinement.rms:
+            refinement = trial
+    return refinement
+
+
+def _moderate(name: str, value: float) -> float:
+    """Keep the first step from a test where the simulation can follow."""
+    return max(value, _LEAST_MASS) if name == "mass" else float(np.clip(value, -0.5, 0.5))
+
+
+def _falling_starts(
+    at: Coordinates, top_speed: float, share_of_top_speed: float
+) -> list[Coordinates]:
+    """Friction curves that fall, and reach at the top speed what the one at `at` reaches."""
+    highest = at["coulomb_friction"] + at["viscous_friction"] * top_speed
+    starts: list[Coordinates] = []
+    for drop in _DROPS:
+        if share_of_top_speed == 0.0:
+            coulomb_friction = (1 - _SLIP_BIAS * drop) * at["coulomb_friction"]
+        else:
+            coulomb_friction = (1 - drop) * at["coulomb_friction"]
+        starts.append(
+            {
+                **at,
+                "coulomb_friction": coulomb_friction,
+                "viscous_friction": (highest - coulomb_friction) / top_speed,
+                SLIP: drop * at["coulomb_friction"],
+                "stribeck_velocity": share_of_top_speed * top_speed,
+            }
+        )
+    return starts
+
+
+def _nearest(problem: OutputError, candidates: Sequence[Coordinates]) -> list[Coordinates]:
+    """Sort candidates by the distance of their simulated stem from the measured one."""
+    pressure = problem.record.pressure
+    return sorted(candidates, key=lambda one: float(np.mean(problem.residual(one, pressure) ** 2)))
+
+
+def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
+    """Try clocks that differ; keep the best if it halves the misfit."""
+    problem = plain.problem
+    starts = [{**start, SLIP: 0.0, OFFSET: offset} for offset in _OFFSETS]
+    trial = refine(problem, _nearest(problem, starts)[0], (*plain.names, OFFSET))
+    improved = misfit_of(trial).systematic < _IMPROVEMENT * misfit_of(plain).systematic
+    return trial if improved else plain
+
+
+def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
+    problem = plain.problem
+    names = (*plain.names, SLIP)
+    offset = {OFFSET: plain.coordinates[OFFSET]}
+    starts = [
+        {**start, **offset},
+        *_falling_starts(plain.coordinates, plain.top_speed, 0.0),
+        *_falling_starts({**start, **offset}, plain.top_speed, 0.0),
+    ]
+    fitted = [least_squares_fit(problem, one, names) for one in _nearest(problem, starts)[:2]]
+    slip = refine(problem, _nearest(problem, fitted)[0], names)
+    demanded_slip = slip.rms < plain.rms and deviation(slip, SLIP) > SIGNIFICANCE
+    best = slip if demanded_slip else plain
+    before = misfit_of(best)
+    if before.describes:
+        return best
+    names = (*names, "stribeck_velocity")
+    fitted = [
+        least_squares_fit(
+            problem, _falling_starts(plain.coordinates, plain.top_speed, share)[-1], names
+        )
+        for share in _STRIBECK_SHARES
+    ]
+    falling = refine(problem, _nearest(problem, fitted)[0], names)
+    improved = misfit_of(falling).systematic < _IMPROVEMENT * before.systematic
+    return falling if improved else best

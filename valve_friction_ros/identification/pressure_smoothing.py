@@ -1,0 +1,204 @@
+"""Pressure without its sensor noise, and without rounding off its corners.
+
+The simulated stem rests and slides by inequalities, so noise on the pressure does not average
+out in it. A plain smoother would trade this for another error: it rounds the corners where the
+commanded pressure changes, just where the stem reverses. So the corners are found first, and the
+signal is smoothed between them.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks, savgol_coeffs, savgol_filter
+
+__all__ = ["find_corners", "independent_halves", "longest_faithful_window", "smooth_between"]
+
+_ORDER = 3
+_CORNER_GATE = 8.0
+"""A jump of the slope by this many standard deviations is a corner …"""
+
+_CORNER_SHARPNESS = 3.0
+"""… if it stands out this many times over the same figure one window away."""
+
+_CORNER_SCALES = (1, 2, 4)
+
+_DEVIATIONS = 4.0
+"""Standard deviations above the expected variance at which a residual is no noise."""
+
+
+def _window_slopes(signal: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+    """Slope per sample of the straight line through each window, by its first sample."""
+    place = np.arange(window) - (window - 1) / 2
+    weights = (place / (place @ place))[::-1]
+    return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
+
+
+def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDArray[np.intp]:
+    """Find where the slopes over `window` samples on either side differ, and only there do."""
+    if signal.size < 4 * window:
+        return np.empty(0, dtype=np.intp)
+    place = np.arange(window) - (window - 1) / 2
+    slopes = _window_slopes(signal, window)
+    jump = np.abs(slopes[window:] - slopes[:-window]) / (noise * np.sqrt(2 / (place @ place)))
+    peaks, _ = find_peaks(jump, height=_CORNER_GATE, distance=window)
+    before = jump[np.maximum(peaks - window, 0)]
+    after = jump[np.minimum(peaks + window, jump.size - 1)]
+    background = np.maximum(np.maximum(before, after), _CORNER_GATE / _CORNER_SHARPNESS)
+    return np.asarray(peaks[jump[peaks] > _CORNER_SHARPNESS * background] + window, dtype=np.intp)
+
+
+def _localised(signal: NDArray[np.float64], corner: int, window: int) -> int:
+    """Move a corner, within half a window, to where the signal bends most.
+
+    The signal around it is a parabola to which, from the corner on, another is added that begins
+    at zero. The place of the corner that leaves the least residual is taken.
+    """
+    first, last = max(corner - window, 0), min(corner + window, signal.size)
+    place = np.linspace(-1.0, 1.0, last - first)
+    smooth, _ = np.linalg.qr(np.vander(place, 3))
+    half = min(window // 2, corner - first, last - 1 - corner)
+    candidates = np.arange(corner - half, corner + half + 1)
+    bent = np.maximum(place[:, None] - place[candidates - first], 0.0)
+    one, two = (bends - smooth @ (smooth.T @ bends) for bends in (bent, bent**2))
+    stretch = signal[first:last] - signal[corner]
+    a, b, c = ((one * one).sum(0), (one * two).sum(0), (two * two).sum(0))
+    p, q = stretch @ one, stretch @ two
+    explained = (c * p * p - 2 * b * p * q + a * q * q) / (a * c - b * b)
+    return int(candidates[np.argmax(explained)])
+
+
+def find_corners(signal: NDArray[np.float64], noise: float, window: int) -> NDArray[np.intp]:
+    """Find the samples where the slope of a noisy signal jumps.
+
+    Parameters
+    ----------
+    signal : ndarray of float, shape (n,)
+        The signal.
+    noise : float
+        Standard deviation of its white noise.
+    window : int
+        Samples on either side over which the slopes are compared, at least 3. Corners that do
+        not show at this scale are looked for over twice and four times as many.
+
+    Returns
+    -------
+    ndarray of int
+        Each begins a new stretch of the signal. Empty for a noiseless signal.
+    """
+    corners: list[int] = []
+    if noise > 0:
+        for scale in _CORNER_SCALES:
+            length = scale * window
+            for corner in _sharp_jumps(signal, noise, length).tolist():
+                if all(abs(corner - known) > length for known in corners):
+                    corners.append(_localised(signal, corner, _CORNER_SCALES[-1] * window))
+    return np.array(sorted(corners), dtype=np.intp)
+
+
+def _odd_at_most(length: int, window: int) -> int:
+    return min(window, length - 1 + length % 2)
+
+
+def smooth_between(
+    signal: NDArray[np.float64], corners: NDArray[np.intp], window: int
+) -> NDArray[np.float64]:
+    """Smooth `signal` by local cubics over `window` samples, separately between `corners`."""
+    smooth = np.empty_like(signal)
+    edges = (0, *corners.tolist(), signal.size)
+    for begin, end in pairwise(edges):
+        fitting = _odd_at_most(end - begin, window)
+        stretch = signal[begin:end]
+        smooth[begin:end] = (
+            savgol_filter(stretch, fitting, _ORDER, mode="interp")
+            if fitting > _ORDER + 1
+            else stretch
+        )
+    return smooth
+
+
+def longest_faithful_window(
+    signal: NDArray[np.float64], corners: NDArray[np.intp], noise: float, longest: int
+) -> int:
+    """Find the longest smoothing window that takes nothing but noise from the signal.
+
+    What a smoother takes from white noise, averaged over blocks of a quarter window, has a
+    variance that follows from the weights. A smoother that cuts into the signal leaves more than
+    that in some block averages. Windows grow by half until they do.
+
+    Parameters
+    ----------
+    signal : ndarray of float, shape (n,)
+        The signal.
+    corners : ndarray of int
+        Where its slope jumps (`find_corners`).
+    noise : float
+        Standard deviation of its white noise.
+    longest : int
+        Longest window to try, samples.
+
+    Returns
+    -------
+    int
+        Odd; 1 for a noiseless signal.
+    """
+    if noise == 0:
+        return 1
+    chosen, window = 1, 5
+    while window <= min(longest, signal.size // 4):
+        residual = signal - smooth_between(signal, corners, window)
+        if chosen > 1 and not _is_noise(residual, noise, window):
+            break
+        chosen = window
+        window = (3 * window // 2) | 1
+    return chosen
+
+
+def _is_noise(residual: NDArray[np.float64], noise: float, window: int) -> bool:
+    """Tell whether block averages of a smoother's residual are what white noise leaves."""
+    length = max(window // 4, 1)
+    blocks = residual.size // length
+    means = residual[: blocks * length].reshape(blocks, length).mean(axis=1)
+    taken = -savgol_coeffs(window, _ORDER)
+    taken[window // 2] += 1.0
+    expected = noise * float(np.linalg.norm(np.convolve(taken, np.full(length, 1 / length))))
+    highest = expected**2 * (1 + _DEVIATIONS * math.sqrt(2 / blocks))
+    return float(np.mean(means**2)) <= highest
+
+
+def independent_halves(
+    signal: NDArray[np.float64], corners: NDArray[np.intp], window: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smooth the even and the odd samples apart, each brought back onto all samples.
+
+    The noise of the two results is independent, as that of the samples is.
+    """
+    places = np.arange(signal.size)
+    halves = []
+    for first in (0, 1):
+        chosen = places[first::2]
+        corners_there = np.searchsorted(chosen, corners)
+        smooth = smooth_between(signal[first::2], corners_there, (window // 2) | 1)
+        halves.append(_onto_all(places, chosen, smooth, corners))
+    return halves[0], halves[1]
+
+
+def _onto_all(
+    places: NDArray[np.intp],
+    chosen: NDArray[np.intp],
+    values: NDArray[np.float64],
+    corners: NDArray[np.intp],
+) -> NDArray[np.float64]:
+    """Interpolate linearly between neighbours, and extend the line at corners and ends."""
+    on_all = np.interp(places, chosen, values)
+    edges = (0, *corners.tolist(), places.size)
+    for begin, end in pairwise(edges):
+        first, last = np.searchsorted(chosen, begin), np.searchsorted(chosen, end) - 1
+        if last - first < 1:
+            continue
+        if chosen[first] > begin:
+            on_all[begin] = 1.5 * values[first] - 0.5 * values[first + 1]
+        if chosen[last] < end - 1:
+            on_all[end - 1] = 1.5 * values[last] - 0.5 * values[last - 1]
+    return on_all

@@ -1,0 +1,162 @@
+"""Refinement by simulation: the model whose simulated stem moves like the measured one.
+
+The sweep regresses a force on differentiated positions, so noise on the position biases it. The
+refinement compares positions with positions. What noise is left on the pressure enters both the
+residual and the sensitivities, and their product does not average out; this bias is avoided by
+instruments: the residual under either half of the pressure samples is weighted with the
+sensitivities under the other half, whose noise is independent of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from valve_friction_ros.identification.output_error import Coordinates, OutputError
+
+__all__ = ["EstimatingEquation", "Refinement", "estimating_equation", "least_squares_fit", "refine"]
+
+_INSTRUMENT_STEPS = 12
+_CONVERGED = 1e-5
+_LARGEST_STEP = 0.3
+
+
+class EstimatingEquation(NamedTuple):
+    """Terms of an equation whose sum vanishes at the estimate, and its derivative.
+
+    Attributes
+    ----------
+    scores : ndarray of float, shape (n, p)
+        Terms, a row a sample.
+    curvature : ndarray of float, shape (p, p)
+        Derivative of their sum by the coordinates.
+    """
+
+    scores: NDArray[np.float64]
+    curvature: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A refined model and the equation that it solves.
+
+    Attributes
+    ----------
+    problem : OutputError
+        Record and valve.
+    coordinates : mapping of str to float
+        The solution, all coordinates of the model.
+    names : tuple of str
+        The free ones, in the order of the equation.
+    equation : EstimatingEquation
+        At the solution, by the free coordinates in their own units.
+    simulated : ndarray of float, shape (n,)
+        Simulated position, m.
+    residuals : tuple of two ndarray of float, shape (n,)
+        Simulated less measured position under either half of the pressure, m.
+    """
+
+    problem: OutputError
+    coordinates: Coordinates
+    names: tuple[str, ...]
+    equation: EstimatingEquation = field(repr=False)
+    simulated: NDArray[np.float64] = field(repr=False)
+    residuals: tuple[NDArray[np.float64], NDArray[np.float64]] = field(repr=False)
+
+    @property
+    def residual(self) -> NDArray[np.float64]:
+        """Simulated less measured position, m, shape (n,)."""
+        return self.simulated - self.problem.record.position
+
+    @property
+    def top_speed(self) -> float:
+        """Highest speed of the simulated stem, m/s."""
+        return float(np.max(np.abs(np.diff(self.simulated)))) / self.problem.record.sample_period
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual, m."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+def estimating_equation(
+    problem: OutputError, at: Coordinates, units: Mapping[str, float]
+) -> EstimatingEquation:
+    """Set up the instrumented equation for the coordinates named in `units`, over their units."""
+    halves = problem.record.halves
+    if halves[0] is halves[1]:
+        slope = problem.sensitivity(at, halves[0], units)
+        residual = problem.residual(at, halves[0])
+        return EstimatingEquation(2 * slope * residual[:, None], 2 * slope.T @ slope)
+    residuals = [problem.residual(at, half) for half in halves]
+    slopes = [problem.sensitivity(at, half, units) for half in halves]
+    scores = slopes[0] * residuals[1][:, None] + slopes[1] * residuals[0][:, None]
+    mixed = slopes[0].T @ slopes[1]
+    return EstimatingEquation(scores, mixed + mixed.T)
+
+
+def _moved(at: Coordinates, units: Mapping[str, float], step: NDArray[np.float64]) -> Coordinates:
+    changes = dict(zip(units, step.tolist(), strict=True))
+    return {**at, **{name: at[name] + change * units[name] for name, change in changes.items()}}
+
+
+def least_squares_fit(
+    problem: OutputError, start: Coordinates, names: tuple[str, ...]
+) -> Coordinates:
+    """Fit the coordinates `names` by least squares, without instruments; return all."""
+    units = problem.units(names, start)
+    pressure = problem.record.pressure
+    fitted = optimize.least_squares(  # type: ignore[operator]  # the stubs take it for a module
+        lambda step: problem.residual(_moved(start, units, step), pressure),
+        np.zeros(len(units)),
+        lambda step: problem.sensitivity(_moved(start, units, step), pressure, units),
+        method="lm",
+        xtol=1e-5,
+        ftol=1e-7,
+        max_nfev=15,
+    )
+    return _moved(start, units, np.asarray(fitted.x))
+
+
+def refine(problem: OutputError, start: Coordinates, names: tuple[str, ...]) -> Refinement:
+    """Refine the coordinates `names` until the simulated stem follows the measured one.
+
+    Least squares first; from there the instrumented equation, by Newton's method.
+
+    Parameters
+    ----------
+    problem : OutputError
+        Record and valve.
+    start : mapping of str to float
+        All coordinates of the model to start from.
+    names : tuple of str
+        Those that are free.
+
+    Returns
+    -------
+    Refinement
+        The refined model.
+    """
+    at = least_squares_fit(problem, start, names)
+    units = problem.units(names, at)
+    equation = estimating_equation(problem, at, units)
+    for _ in range(_INSTRUMENT_STEPS):
+        step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
+        largest = float(np.max(np.abs(step)))
+        at = _moved(at, units, step * min(1.0, _LARGEST_STEP / max(largest, 1e-300)))
+        equation = estimating_equation(problem, at, units)
+        if largest < _CONVERGED:
+            break
+    scale = np.array([*units.values()])
+    halves = problem.record.halves
+    return Refinement(
+        problem,
+        at,
+        names,
+        EstimatingEquation(equation.scores / scale, equation.curvature / np.outer(scale, scale)),
+        problem.simulated(at, problem.record.pressure),
+        (problem.residual(at, halves[0]), problem.residual(at, halves[1])),
+    )
