@@ -22,6 +22,7 @@ __all__ = ["EstimatingEquation", "Refinement", "estimating_equation", "least_squ
 _INSTRUMENT_STEPS = 12
 _CONVERGED = 1e-5
 _LARGEST_STEP = 0.3
+_LARGEST_GROWTH = 1.2
 
 
 class EstimatingEquation(NamedTuple):
@@ -121,6 +122,30 @@ def least_squares_fit(
     return _moved(start, units, np.asarray(fitted.x))
 
 
+def _instrumented(
+    problem: OutputError, fitted: Coordinates, units: Mapping[str, float]
+) -> tuple[Coordinates, EstimatingEquation]:
+    """Solve the instrumented equation from the least-squares fit, and stay there if it fails.
+
+    In a record of few strokes a single stick event can bend the equation so much that Newton's
+    method leaves; the fit with its small bias is then the better answer.
+    """
+    pressure = problem.record.pressure
+    allowed = _LARGEST_GROWTH * float(np.linalg.norm(problem.residual(fitted, pressure)))
+    at, equation = fitted, estimating_equation(problem, fitted, units)
+    begin = equation
+    for _ in range(_INSTRUMENT_STEPS):
+        step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
+        largest = float(np.max(np.abs(step)))
+        at = _moved(at, units, step * min(1.0, _LARGEST_STEP / max(largest, 1e-300)))
+        if float(np.linalg.norm(problem.residual(at, pressure))) > allowed:
+            return fitted, begin
+        equation = estimating_equation(problem, at, units)
+        if largest < _CONVERGED:
+            break
+    return at, equation
+
+
 def refine(problem: OutputError, start: Coordinates, names: tuple[str, ...]) -> Refinement:
     """Refine the coordinates `names` until the simulated stem follows the measured one.
 
@@ -140,16 +165,9 @@ def refine(problem: OutputError, start: Coordinates, names: tuple[str, ...]) -> 
     Refinement
         The refined model.
     """
-    at = least_squares_fit(problem, start, names)
-    units = problem.units(names, at)
-    equation = estimating_equation(problem, at, units)
-    for _ in range(_INSTRUMENT_STEPS):
-        step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
-        largest = float(np.max(np.abs(step)))
-        at = _moved(at, units, step * min(1.0, _LARGEST_STEP / max(largest, 1e-300)))
-        equation = estimating_equation(problem, at, units)
-        if largest < _CONVERGED:
-            break
+    fitted = least_squares_fit(problem, start, names)
+    units = problem.units(names, fitted)
+    at, equation = _instrumented(problem, fitted, units)
     scale = np.array([*units.values()])
     halves = problem.record.halves
     return Refinement(
