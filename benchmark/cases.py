@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from benchmark.plants import PLANTS, Plant
 from numpy.typing import NDArray
 
+from benchmark.plants import PLANTS, Plant
 from valve_friction_ros.model import (
     Recording,
     SensorNoise,
@@ -63,7 +63,7 @@ CONDITIONS = {
 
 
 def _in_service(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Moves of ±3 % of the range every 4 s around mid-range, as a controller makes them.
+    """Move by ±3 % of the range every 4 s around mid-range, as a controller makes them.
 
     A random walk; of most such walks the stem of a tight packing follows one way only, which is
     refused. This seed moves the graphite valve 4 mm up and 5 mm down.

@@ -22,7 +22,7 @@ __all__ = ["EstimatingEquation", "Refinement", "estimating_equation", "least_squ
 _INSTRUMENT_STEPS = 12
 _CONVERGED = 1e-5
 _LARGEST_STEP = 0.3
-_LARGEST_GROWTH = 1.2
+_LARGEST_GROWTH = 1.5
 
 
 class EstimatingEquation(NamedTuple):
@@ -89,14 +89,21 @@ def estimating_equation(
     """Set up the instrumented equation for the coordinates named in `units`, over their units."""
     halves = problem.record.halves
     if halves[0] is halves[1]:
-        slope = problem.sensitivity(at, halves[0], units)
-        residual = problem.residual(at, halves[0])
-        return EstimatingEquation(2 * slope * residual[:, None], 2 * slope.T @ slope)
+        return _plain_equation(problem, at, units)
     residuals = [problem.residual(at, half) for half in halves]
     slopes = [problem.sensitivity(at, half, units) for half in halves]
     scores = slopes[0] * residuals[1][:, None] + slopes[1] * residuals[0][:, None]
     mixed = slopes[0].T @ slopes[1]
     return EstimatingEquation(scores, mixed + mixed.T)
+
+
+def _plain_equation(
+    problem: OutputError, at: Coordinates, units: Mapping[str, float]
+) -> EstimatingEquation:
+    """Set up the equation of least squares, without instruments."""
+    slope = problem.sensitivity(at, problem.record.pressure, units)
+    residual = problem.residual(at, problem.record.pressure)
+    return EstimatingEquation(2 * slope * residual[:, None], 2 * slope.T @ slope)
 
 
 def _moved(at: Coordinates, units: Mapping[str, float], step: NDArray[np.float64]) -> Coordinates:
@@ -127,22 +134,27 @@ def _instrumented(
 ) -> tuple[Coordinates, EstimatingEquation]:
     """Solve the instrumented equation from the least-squares fit, and stay there if it fails.
 
-    In a record of few strokes a single stick event can bend the equation so much that Newton's
-    method leaves; the fit with its small bias is then the better answer.
+    In a record of few strokes a single stick event can go one way under one half of the pressure
+    and another under the other half, or throw Newton's method off. The fit with its small bias
+    is then the better answer.
     """
-    pressure = problem.record.pressure
-    allowed = _LARGEST_GROWTH * float(np.linalg.norm(problem.residual(fitted, pressure)))
-    at, equation = fitted, estimating_equation(problem, fitted, units)
-    begin = equation
+    record = problem.record
+    allowed = _LARGEST_GROWTH * float(np.linalg.norm(problem.residual(fitted, record.pressure)))
+
+    def is_near(at: Coordinates) -> bool:
+        distances = [np.linalg.norm(problem.residual(at, half)) for half in record.halves]
+        return bool(max(distances) <= allowed)
+
+    at = fitted
     for _ in range(_INSTRUMENT_STEPS):
+        if not is_near(at):
+            return fitted, _plain_equation(problem, fitted, units)
+        equation = estimating_equation(problem, at, units)
         step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
         largest = float(np.max(np.abs(step)))
-        at = _moved(at, units, step * min(1.0, _LARGEST_STEP / max(largest, 1e-300)))
-        if float(np.linalg.norm(problem.residual(at, pressure))) > allowed:
-            return fitted, begin
-        equation = estimating_equation(problem, at, units)
         if largest < _CONVERGED:
             break
+        at = _moved(at, units, step * min(1.0, _LARGEST_STEP / max(largest, 1e-300)))
     return at, equation
 
 
