@@ -1,6 +1,7 @@
 """Command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,13 @@ from valve_friction_ros.commands.bench_processes import (
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.identification import UNITS, RefusalError
+from valve_friction_ros.commands.formatting import two_digits
+from valve_friction_ros.identification import (
+    UNITS,
+    AssessedParameter,
+    RefusalError,
+    Verdict,
+)
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,
@@ -43,6 +50,9 @@ _TOLERANCES = {
     "spring_constant": 0.001,
     "spring_preload": 0.001,
 }
+_PRINTED_WIDTH = 100
+_INTERVALS = 3.0
+"""Half widths of its interval by which an identified value may be off."""
 _START_TIMEOUT = 30.0
 _UNDER_WAY = 2.0
 """Signal let pass after a change, s: samples still under way belong to the time before it."""
@@ -54,18 +64,26 @@ class _Outcome(NamedTuple):
 
     label: str
     truth: KarnoppParameters
-    identified: Mapping[str, float]
+    published: Mapping[str, float]
+    refined: Mapping[str, AssessedParameter]
     case: Case
 
     def errors(self) -> dict[str, float]:
-        """Relative errors of the identified parameters."""
-        return {name: self.identified[name] / getattr(self.truth, name) - 1 for name in _TOLERANCES}
+        """Relative errors of the published estimate."""
+        return {name: self.published[name] / getattr(self.truth, name) - 1 for name in _TOLERANCES}
 
     def missed(self) -> list[str]:
-        """Parameters whose error exceeds the tolerance."""
-        return [
+        """Parameters whose published error exceeds the tolerance, or whose interval is untrue."""
+        outside = {
             name for name, error in self.errors().items() if not abs(error) <= _TOLERANCES[name]
-        ]
+        }
+        untrue = {
+            name
+            for name, one in self.refined.items()
+            if one.verdict is Verdict.IDENTIFIED
+            and abs(one.value - getattr(self.truth, name)) > _INTERVALS * one.half_width
+        }
+        return [name for name in _TOLERANCES if name in outside | untrue]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -122,6 +140,8 @@ def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Out
     )
     values = client.diagnostic_values
     sweep = client.sweep_columns()
+    published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in _TOLERANCES}
+    refined = {name: _refined(name, values) for name in _TOLERANCES}
     case = Case(
         label,
         recording,
@@ -129,29 +149,45 @@ def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Out
         sweep["coulomb_friction"],
         sweep["sigma"],
         float(values["threshold [m/s]"]),
+        refined["coulomb_friction"],
     )
-    identified = {name: float(values[f"{name} [{UNITS[name]}]"]) for name in _TOLERANCES}
-    return _Outcome(label, truth, identified, case)
+    return _Outcome(label, truth, published, refined, case)
 
 
-def _table(outcomes: Sequence[_Outcome]) -> Table:
-    table = Table("", "parameter", "unit", box=None, header_style="bold")
-    table.columns[1].no_wrap = True
-    for heading in ("true", "identified", "error", "tolerance"):
-        table.add_column(heading, justify="right")
-    for outcome in outcomes:
-        for name, error in outcome.errors().items():
-            style = "red" if name in outcome.missed() else None
-            table.add_row(
-                outcome.label,
-                name,
-                UNITS[name],
-                f"{getattr(outcome.truth, name):.6g}",
-                f"{outcome.identified[name]:.6g}",
-                f"{100 * error:+.4f} %",
-                f"±{100 * _TOLERANCES[name]:g} %",
-                style=style,
-            )
+def _refined(name: str, values: Mapping[str, str]) -> AssessedParameter:
+    """Read a parameter with its verdict from a diagnostic."""
+    half_width = float(values[f"{name} half width [{UNITS[name]}]"])
+    return AssessedParameter(
+        name,
+        float(values[f"{name} [{UNITS[name]}]"]),
+        float("nan"),
+        half_width,
+        Verdict(values[f"{name} verdict"]),
+        values.get(f"{name} reason", ""),
+    )
+
+
+def _table(outcome: _Outcome) -> Table:
+    table = Table(title=outcome.label, title_justify="left", box=None, header_style="bold")
+    table.add_column("parameter", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for heading in ("true", "published", "error", "refined", "± 95 %"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for name, error in outcome.errors().items():
+        refined = outcome.refined[name]
+        told = not math.isnan(refined.value)
+        table.add_row(
+            name,
+            UNITS[name],
+            f"{getattr(outcome.truth, name):.6g}",
+            f"{outcome.published[name]:.6g}",
+            f"{100 * error:+.3f} %",
+            f"{refined.value:.6g}" if told else "–",
+            two_digits(refined.half_width) if told else "",
+            refined.verdict.value,
+            style="red" if name in outcome.missed() else None,
+        )
     return table
 
 
@@ -196,7 +232,8 @@ def _run(client: BenchClient, console: Console) -> _Story:
 
 def _report(story: _Story, output: Path, console: Console) -> int:
     """Print and draw what was seen, and judge it; return the exit code."""
-    console.print(_table(story.outcomes))
+    for outcome in story.outcomes:
+        console.print(_table(outcome))
     level = "without a level" if story.level is None else Level(story.level).name
     verdict = f"/diagnostics {level}: {story.message}"
     console.print(verdict, style="bold", highlight=False, markup=False)
@@ -215,7 +252,7 @@ def _report(story: _Story, output: Path, console: Console) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo; return its exit code."""
     options = _parser().parse_args(arguments)
-    console = Console()
+    console = Console() if sys.stdout.isatty() else Console(width=_PRINTED_WIDTH)
     try:
         require_picture_file(options.output)
     except ValueError as error:

@@ -12,16 +12,20 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from valve_friction_ros.commands.formatting import two_digits
 from valve_friction_ros.commands.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.identification import (
+    ASSESSED_UNITS,
     FIXABLE,
-    UNITS,
-    Estimate,
+    AssessedParameter,
+    Assessment,
     IdentificationSettings,
     RefusalError,
-    identify,
+    Verdict,
+    assess,
 )
 from valve_friction_ros.model import Valve
+from valve_friction_ros.monitoring import percentage
 from valve_friction_ros.monitoring.csv_recording import CsvColumns, drive_column, read_recording
 
 __all__ = ["main"]
@@ -61,8 +65,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--window",
         type=int,
-        default=defaults.window,
-        help="derivative window d, samples (%(default)s)",
+        help=f"derivative window d, samples, for both estimates; by default {defaults.window} for "
+        "the published one, and chosen from the noise of the record for the refined one",
     )
     parser.add_argument(
         "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
@@ -109,50 +113,111 @@ def _json_number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _as_json(estimate: Estimate) -> dict[str, Any]:
+def _parameter_as_json(parameter: AssessedParameter, published: float) -> dict[str, Any]:
+    low, high = parameter.interval
+    return {
+        "value": _json_number(parameter.value),
+        "standard_error": _json_number(parameter.standard_error),
+        "interval": [_json_number(low), _json_number(high)],
+        "verdict": parameter.verdict.value,
+        "reason": parameter.reason,
+        "published": _json_number(published),
+        "unit": ASSESSED_UNITS[parameter.name],
+        "fixed": parameter.verdict is Verdict.FIXED,
+    }
+
+
+def _published(assessment: Assessment, name: str) -> float:
+    estimate = assessment.published
+    return math.nan if estimate is None else estimate.values.get(name, math.nan)
+
+
+def _as_json(assessment: Assessment) -> dict[str, Any]:
+    estimate = assessment.published or assessment.start
+    misfit = assessment.misfit
     return {
         "parameters": {
-            name: {
-                "value": _json_number(value),
-                "unit": UNITS[name],
-                "fixed": name in estimate.fixed,
-            }
-            for name, value in estimate.values.items()
+            name: _parameter_as_json(parameter, _published(assessment, name))
+            for name, parameter in assessment.parameters.items()
         },
         "threshold": estimate.threshold,
         "samples": estimate.samples,
         "sigma": _json_number(estimate.sigma),
         "r_squared": _json_number(estimate.r_squared),
         "window": estimate.settings.window,
-        "warnings": list(estimate.warnings),
+        "chosen_window": assessment.start.settings.window,
+        "fit": _json_number(assessment.force_fit if misfit is None else misfit.fit),
+        "rms": None if misfit is None else misfit.rms,
+        "systematic_misfit": None if misfit is None else misfit.systematic,
+        "model_describes": None if misfit is None else misfit.describes,
+        "warnings": _warnings(assessment),
     }
 
 
-def _print_table(estimate: Estimate) -> None:
-    table = Table("parameter", "value", "unit", "", box=None, header_style="bold")
-    table.columns[1].justify = "right"
-    for name, value in estimate.values.items():
-        note = "fixed" if name in estimate.fixed else ""
-        table.add_row(name, f"{value:.6g}", UNITS[name], note)
-    console = Console()
-    console.print(table)
-    console.print(
-        f"\nthreshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above it, "
-        f"σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, "
-        f"window {estimate.settings.window} samples",
-        highlight=False,
+def _warnings(assessment: Assessment) -> list[str]:
+    """Warnings of the assessment, and of the published estimate beside it, each once."""
+    published = () if assessment.published is None else assessment.published.warnings
+    notes = (f"published estimate: {warning}" for warning in published)
+    return list(dict.fromkeys((*assessment.warnings, *notes)))
+
+
+def _print_table(assessment: Assessment, valve: Valve) -> None:
+    table = Table(
+        "parameter",
+        "value",
+        "± 95 %",
+        "unit",
+        "verdict",
+        "published",
+        box=None,
+        header_style="bold",
     )
-    for warning in estimate.warnings:
-        console.print(f"note: {warning}", highlight=False)
+    for column in (1, 2, 5):
+        table.columns[column].justify = "right"
+    for name, parameter in assessment.parameters.items():
+        published = _published(assessment, name)
+        table.add_row(
+            name,
+            "–" if math.isnan(parameter.value) else f"{parameter.value:.6g}",
+            two_digits(parameter.half_width) if parameter.half_width > 0 else "",
+            ASSESSED_UNITS[name],
+            parameter.verdict.value,
+            "" if math.isnan(published) else f"{published:.6g}",
+        )
+    console = Console(highlight=False)
+    console.print(table)
+    console.print()
+    for parameter in assessment.parameters.values():
+        if parameter.reason and parameter.verdict is not Verdict.FIXED:
+            console.print(f"{parameter.name} {parameter.verdict.value}: {parameter.reason}")
+    estimate = assessment.published or assessment.start
+    misfit = assessment.misfit
+    if misfit is None:
+        console.print(f"the regression reproduces {100 * assessment.force_fit:.2f} % of the force")
+    else:
+        share = valve.share_of_travel(misfit.rms)
+        of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
+        console.print(
+            f"fit {100 * misfit.fit:.2f} %: the refined model's stem is {misfit.rms * 1e6:.3g} µm "
+            f"rms from the measured one{of_travel}; "
+            f"{misfit.systematic * 1e6:.3g} µm of it are not noise"
+        )
+    console.print(
+        f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
+        f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
+        f"{estimate.settings.window} samples; refined from {assessment.start.settings.window}"
+    )
+    for warning in _warnings(assessment):
+        console.print(f"note: {warning}")
 
 
-def _run(options: argparse.Namespace) -> Estimate:
+def _run(options: argparse.Namespace) -> tuple[Assessment, Valve]:
     columns = CsvColumns(
         options.time_column, options.position_column, options.pressure_column, options.force_column
     )
     description = _valve(options, columns)
     settings = IdentificationSettings(
-        window=options.window,
+        window=IdentificationSettings().window if options.window is None else options.window,
         order=options.order,
         fixed=_fixed(options.fix, description.known),
         position_bias=options.position_bias,
@@ -164,28 +229,28 @@ def _run(options: argparse.Namespace) -> Estimate:
         plots.require_picture_file(options.plot)
     recording = read_recording(options.file, description.valve, columns)
     try:
-        estimate = identify(recording, description.valve, settings)
+        assessment = assess(recording, description.valve, settings, options.window)
     except RefusalError as refusal:
         raise RefusalError(f"{options.file}: {refusal}") from None
     if options.plot is not None:
         drive = plots.FORCE if description is _DIRECT_DRIVE else plots.PRESSURE
-        figure = plots.identification_figure(recording, description.valve, estimate, drive)
+        figure = plots.identification_figure(recording, description.valve, assessment, drive)
         figure.savefig(options.plot)
-    return estimate
+    return assessment, description.valve
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     options = _parser().parse_args(arguments)
     try:
-        estimate = _run(options)
+        assessment, valve = _run(options)
     except (ValueError, RefusalError, OSError) as error:
         print("identify_recording:", *str(error).splitlines(), file=sys.stderr)
         return _EXIT_REFUSED
     if options.json:
-        print(json.dumps(_as_json(estimate), ensure_ascii=False, allow_nan=False))
+        print(json.dumps(_as_json(assessment), ensure_ascii=False, allow_nan=False))
     else:
-        _print_table(estimate)
+        _print_table(assessment, valve)
     return 0
 
 

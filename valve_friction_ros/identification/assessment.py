@@ -10,9 +10,12 @@ from valve_friction_ros.identification.conditioned_record import condition
 from valve_friction_ros.identification.derivative_window import fitting_window
 from valve_friction_ros.identification.estimate import UNITS, Estimate
 from valve_friction_ros.identification.excitation_check import (
+    require_enough_samples,
+    require_motion,
     require_related_signals,
     require_stem_between_stops,
     require_travel,
+    require_two_directions,
 )
 from valve_friction_ros.identification.identify import identify
 from valve_friction_ros.identification.judgement import judge_refinement, judge_regression
@@ -130,6 +133,9 @@ def assess(
         If the record cannot tell; the message says what to do.
     """
     settings = settings or IdentificationSettings()
+    require_enough_samples(recording, settings.window)
+    require_motion(recording)
+    require_two_directions(recording, settings.window)
     require_travel(recording, valve)
     require_stem_between_stops(recording, valve)
     has_spring = settings.fixed.get("spring_constant") != 0.0

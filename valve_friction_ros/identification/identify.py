@@ -131,7 +131,7 @@ def identify(
     derivatives = differentiate(
         recording.position, recording.sample_period, settings.window, settings.order
     )
-    require_motion(recording, derivatives)
+    require_motion(recording)
     require_two_directions(recording, settings.window)
     sweep, chosen = _sweep(recording, valve, settings, derivatives)
     if "mass" not in settings.fixed:

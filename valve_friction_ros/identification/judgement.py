@@ -30,7 +30,7 @@ FALL_SPEED = 6.5e-3
 """Speed, m/s, up to which the friction of a packing is known to fall: twice the v_s = 3.26 mm/s
 that was published for graphite. Slower records cannot tell F_c from the friction at low speed."""
 
-FEWEST_STROKES = 4
+FEWEST_STROKES = 3
 """Strokes below which the scatter between them is not known, and nothing is more than weak."""
 
 _FRICTION = ("viscous_friction", "coulomb_friction", "static_friction")

@@ -36,6 +36,10 @@ _IMPROVEMENT = 0.5
 """Share of its misfit to which a falling friction curve, or another clock, must bring it."""
 
 _LEAST_MASS = 0.01
+_LEAST_SLIP = 0.02
+_LEAST_ASYMMETRY = 0.02
+_LEAST_OFFSET = 1e-3
+"""Slip force over F_c, asymmetry and clock offset (s) that are worth a parameter."""
 
 
 def deviation(refinement: Refinement, name: str) -> float:
@@ -73,7 +77,7 @@ def demanded(refinement: Refinement, candidates: Sequence[str]) -> tuple[str, fl
     for name in candidates:
         value, error = one_step(refinement, name)
         change = abs(value - refinement.coordinates[name])
-        if error > 0 and change > largest * error:
+        if error > 0 and change > largest * error and change > _least(refinement, name):
             best, largest = (name, value), change / error
     return best
 
@@ -117,6 +121,15 @@ def with_demanded(
         if trial.rms < refinement.rms:
             refinement = trial
     return refinement
+
+
+def _least(refinement: Refinement, name: str) -> float:
+    """Return the size below which a part of the model is of no consequence, however sure."""
+    if name == OFFSET:
+        return max(_LEAST_OFFSET, 0.5 * refinement.problem.record.sample_period)
+    if name == SLIP:
+        return _LEAST_SLIP * refinement.coordinates["coulomb_friction"]
+    return 0.0 if name == "mass" else _LEAST_ASYMMETRY
 
 
 def _moderate(name: str, value: float) -> float:
@@ -173,7 +186,11 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
     ]
     fitted = [least_squares_fit(problem, one, names) for one in _nearest(problem, starts)[:2]]
     slip = refine(problem, _nearest(problem, fitted)[0], names)
-    demanded_slip = slip.rms < plain.rms and deviation(slip, SLIP) > SIGNIFICANCE
+    demanded_slip = (
+        slip.rms < plain.rms
+        and deviation(slip, SLIP) > SIGNIFICANCE
+        and slip.coordinates[SLIP] > _least(slip, SLIP)
+    )
     best = slip if demanded_slip else plain
     before = misfit_of(best)
     if before.describes:

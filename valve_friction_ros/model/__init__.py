@@ -24,6 +24,7 @@ from valve_friction_ros.model.simulation import (
     Trajectory,
     advance,
     balanced_state,
+    compile_kernels,
     simulate,
 )
 from valve_friction_ros.model.valve import ATMOSPHERIC_PRESSURE, Valve
@@ -51,6 +52,7 @@ __all__ = [
     "Valve",
     "advance",
     "balanced_state",
+    "compile_kernels",
     "converter_response",
     "simulate",
 ]

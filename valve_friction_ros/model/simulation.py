@@ -24,7 +24,14 @@ from valve_friction_ros.model.linear_motion import (
 from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["StemState", "Trajectory", "advance", "balanced_state", "simulate"]
+__all__ = [
+    "StemState",
+    "Trajectory",
+    "advance",
+    "balanced_state",
+    "compile_kernels",
+    "simulate",
+]
 
 
 @dataclass(frozen=True)
@@ -281,3 +288,14 @@ def simulate(
         velocities,
     )
     return Trajectory(positions, velocities)
+
+
+def compile_kernels() -> None:
+    """Compile the simulation, or load it compiled, before it is needed.
+
+    Takes some seconds the first time on a machine; a node does it before its first message.
+    """
+    valve = Valve(diaphragm_area=1.0)
+    parameters = KarnoppParameters(1.0, 1.0, 1.0, 1.0, 1.0)
+    simulate(valve, parameters, np.array([0.0, 2.0]), 1e-3)
+    advance(StemState(0.0), valve, parameters, (0.0, 2.0), 1e-3)

@@ -1,5 +1,6 @@
 """Monitoring of a valve: stream buffers, baseline and diagnosis; no ROS."""
 
+from valve_friction_ros.monitoring.baseline import Baseline, Ratio
 from valve_friction_ros.monitoring.diagnosis import (
     Diagnosis,
     FrictionLimits,
@@ -19,11 +20,13 @@ from valve_friction_ros.monitoring.resampling import uniform_recording
 from valve_friction_ros.monitoring.samples import Samples, nanoseconds
 
 __all__ = [
+    "Baseline",
     "Diagnosis",
     "FrictionLimits",
     "FrictionMonitor",
     "Level",
     "MonitorSettings",
+    "Ratio",
     "RecordBuffer",
     "Samples",
     "Snapshot",

@@ -1,12 +1,12 @@
 """From an estimate to a verdict: whether friction has grown or collapsed, and what it costs."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
-from valve_friction_ros.identification.estimate import Estimate
-from valve_friction_ros.model.checks import require_positive
+from valve_friction_ros.identification import Assessment
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.monitoring.baseline import Baseline, Ratio
 
 __all__ = [
     "Diagnosis",
@@ -41,6 +41,8 @@ class StatusSignal(Enum):
 class FrictionLimits:
     """Bounds of the Coulomb friction, as ratios to its baseline.
 
+    A bound counts as passed only when the whole interval of the ratio lies beyond it.
+
     Attributes
     ----------
     warn_ratio : float
@@ -56,7 +58,7 @@ class FrictionLimits:
         Unless 0 < low_ratio < 1 < warn_ratio < error_ratio.
     """
 
-    warn_ratio: float = 1.5
+    warn_ratio: float = 1.25
     error_ratio: float = 2.0
     low_ratio: float = 0.5
 
@@ -82,27 +84,33 @@ class Diagnosis:
         The same in the words of NE 107.
     message : str
         One sentence for people, with the consequence.
-    ratio : float or None
-        Coulomb friction over its baseline; None without a baseline.
+    ratio : Ratio or None
+        Coulomb friction over its baseline, with its interval; None without a baseline or without
+        an identifiable friction.
     """
 
     level: Level
     status_signal: StatusSignal
     message: str
-    ratio: float | None
+    ratio: Ratio | None
 
 
-def dead_band(estimate: Estimate, valve: Valve) -> float:
+def dead_band(assessment: Assessment, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.
 
     After a move the sliding friction F_c still holds the spring off balance; to move back, the
     actuator must undo it and overcome F_s: the pressure that does so would move a frictionless
-    stem by (F_c + F_s)/k. The result is nan without a spring or without travel stops.
+    stem by (F_c + F_s)/k. Where no slip jump was seen, F_s is F_c. The result is nan without a
+    spring, without travel stops, or where F_c or k is not identifiable.
     """
-    if estimate.spring_constant <= 0:
+    values = assessment.values
+    if not values["spring_constant"] > 0:
         return float("nan")
-    friction = estimate.coulomb_friction + estimate.static_friction
-    return valve.share_of_travel(friction / estimate.spring_constant)
+    coulomb_friction, static_friction = values["coulomb_friction"], values["static_friction"]
+    if math.isnan(static_friction):
+        static_friction = coulomb_friction
+    force = coulomb_friction + static_friction
+    return valve.share_of_travel(force / values["spring_constant"])
 
 
 def percentage(share: float) -> str:
@@ -111,59 +119,91 @@ def percentage(share: float) -> str:
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
-def _consequence(estimate: Estimate, valve: Valve) -> str:
-    share = dead_band(estimate, valve)
+def _consequence(assessment: Assessment, valve: Valve) -> str:
+    share = dead_band(assessment, valve)
     if math.isnan(share):
-        return f"coulomb friction {estimate.coulomb_friction:.4g} N"
+        friction = assessment.parameters["coulomb_friction"]
+        return f"coulomb friction {friction.value:.4g} ± {friction.half_width:.2g} N"
     return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
 
 
+def _figures(ratio: Ratio) -> str:
+    return f"{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})"
+
+
 def diagnose(
-    estimate: Estimate,
+    assessment: Assessment,
     valve: Valve,
-    baseline: float | None = None,
+    baseline: Baseline | None = None,
     limits: FrictionLimits | None = None,
 ) -> Diagnosis:
     """Compare the identified Coulomb friction with its baseline.
 
     Parameters
     ----------
-    estimate : Estimate
+    assessment : Assessment
         The latest identification.
     valve : Valve
         Tells the travel, for the dead band.
-    baseline : float, optional
-        Coulomb friction of the healthy valve, N, above zero.
+    baseline : Baseline, optional
+        Coulomb friction of the healthy valve.
     limits : FrictionLimits, optional
         Bounds of the ratio.
 
     Returns
     -------
     Diagnosis
-        OK within the limits, or without a baseline to compare with.
+        A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
+        uncertain estimate raises no alarm: an unchanged valve would have to be misjudged by the
+        whole distance to the bound. A valve that the model does not describe is WARN at least.
     """
     limits = limits or FrictionLimits()
-    effect = _consequence(estimate, valve)
+    friction = assessment.parameters["coulomb_friction"]
+    if math.isnan(friction.value):
+        message = f"coulomb friction is not identifiable: {friction.reason}"
+        return _with_model_doubt(Diagnosis(Level.OK, StatusSignal.GOOD, message, None), assessment)
+    effect = _consequence(assessment, valve)
     if baseline is None:
-        return Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
-    ratio = estimate.coulomb_friction / require_positive("baseline", baseline)
-    compared = f"coulomb friction is {ratio:.2f} times its baseline"
-    if ratio >= limits.error_ratio:
+        verdict = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
+    else:
+        verdict = _against(baseline.compared_with(friction), limits, effect)
+    return _with_model_doubt(verdict, assessment)
+
+
+def _with_model_doubt(verdict: Diagnosis, assessment: Assessment) -> Diagnosis:
+    misfit = assessment.misfit
+    if misfit is None or misfit.describes:
+        return verdict
+    doubt = (
+        "the Karnopp model does not describe this valve "
+        f"({misfit.systematic * 1e6:.3g} µm of misfit); {verdict.message}"
+    )
+    if verdict.level >= Level.WARN:
+        return replace(verdict, message=doubt)
+    return replace(
+        verdict, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=doubt
+    )
+
+
+def _against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
+    compared = f"coulomb friction is {_figures(ratio)} times its baseline"
+    if ratio.low >= limits.error_ratio:
         return Diagnosis(
             Level.ERROR, StatusSignal.FAILURE, f"excess friction: {compared}; {effect}", ratio
         )
-    if ratio <= limits.low_ratio:
+    if ratio.high <= limits.low_ratio:
         return Diagnosis(
             Level.ERROR,
             StatusSignal.OUT_OF_SPECIFICATION,
             f"friction collapsed, the packing may leak: {compared}; {effect}",
             ratio,
         )
-    if ratio >= limits.warn_ratio:
+    if ratio.low >= limits.warn_ratio:
         return Diagnosis(
             Level.WARN,
             StatusSignal.MAINTENANCE_REQUIRED,
             f"friction has grown: {compared}; {effect}",
             ratio,
         )
-    return Diagnosis(Level.OK, StatusSignal.GOOD, f"friction normal: {compared}; {effect}", ratio)
+    words = "friction normal" if ratio.value < limits.warn_ratio else "friction perhaps grown"
+    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {compared}; {effect}", ratio)

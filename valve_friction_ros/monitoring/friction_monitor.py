@@ -1,13 +1,17 @@
 """The monitor of one valve, without any ROS: gather, identify, remember, judge."""
 
+import math
 from dataclasses import dataclass, field
 
-from valve_friction_ros.identification.estimate import Estimate
-from valve_friction_ros.identification.identify import identify
-from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification import (
+    Assessment,
+    IdentificationSettings,
+    RefusalError,
+    assess,
+)
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.monitoring.baseline import Baseline
 from valve_friction_ros.monitoring.diagnosis import (
     Diagnosis,
     FrictionLimits,
@@ -30,28 +34,29 @@ class MonitorSettings:
         Geometry and sensor range.
     identification : IdentificationSettings
         How records are identified.
+    derivative_window : int or None
+        Derivative window of the assessment, samples; None: each record's noise chooses it.
     limits : FrictionLimits
         When friction is out of bounds.
-    baseline : float or None
-        Coulomb friction of the healthy valve, N, where it is known beforehand.
+    baseline : Baseline or None
+        Friction of the healthy valve, where it is known beforehand.
     window : float
         Length of the record that is kept and identified, s.
     """
 
     valve: Valve
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
+    derivative_window: int | None = None
     limits: FrictionLimits = field(default_factory=FrictionLimits)
-    baseline: float | None = None
+    baseline: Baseline | None = None
     window: float = 60.0
 
     def __post_init__(self) -> None:
-        """Refuse a window or a baseline that cannot be."""
+        """Refuse a window that cannot be."""
         require_positive("window", self.window)
-        if self.baseline is not None:
-            require_positive("baseline_coulomb_friction", self.baseline)
 
 
-def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Estimate:
+def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Assessment:
     """Identify a snapshot of the buffer; needs nothing of the monitor, so any thread may run it.
 
     Raises
@@ -60,7 +65,12 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Estimate
         With the cause, and why the buffer was emptied if that is recent.
     """
     try:
-        return identify(snapshot.recording(), settings.valve, settings.identification)
+        return assess(
+            snapshot.recording(),
+            settings.valve,
+            settings.identification,
+            settings.derivative_window,
+        )
     except RefusalError as refusal:
         if snapshot.cleared_because is None:
             raise
@@ -81,8 +91,8 @@ class FrictionMonitor:
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
         self._baseline = settings.baseline
-        self._estimate: Estimate | None = None
-        self._estimate_stamp: int | None = None
+        self._assessment: Assessment | None = None
+        self._stamp: int | None = None
         self._refusal: str | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
 
@@ -92,19 +102,19 @@ class FrictionMonitor:
         return self._settings
 
     @property
-    def baseline(self) -> float | None:
-        """Coulomb friction to compare with, N."""
+    def baseline(self) -> Baseline | None:
+        """Friction to compare with."""
         return self._baseline
 
     @property
-    def estimate(self) -> Estimate | None:
-        """The latest estimate; a refusal leaves the one before it in place."""
-        return self._estimate
+    def assessment(self) -> Assessment | None:
+        """The latest assessment; a refusal leaves the one before it in place."""
+        return self._assessment
 
     @property
-    def estimate_stamp(self) -> int | None:
-        """When the latest estimate was made, ns."""
-        return self._estimate_stamp
+    def stamp(self) -> int | None:
+        """When the latest assessment was made, ns."""
+        return self._stamp
 
     @property
     def refusal(self) -> str | None:
@@ -120,34 +130,40 @@ class FrictionMonitor:
             self._baseline = settings.baseline
         self._settings = settings
 
-    def accept(self, estimate: Estimate, stamp: int) -> None:
-        """Remember an estimate made at `stamp` (ns)."""
-        self._estimate, self._estimate_stamp, self._refusal = estimate, stamp, None
+    def accept(self, assessment: Assessment, stamp: int) -> None:
+        """Remember an assessment made at `stamp` (ns)."""
+        self._assessment, self._stamp, self._refusal = assessment, stamp, None
 
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""
         self._refusal = str(refusal)
 
-    def set_baseline(self) -> float:
-        """Make the latest estimate the baseline and return it, N.
+    def set_baseline(self) -> Baseline:
+        """Make the latest estimate the baseline and return it.
 
         Raises
         ------
         RefusalError
-            If there is no estimate, or its Coulomb friction is not above zero.
+            If there is no estimate, or its Coulomb friction is not identifiable or not above
+            zero.
         """
-        if self._estimate is None:
+        if self._assessment is None:
             raise RefusalError("there is no estimate to take as baseline: identify first")
-        if self._estimate.coulomb_friction <= 0:
+        friction = self._assessment.parameters["coulomb_friction"]
+        if math.isnan(friction.value):
             raise RefusalError(
-                f"a coulomb friction of {self._estimate.coulomb_friction:.4g} N is no baseline"
+                f"coulomb friction is not identifiable, so it is no baseline: {friction.reason}"
             )
-        self._baseline = self._estimate.coulomb_friction
+        if friction.value <= 0:
+            raise RefusalError(f"a coulomb friction of {friction.value:.4g} N is no baseline")
+        self._baseline = Baseline(friction.value, friction.half_width)
         return self._baseline
 
     def diagnosis(self) -> Diagnosis:
         """Judge the latest estimate; OK while there is none."""
-        if self._estimate is None:
+        if self._assessment is None:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
-        return diagnose(self._estimate, self._settings.valve, self._baseline, self._settings.limits)
+        return diagnose(
+            self._assessment, self._settings.valve, self._baseline, self._settings.limits
+        )

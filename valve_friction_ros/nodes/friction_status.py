@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from valve_friction_ros.identification import UNITS, Estimate
+from valve_friction_ros.identification import ASSESSED_UNITS, UNITS, Assessment
 from valve_friction_ros.monitoring import (
     FrictionMonitor,
     Level,
@@ -20,17 +20,33 @@ def _number(value: float) -> str:
     return f"{value:.9g}"
 
 
-def _estimate_values(estimate: Estimate, monitor: FrictionMonitor) -> dict[str, str]:
-    share = dead_band(estimate, monitor.settings.valve)
-    values = {f"{name} [{UNITS[name]}]": _number(value) for name, value in estimate.values.items()}
+def _assessed_values(assessment: Assessment, monitor: FrictionMonitor) -> dict[str, str]:
+    values: dict[str, str] = {}
+    published = assessment.published
+    for name, one in assessment.parameters.items():
+        unit = ASSESSED_UNITS[name]
+        values[f"{name} [{unit}]"] = _number(one.value)
+        values[f"{name} half width [{unit}]"] = _number(one.half_width)
+        values[f"{name} verdict"] = one.verdict.value
+        if one.reason:
+            values[f"{name} reason"] = one.reason
+        if published is not None and name in UNITS:
+            values[f"{name} published [{unit}]"] = _number(published.values[name])
+    share = dead_band(assessment, monitor.settings.valve)
     if math.isfinite(share):
         values["dead_band [%]"] = _number(100 * share)
-    values["threshold [m/s]"] = _number(estimate.threshold)
-    values["samples"] = str(estimate.samples)
-    values["sigma [N]"] = _number(estimate.sigma)
-    values["r_squared"] = _number(estimate.r_squared)
-    values["fixed"] = ", ".join(estimate.fixed)
-    values["warnings"] = "; ".join(estimate.warnings)
+    if assessment.misfit is not None:
+        values["fit [%]"] = _number(100 * assessment.misfit.fit)
+        values["rms [µm]"] = _number(1e6 * assessment.misfit.rms)
+        values["systematic misfit [µm]"] = _number(1e6 * assessment.misfit.systematic)
+    values["derivative_window [samples]"] = str(assessment.start.settings.window)
+    if published is not None:
+        values["threshold [m/s]"] = _number(published.threshold)
+        values["samples"] = str(published.samples)
+        values["sigma [N]"] = _number(published.sigma)
+        values["r_squared"] = _number(published.r_squared)
+    values["fixed"] = ", ".join(monitor.settings.identification.fixed)
+    values["warnings"] = "; ".join(assessment.warnings)
     return values
 
 
@@ -65,19 +81,25 @@ def friction_status(
     level, signal = diagnosis.level, diagnosis.status_signal
     if input_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
-    estimate = monitor.estimate
+    assessment = monitor.assessment
+    friction = None if assessment is None else assessment.parameters["coulomb_friction"]
+    valid = friction is not None and math.isfinite(friction.value) and monitor.refusal is None
+    reason = monitor.refusal or ("" if friction is None or valid else friction.reason)
     values: dict[str, str] = {
-        "estimate_valid": str(estimate is not None and monitor.refusal is None).lower(),
-        "reason": monitor.refusal or "",
+        "estimate_valid": str(valid).lower(),
+        "reason": reason,
         "NE 107": signal.value,
     }
-    if estimate is not None and monitor.estimate_stamp is not None:
-        values["estimate_age [s]"] = f"{(now - monitor.estimate_stamp) / 1e9:.3f}"
-        values |= _estimate_values(estimate, monitor)
+    if assessment is not None and monitor.stamp is not None:
+        values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
+        values |= _assessed_values(assessment, monitor)
     if monitor.baseline is not None:
-        values["baseline_coulomb_friction [N]"] = _number(monitor.baseline)
+        values["baseline_coulomb_friction [N]"] = _number(monitor.baseline.coulomb_friction)
+        values["baseline half width [N]"] = _number(monitor.baseline.half_width)
     if diagnosis.ratio is not None:
-        values["coulomb_friction_ratio"] = _number(diagnosis.ratio)
+        values["coulomb_friction_ratio"] = _number(diagnosis.ratio.value)
+        values["coulomb_friction_ratio low"] = _number(diagnosis.ratio.low)
+        values["coulomb_friction_ratio high"] = _number(diagnosis.ratio.high)
     values["buffered_samples"] = str(len(monitor.buffer))
     return _status(
         level, name, hardware_id, "; ".join([*input_problems, diagnosis.message]), values

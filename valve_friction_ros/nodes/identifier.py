@@ -16,7 +16,8 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.identification import UNITS, Estimate, RefusalError
+from valve_friction_ros.identification import UNITS, Assessment, RefusalError
+from valve_friction_ros.model import compile_kernels
 from valve_friction_ros.monitoring import FrictionMonitor, dead_band, identify_snapshot
 from valve_friction_ros.nodes.friction_status import friction_status
 from valve_friction_ros.nodes.identifier_parameters import (
@@ -35,7 +36,15 @@ __all__ = ["Identifier", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
-_FIGURES = ("dead_band", "coulomb_friction_ratio", "threshold", "sigma", "r_squared")
+_FIGURES = (
+    "dead_band",
+    "coulomb_friction_ratio",
+    "fit",
+    "rms",
+    "threshold",
+    "sigma",
+    "r_squared",
+)
 
 
 class Identifier(Node):
@@ -54,6 +63,7 @@ class Identifier(Node):
         self.add_post_set_parameters_callback(self._take_parameters)
         self._joint = self.get_parameter(JOINT.name).value
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="identify")
+        self._worker.submit(compile_kernels)
         self._identifying = False
         self._create_outputs()
         self._pressure_watch = self._subscribe(
@@ -79,6 +89,10 @@ class Identifier(Node):
             name: self.create_publisher(Float64, f"~/friction/{name}", LATCHED)
             for name in (*UNITS, *_FIGURES)
         }
+        self._half_width_publishers, self._published_publishers = (
+            {name: self.create_publisher(Float64, f"~/{kind}/{name}", LATCHED) for name in UNITS}
+            for kind in ("half_width", "published")
+        )
         self._sweep_publisher = self.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
 
@@ -135,14 +149,14 @@ class Identifier(Node):
             return response
         self._identifying = True
         try:
-            estimate = await self._in_worker()
+            assessment = await self._in_worker()
         except RefusalError as refusal:
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
             response.message = str(refusal)
         else:
-            self._monitor.accept(estimate, self.get_clock().now().nanoseconds)
-            self._publish_results(estimate)
+            self._monitor.accept(assessment, self.get_clock().now().nanoseconds)
+            self._publish_results(assessment)
             response.success = True
             response.message = self._monitor.diagnosis().message
         finally:
@@ -155,7 +169,7 @@ class Identifier(Node):
         executor = self.executor
         result = Future(executor=executor)
 
-        def deliver(done: "ThreadFuture[Estimate]") -> None:
+        def deliver(done: "ThreadFuture[Assessment]") -> None:
             error = done.exception()
             if error is not None:
                 result.set_exception(error)
@@ -175,7 +189,10 @@ class Identifier(Node):
             response.message = str(refusal)
             return response
         response.success = True
-        response.message = f"baseline: coulomb_friction {baseline:.6g} N"
+        response.message = (
+            f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
+            f"± {baseline.half_width:.2g} N"
+        )
         self._publish_diagnostics()
         return response
 
@@ -185,19 +202,28 @@ class Identifier(Node):
         response.message = "the buffer is empty; estimate and baseline are kept"
         return response
 
-    def _publish_results(self, estimate: Estimate) -> None:
+    def _publish_results(self, assessment: Assessment) -> None:
         ratio = self._monitor.diagnosis().ratio
+        published, misfit = assessment.published, assessment.misfit
+        unknown = float("nan")
         figures = {
-            **estimate.values,
-            "dead_band": dead_band(estimate, self._monitor.settings.valve),
-            "coulomb_friction_ratio": float("nan") if ratio is None else ratio,
-            "threshold": estimate.threshold,
-            "sigma": estimate.sigma,
-            "r_squared": estimate.r_squared,
+            **assessment.values,
+            "dead_band": dead_band(assessment, self._monitor.settings.valve),
+            "coulomb_friction_ratio": unknown if ratio is None else ratio.value,
+            "fit": assessment.force_fit if misfit is None else misfit.fit,
+            "rms": unknown if misfit is None else misfit.rms,
+            "threshold": unknown if published is None else published.threshold,
+            "sigma": unknown if published is None else published.sigma,
+            "r_squared": unknown if published is None else published.r_squared,
         }
         for name, publisher in self._friction_publishers.items():
             publisher.publish(Float64(data=figures[name]))
-        self._sweep_publisher.publish(sweep_message(estimate.sweep))
+        for name, publisher in self._half_width_publishers.items():
+            publisher.publish(Float64(data=assessment.parameters[name].half_width))
+        for name, publisher in self._published_publishers.items():
+            value = unknown if published is None else published.values[name]
+            publisher.publish(Float64(data=value))
+        self._sweep_publisher.publish(sweep_message((published or assessment.start).sweep))
 
     def _publish_diagnostics(self) -> None:
         now = self.get_clock().now()

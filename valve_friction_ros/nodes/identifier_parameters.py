@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from valve_friction_ros.identification import FIXABLE, IdentificationSettings
-from valve_friction_ros.monitoring import FrictionLimits, MonitorSettings
+from valve_friction_ros.monitoring import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.nodes.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.valve_parameters import VALVE_PARAMETERS, valve_from
 
@@ -33,9 +33,10 @@ CHANGEABLE = (
     ),
     ParameterSpec(
         "derivative_window",
-        _DEFAULTS.window,
-        "Length d of the derivative window [samples], odd",
-        (5, 100_001),
+        0,
+        "Length d of the derivative window [samples], odd; 0: 31 for the published estimate, and "
+        "chosen from the noise of each record for the refined one",
+        (0, 100_001),
     ),
     ParameterSpec(
         "polynomial_order", _DEFAULTS.order, "Order n of the derivative polynomial [-]", (2, 20)
@@ -84,17 +85,19 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     ValueError
         If they break a rule; the message names it.
     """
+    baseline = optional(values["baseline_coulomb_friction"])
     fixed = {name: optional(values[f"fixed.{name}"]) for name in FIXABLE}
     return MonitorSettings(
         valve=valve_from(values),
         identification=IdentificationSettings(
-            window=values["derivative_window"],
+            window=values["derivative_window"] or _DEFAULTS.window,
             order=values["polynomial_order"],
             fixed={name: value for name, value in fixed.items() if value is not None},
             position_bias=optional(values["position_bias"]),
             assumed_mass=values["assumed_mass"],
         ),
+        derivative_window=values["derivative_window"] or None,
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),
-        baseline=optional(values["baseline_coulomb_friction"]),
+        baseline=None if baseline is None else Baseline(baseline),
         window=values["window"],
     )

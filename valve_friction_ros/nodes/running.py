@@ -2,17 +2,19 @@
 
 import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 __all__ = ["quick_executor", "run_node"]
 
-_WAKE_UP_PERIOD = 0.5
+_WAKE_UP_PERIOD = 0.2
 _WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
 """What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
 
@@ -41,7 +43,7 @@ def run_node(
     arguments: Sequence[str] | None = None,
     create_executor: Callable[[], Executor] = SingleThreadedExecutor,
 ) -> int:
-    """Run a node until Ctrl-C or shutdown.
+    """Run a node until Ctrl-C, SIGTERM or shutdown.
 
     Parameters
     ----------
@@ -57,33 +59,30 @@ def run_node(
     int
         Exit code: 0 after a clean stop, 2 if arguments or parameters do not let it start.
     """
-    # rclpy chains its handler before this one, and shuts the context down, which ends the loop
-    # below. A KeyboardInterrupt could strike within rclpy's own code, which then fails.
-    signal.signal(signal.SIGINT, lambda *_: None)
+    # A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
+    # context down under a callback that is still publishing. So the request is only noted.
+    stop = threading.Event()
+    for request in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(request, lambda *_: stop.set())
     node = None
     try:
-        rclpy.init(args=arguments)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except _WRONG_REQUESTS as error:
         return _cannot_start(error)
     try:
         try:
             node = create()
         except _WRONG_REQUESTS as error:
-            return _cannot_start(error) if rclpy.ok() else 0
+            return _cannot_start(error)
         executor = create_executor()
         executor.add_node(node)
         never = Future()
         # An unlimited wait is no option: the events executor would turn without a pause.
-        while rclpy.ok():
+        while rclpy.ok() and not stop.is_set():
             executor.spin_until_future_complete(never, _WAKE_UP_PERIOD)
     except ExternalShutdownException:
         pass
-    except RuntimeError:
-        if rclpy.ok():  # else a callback was still at work when the context was shut down
-            raise
     finally:
-        # Under ros2 launch Ctrl-C arrives twice; the second must not disturb the stop.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()

@@ -8,7 +8,14 @@ import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.model import KarnoppParameters, StemState, Valve, advance, balanced_state
+from valve_friction_ros.model import (
+    KarnoppParameters,
+    StemState,
+    Valve,
+    advance,
+    balanced_state,
+    compile_kernels,
+)
 from valve_friction_ros.model.checks import require_non_negative
 from valve_friction_ros.nodes.messages import stamp_of
 from valve_friction_ros.nodes.parameters import (
@@ -69,7 +76,7 @@ class Simulator(Node):
         self._stamp: int | None = None
         self._pressure = 0.0
         self._state = StemState(0.0)
-        self._compile()
+        compile_kernels()
         self._publisher = self.create_publisher(
             JointState, "stem_state", stream(), qos_overriding_options=qos_overrides()
         )
@@ -80,12 +87,6 @@ class Simulator(Node):
             stream(),
             qos_overriding_options=qos_overrides(),
         )
-
-    def _compile(self) -> None:
-        """Compile the model before the first message, not in its callback."""
-        valve, parameters, _ = self._plant
-        rest = valve.pressure_reference
-        advance(balanced_state(valve, parameters, rest), valve, parameters, (rest, rest), 1e-3)
 
     def _take_parameters(self, _: object) -> None:
         self._plant = _plant(values_of(self, _CHANGEABLE))

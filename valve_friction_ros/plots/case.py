@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import Estimate
+from valve_friction_ros.identification import AssessedParameter, Assessment
 from valve_friction_ros.model import Recording
 
 __all__ = ["FORCE", "PRESSURE", "Case", "DriveScale"]
@@ -44,8 +44,12 @@ class Case:
         σ_s at each threshold, N.
     threshold : float
         The chosen threshold, m/s.
+    friction : AssessedParameter
+        The refined Coulomb friction with its interval and verdict.
     drive : DriveScale
         How the pressure is shown.
+    simulated : ndarray of float, shape (m,), or None
+        Position of the refined model's stem, m, at m times evenly spread over the record.
     """
 
     label: str
@@ -54,25 +58,30 @@ class Case:
     coulomb_friction: NDArray[np.float64] = field(repr=False)
     sigma: NDArray[np.float64] = field(repr=False)
     threshold: float
+    friction: AssessedParameter
     drive: DriveScale = PRESSURE
+    simulated: NDArray[np.float64] | None = field(default=None, repr=False)
 
     @classmethod
     def of(
-        cls, label: str, recording: Recording, estimate: Estimate, drive: DriveScale = PRESSURE
+        cls, label: str, recording: Recording, assessment: Assessment, drive: DriveScale = PRESSURE
     ) -> "Case":
-        """Gather a case from an estimate."""
-        sweep = estimate.sweep
+        """Gather a case from an assessment; the sweep is the published one, if there is one."""
+        estimate = assessment.published or assessment.start
+        refinement = assessment.refinement
         return cls(
             label,
             recording,
-            sweep.thresholds,
-            sweep.estimates["coulomb_friction"],
-            sweep.sigma,
+            estimate.sweep.thresholds,
+            estimate.sweep.estimates["coulomb_friction"],
+            estimate.sweep.sigma,
             estimate.threshold,
+            assessment.parameters["coulomb_friction"],
             drive,
+            None if refinement is None else refinement.simulated,
         )
 
     @property
     def chosen_coulomb_friction(self) -> float:
-        """F_c at the chosen threshold, N."""
+        """F_c of the published method, at the chosen threshold, N."""
         return float(self.coulomb_friction[np.argmin(np.abs(self.thresholds - self.threshold))])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from valve_friction_ros.identification import Estimate
+from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Assessment
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.monitoring import dead_band, percentage
 from valve_friction_ros.plots.case import PRESSURE, Case, DriveScale
@@ -73,13 +73,27 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
 
 
 def identification_figure(
-    recording: Recording, valve: Valve, estimate: Estimate, drive: DriveScale = PRESSURE
+    recording: Recording, valve: Valve, assessment: Assessment, drive: DriveScale = PRESSURE
 ) -> Figure:
-    """Draw a recording and its identification."""
-    share = dead_band(estimate, valve)
-    effect = f", dead band {percentage(share)} of travel" if math.isfinite(share) else ""
-    verdict = (
-        f"F_c {estimate.coulomb_friction:.4g} N, F_v {estimate.viscous_friction:.4g} N·s/m, "
-        f"k {estimate.spring_constant:.4g} N/m{effect}"
-    )
-    return friction_figure([Case.of("recording", recording, estimate, drive)], verdict)
+    """Draw a recording and its identification, each number with its verdict."""
+    told = [
+        _told(symbol, assessment.parameters[name], ASSESSED_UNITS[name])
+        for symbol, name in (
+            ("F_c", "coulomb_friction"),
+            ("F_v", "viscous_friction"),
+            ("k", "spring_constant"),
+        )
+    ]
+    share = dead_band(assessment, valve)
+    if math.isfinite(share):
+        told.append(f"dead band {percentage(share)} of travel")
+    if assessment.misfit is not None:
+        told.append(f"fit {100 * assessment.misfit.fit:.2f} %")
+    verdict = "; ".join((*told, *assessment.warnings))
+    return friction_figure([Case.of("recording", recording, assessment, drive)], verdict)
+
+
+def _told(symbol: str, parameter: AssessedParameter, unit: str) -> str:
+    if math.isnan(parameter.value):
+        return f"{symbol} {parameter.verdict.value}"
+    return f"{symbol} {parameter.value:.4g} {unit} ({parameter.verdict.value})"

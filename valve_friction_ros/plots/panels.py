@@ -1,10 +1,12 @@
 """Panels of the figures, each drawn on given axes in the paper's units: kPa, mm, m/s, N."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from valve_friction_ros.identification import AssessedParameter
 from valve_friction_ros.plots.case import Case
 
 __all__ = ["COLOURS", "draw_coulomb_sweep", "draw_record", "draw_sigma_sweep", "draw_signature"]
@@ -31,6 +33,11 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
             time, recording.pressure[some] / case.drive.pascals, color=colour, lw=1.2
         )
         stem_axes.plot(time, recording.position[some] * 1e3, color=colour, label=case.label, lw=1.2)
+        if case.simulated is not None:
+            spread = np.linspace(time[0], recording.time[-1] + time[0], case.simulated.size)
+            few = _thinned(case.simulated.size)
+            stem_axes.plot(spread[few], case.simulated[few] * 1e3, "k:", lw=1.0)
+            stem_axes.set_title("stem (dotted: refined model)", loc="right", fontsize="small")
     pressure_axes.set_ylabel(cases[0].drive.label)
     pressure_axes.tick_params(labelbottom=False)
     stem_axes.set_ylabel("stem [mm]")
@@ -53,24 +60,39 @@ def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
     axes.set_title("valve signature")
 
 
+def _told(friction: AssessedParameter) -> str:
+    """Refined Coulomb friction in words, its verdict with it."""
+    if math.isnan(friction.value):
+        return f"$F_c$ {friction.verdict.value}"
+    interval = f" ± {friction.half_width:.2g}" if friction.half_width > 0 else ""
+    return f"$F_c$ = {friction.value:.4g}{interval} N: {friction.verdict.value}"
+
+
 def draw_coulomb_sweep(axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw F_c over the threshold δv, with the chosen threshold marked."""
+    """Draw F_c over the threshold δv, the chosen threshold, and the refined F_c as a band."""
+    levels = [0.0]
     for case, colour in zip(cases, COLOURS, strict=False):
-        chosen = case.chosen_coulomb_friction
+        chosen, refined = case.chosen_coulomb_friction, case.friction
         axes.plot(case.thresholds, case.coulomb_friction, color=colour, lw=1.2)
         axes.plot(case.threshold, chosen, "o", color=colour, mec="black", ms=7, zorder=3)
+        shown = chosen if math.isnan(refined.value) else refined.value
+        if not math.isnan(refined.value):
+            axes.axhline(refined.value, color=colour, ls="--", lw=1.0)
+            axes.axhspan(*refined.interval, color=colour, alpha=0.2, lw=0)
         axes.annotate(
-            f"$F_c$ = {chosen:.1f} N",
-            (case.threshold, chosen),
-            xytext=(4, 8),
+            _told(refined),
+            (0.98, shown),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 5),
             textcoords="offset points",
+            ha="right",
         )
-    highest = max(case.chosen_coulomb_friction for case in cases)
-    if highest > 0:
-        axes.set_ylim(0, 1.5 * highest)
+        levels += [chosen, shown]
+    if max(levels) > 0:
+        axes.set_ylim(0, 1.5 * max(levels))
     axes.set_ylabel("coulomb friction $F_c$ [N]")
     axes.tick_params(labelbottom=False)
-    axes.set_title("δv sweep (● chosen threshold)")
+    axes.set_title("δv sweep (● published choice, dashed: refined, with 95 % band)")
 
 
 def draw_sigma_sweep(axes: Axes, cases: Sequence[Case]) -> None:
