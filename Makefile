@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 PYTEST_ARGS ?=
+ACCURACY_ARGS ?=
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -55,6 +56,10 @@ venv:  ## the virtual environment to run the package
 venv-test:  ## the same, with what checks it
 	@$(python-found)
 	@$(INSTALL) test
+
+.PHONY: accuracy
+accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--seeds 3" for less
+	@"$(VENV)/bin/python" -m benchmark.accuracy $(ACCURACY_ARGS)
 
 .PHONY: clean
 clean:  ## remove what make and colcon made

@@ -17,7 +17,7 @@ from valve_friction_ros.model import (
 )
 from valve_friction_ros.model.excitations import pressure_at
 
-__all__ = ["CONDITIONS", "EXCITATIONS", "NOISES", "Case", "Condition"]
+__all__ = ["CONDITIONS", "EXCITATIONS", "NOISES", "PERIOD", "Case", "Condition", "clean_record"]
 
 PERIOD = 1e-3
 """Sample period of the simulation and of the fast sensors, s."""
@@ -83,7 +83,8 @@ EXCITATIONS = {
 
 
 @cache
-def _clean(plant_name: str, excitation: str) -> Recording:
+def clean_record(plant_name: str, excitation: str) -> Recording:
+    """Return the record of perfect sensors at 1 kHz."""
     command, duration = EXCITATIONS[excitation]
     time = np.arange(round(duration / PERIOD)) * PERIOD
     pressure = converter_response(command(time), PERIOD)
@@ -108,5 +109,5 @@ class Case:
         """Return the record as the sensors see it, reproducible by its seed."""
         noise = NOISES[self.noise]
         seeded = SensorNoise(noise.position, noise.pressure, seed)
-        noisy = seeded.applied_to(_clean(self.plant_name, self.excitation))
+        noisy = seeded.applied_to(clean_record(self.plant_name, self.excitation))
         return CONDITIONS[self.condition].sampled(noisy)

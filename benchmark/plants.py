@@ -47,6 +47,7 @@ def _lugre(plant: "Plant", pressure: NDArray[np.float64], period: float) -> NDAr
         p.viscous_friction,
         BRISTLE_STIFFNESS,
         bristle_damping,
+        plant.valve.travel,
     )
 
 
@@ -62,10 +63,14 @@ def _step_lugre(
     viscous: float,
     stiffness: float,
     damping: float,
+    travel: float,
 ) -> NDArray[np.float64]:
-    """LuGre friction, ż = v − σ_0·|v|/g(v)·z, by linearly implicit steps (Canudas de Wit, 1995)."""
+    """LuGre friction, ż = v − σ_0·|v|/g(v)·z, by linearly implicit steps (Canudas de Wit, 1995).
+
+    The travel stops take the stem's whole speed.
+    """
     positions = np.empty_like(forces)
-    position, velocity, bristle = forces[0] / spring, 0.0, 0.0
+    position, velocity, bristle = min(max(forces[0] / spring, 0.0), travel), 0.0, 0.0
     positions[0] = position
     for sample in range(1, forces.size):
         before, change = forces[sample - 1], forces[sample] - forces[sample - 1]
@@ -80,6 +85,8 @@ def _step_lugre(
             position += step * velocity
             rate = stiffness * abs(velocity) / level
             bristle = (bristle + step * velocity) / (1.0 + step * rate)
+            if position < 0.0 or position > travel:
+                position, velocity = min(max(position, 0.0), travel), 0.0
         positions[sample] = position
     return positions
 

@@ -1,0 +1,193 @@
+"""Run the benchmark: python -m benchmark.accuracy, or `make accuracy`."""
+
+import argparse
+import json
+import multiprocessing
+import os
+import statistics
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from benchmark.alarms import GROWTH, AlarmCounts, Judged, judge
+from benchmark.bounds import Bound, alarm_bounds, by_case, case_bounds, coverage_bounds
+from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, Case
+from benchmark.emps import emps_bounds
+from benchmark.picture import draw
+from benchmark.plants import PLANTS
+from benchmark.report import bounds_table, cases_table
+from benchmark.runs import Outcome, run
+
+__all__ = ["Results", "main"]
+
+PARTS = ("cases", "coverage", "alarms", "emps", "timing")
+
+_FIRST_COVERAGE_SEED = 10_000
+_FIRST_GROWN_SEED = 20_000
+_TIMED_RUNS = 5
+
+
+@dataclass
+class Results:
+    """What the parts of the benchmark brought.
+
+    Attributes
+    ----------
+    outcomes, coverage : list of Outcome
+        Of the cases, and of the records for the coverage.
+    alarms : AlarmCounts or None
+        Of the two valves that are watched.
+    bounds : list of Bound
+        All that was checked.
+    seconds : dict of str to float
+        Median time of one identification, by valve.
+    """
+
+    outcomes: list[Outcome] = field(default_factory=list)
+    coverage: list[Outcome] = field(default_factory=list)
+    alarms: AlarmCounts | None = None
+    bounds: list[Bound] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="accuracy", description=__doc__)
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, help="what to run")
+    parser.add_argument("--seeds", type=int, default=20, help="records of the square wave")
+    parser.add_argument("--other-seeds", type=int, default=3, help="records of all other cases")
+    parser.add_argument("--coverage", type=int, default=200, help="records for the coverage")
+    parser.add_argument("--alarms", type=int, default=1000, help="identifications for the alarms")
+    parser.add_argument("--grown", type=int, default=100, help="pairs of a valve that has grown")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument("--output", type=Path, default=Path("accuracy"), help="name of the files")
+    return parser
+
+
+def _all_cases() -> list[Case]:
+    return [
+        Case(plant, excitation, noise, condition)
+        for plant in PLANTS
+        for excitation in EXCITATIONS
+        for noise in NOISES
+        for condition in CONDITIONS
+    ]
+
+
+def _seeds_of(case: Case, options: argparse.Namespace) -> int:
+    if case.noise == "clean":
+        return 1
+    is_main = (case.excitation, case.condition) == ("square", "1 kHz")
+    if is_main and case.plant.is_karnopp and case.noise in ("28.6 µm", "60 µm"):
+        return int(options.seeds)
+    return int(options.other_seeds)
+
+
+def _run(task: tuple[Case, int]) -> Outcome:
+    return run(*task)
+
+
+def _judge(task: tuple[float, int]) -> Judged:
+    return judge(*task)
+
+
+def _in_parallel(
+    title: str, work: Callable[[Any], Any], tasks: Sequence[Any], jobs: int, console: Console
+) -> list[Any]:
+    """Do all tasks in `jobs` processes, in order, with a progress bar."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    context = multiprocessing.get_context("spawn")
+    with Progress(*columns, console=console) as progress, context.Pool(jobs) as pool:
+        results: Iterable[Any] = pool.imap(work, tasks)
+        return list(progress.track(results, total=len(tasks), description=title))
+
+
+def _timing(results: Results) -> None:
+    for name in PLANTS:
+        case = Case(name, "square", "28.6 µm", "1 kHz")
+        case.record(0)
+        results.seconds[name] = statistics.median(
+            run(case, seed).seconds for seed in range(_TIMED_RUNS)
+        )
+
+
+def _coverage(results: Results, options: argparse.Namespace, console: Console) -> None:
+    plants = [name for name, plant in PLANTS.items() if plant.is_karnopp]
+    tasks = [
+        (Case(name, "square", "28.6 µm", "1 kHz"), _FIRST_COVERAGE_SEED + seed)
+        for name in plants
+        for seed in range(options.coverage)
+    ]
+    results.coverage = _in_parallel("coverage", _run, tasks, options.jobs, console)
+    for group in by_case(results.coverage).values():
+        results.bounds += coverage_bounds(group)
+
+
+def _alarms(results: Results, options: argparse.Namespace, console: Console) -> None:
+    unchanged = [(1.0, seed) for seed in range(options.alarms)]
+    grown = [(GROWTH, _FIRST_GROWN_SEED + seed) for seed in range(2 * options.grown)]
+    judged = _in_parallel("alarms", _judge, [*unchanged, *grown], options.jobs, console)
+    healthy, tight = judged[: len(unchanged)], judged[len(unchanged) :]
+    declared = ["high" in (tight[i].side, tight[i + 1].side) for i in range(0, len(tight), 2)]
+    ratios = [one.ratio for one in healthy], [one.ratio for one in tight]
+    results.alarms = AlarmCounts([one.side for one in healthy], declared, ratios)
+    results.bounds += alarm_bounds(results.alarms)
+
+
+def _cases(results: Results, options: argparse.Namespace, console: Console) -> None:
+    tasks = [(case, seed) for case in _all_cases() for seed in range(_seeds_of(case, options))]
+    results.outcomes = _in_parallel("cases", _run, tasks, options.jobs, console)
+    for group in by_case(results.outcomes).values():
+        results.bounds += case_bounds(group)
+    console.print(cases_table(results.outcomes))
+
+
+def _emps(results: Results, console: Console) -> None:
+    bounds = emps_bounds()
+    if bounds is None:
+        console.print("EMPS is skipped: its record is not here")
+    else:
+        results.bounds += bounds
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the parts that were asked for; return 1 if a bound is missed."""
+    options = _parser().parse_args(arguments)
+    console = Console()
+    results = Results()
+    if "timing" in options.parts:
+        _timing(results)
+    if "emps" in options.parts:
+        _emps(results, console)
+    if "coverage" in options.parts:
+        _coverage(results, options, console)
+    if "alarms" in options.parts:
+        _alarms(results, options, console)
+    if "cases" in options.parts:
+        _cases(results, options, console)
+    console.print(bounds_table(results.bounds))
+    for name, seconds in results.seconds.items():
+        console.print(f"{name}: {seconds:.2f} s to identify and assess 52 s at 1 kHz")
+    output = options.output
+    output.with_suffix(".json").write_text(
+        json.dumps(asdict(results), indent=1, ensure_ascii=False), encoding="utf-8"
+    )
+    draw(results.outcomes, results.coverage, results.alarms, output.with_suffix(".png"))
+    missed = [bound for bound in results.bounds if not bound.met]
+    for bound in missed:
+        console.print(f"[red]missed[/] {bound.what}: {bound.reached}", soft_wrap=True)
+    console.print(f"{len(results.bounds) - len(missed)} of {len(results.bounds)} bounds are met")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,97 @@
+"""False alarms of an unchanged valve, and alarms of one whose friction has grown."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from benchmark.cases import EXCITATIONS, NOISES, PERIOD
+from benchmark.runs import SETTINGS
+from valve_friction_ros.identification import Assessment, RefusalError, assess
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SensorNoise,
+    converter_response,
+    simulate,
+)
+from valve_friction_ros.monitoring import Baseline, FrictionLimits, diagnose
+
+__all__ = ["GROWTH", "AlarmCounts", "Judged", "judge"]
+
+GROWTH = 1.5
+"""Friction of the valve whose packing was tightened, over that of the unchanged one."""
+
+_BASELINE_SEED = 1_000_000
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One identification, judged by the monitor.
+
+    Attributes
+    ----------
+    side : str
+        "high" or "low" for an alarm, else empty.
+    ratio : float
+        Friction over the baseline; nan where none was identified.
+    """
+
+    side: str
+    ratio: float
+
+
+@dataclass(frozen=True)
+class AlarmCounts:
+    """All identifications of the two valves.
+
+    Attributes
+    ----------
+    unchanged : list of str
+        Alarm of each identification of the unchanged valve.
+    declared : list of bool
+        Whether growth was declared, for each pair of identifications.
+    ratios : tuple of list of float
+        Friction over the baseline, of either valve.
+    """
+
+    unchanged: list[str]
+    declared: list[bool]
+    ratios: tuple[list[float], list[float]]
+
+
+@cache
+def _clean(growth: float) -> Recording:
+    command, duration = EXCITATIONS["square"]
+    pressure = converter_response(command(np.arange(round(duration / PERIOD)) * PERIOD), PERIOD)
+    friction = growth * LOW_FRICTION.coulomb_friction
+    valve = replace(LOW_FRICTION, coulomb_friction=friction, static_friction=friction)
+    return Recording(PERIOD, pressure, simulate(BENCH_VALVE, valve, pressure, PERIOD).position)
+
+
+def _assessed(growth: float, seed: int) -> Assessment:
+    noise = NOISES["28.6 µm"]
+    recording = SensorNoise(noise.position, noise.pressure, seed).applied_to(_clean(growth))
+    return assess(recording, BENCH_VALVE, SETTINGS)
+
+
+@cache
+def _baseline() -> Baseline:
+    friction = _assessed(1.0, _BASELINE_SEED).parameters["coulomb_friction"]
+    return Baseline(friction.value, friction.half_width)
+
+
+def judge(growth: float, seed: int) -> Judged:
+    """Identify a valve with its friction grown, and let the monitor judge it."""
+    try:
+        assessment = _assessed(growth, seed)
+    except RefusalError:
+        return Judged("", float("nan"))
+    limits = FrictionLimits()
+    ratio = diagnose(assessment, BENCH_VALVE, _baseline(), limits).ratio
+    if ratio is None:
+        return Judged("", float("nan"))
+    if ratio.low >= limits.warn_ratio:
+        return Judged("high", ratio.value)
+    return Judged("low" if ratio.high <= limits.low_ratio else "", ratio.value)

@@ -1,0 +1,189 @@
+"""What an identification must reach, checked on the outcomes."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmark.alarms import AlarmCounts
+from benchmark.cases import Case
+from benchmark.runs import Outcome, wrong_claims
+from valve_friction_ros.identification import Verdict
+
+__all__ = [
+    "COVERAGE",
+    "FORCE_BOUND",
+    "Bound",
+    "alarm_bounds",
+    "by_case",
+    "case_bounds",
+    "coverage_bounds",
+    "coverage_of",
+    "worst",
+]
+
+COVERAGE = (0.90, 0.99)
+"""Shares of the records between which a 95 % interval covers the truth."""
+
+FORCE_BOUND = 0.05
+
+_SQUARE = {
+    "coulomb_friction": 0.01,
+    "viscous_friction": 0.05,
+    "spring_constant": 0.001,
+    "static_friction": 0.02,
+}
+_MOST_FALSE_ALARMS = 0.01
+_LEAST_DECLARED = 0.99
+
+
+@dataclass(frozen=True)
+class Bound:
+    """One requirement, what was reached, and whether that is enough.
+
+    Attributes
+    ----------
+    what : str
+        The requirement.
+    reached : str
+        The figure reached.
+    met : bool
+        Whether it is met.
+    """
+
+    what: str
+    reached: str
+    met: bool
+
+
+def by_case(outcomes: Sequence[Outcome]) -> dict[Case, list[Outcome]]:
+    """Group outcomes by their case, in the order of the first of each."""
+    groups: dict[Case, list[Outcome]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.case, []).append(outcome)
+    return groups
+
+
+def worst(outcomes: Sequence[Outcome], name: str) -> float:
+    """Largest error of a parameter over those records that answered; nan if none did."""
+    errors = [abs(outcome.errors.get(name, np.nan)) for outcome in outcomes]
+    known = [error for error in errors if not np.isnan(error)]
+    return max(known) if known else float("nan")
+
+
+def coverage_of(outcomes: Sequence[Outcome], name: str) -> tuple[float, int]:
+    """Share of intervals that hold the truth, and how many intervals there were."""
+    held = [
+        abs(outcome.errors[name]) <= outcome.half_widths[name]
+        for outcome in outcomes
+        if not np.isnan(outcome.errors.get(name, np.nan))
+    ]
+    return (float(np.mean(held)) if held else float("nan")), len(held)
+
+
+def _title(case: Case) -> str:
+    return f"{case.plant_name}, {case.excitation}, {case.noise}, {case.condition}"
+
+
+def _all_within(outcomes: Sequence[Outcome], name: str, bound: float) -> Bound:
+    """Require an answer in every record, within the bound."""
+    errors = np.array([abs(outcome.errors.get(name, np.nan)) for outcome in outcomes])
+    within = int(np.count_nonzero(errors <= bound))
+    what = f"{_title(outcomes[0].case)}: {name} within {bound:.1%}"
+    reached = f"{within} of {errors.size}, worst {worst(outcomes, name):.2%}"
+    return Bound(what, reached, within == errors.size)
+
+
+def _square_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
+    case = outcomes[0].case
+    if not case.plant.is_karnopp or (case.excitation, case.condition) != ("square", "1 kHz"):
+        return []
+    if case.noise == "28.6 µm":
+        names = [name for name in _SQUARE if name != "static_friction" or _slips(case)]
+        return [_all_within(outcomes, name, _SQUARE[name]) for name in names]
+    if case.noise == "60 µm":
+        return [_all_within(outcomes, "coulomb_friction", 0.02)]
+    return []
+
+
+def _slips(case: Case) -> bool:
+    parameters = case.plant.parameters
+    return parameters.static_friction > parameters.coulomb_friction
+
+
+def _force_bound(outcomes: Sequence[Outcome]) -> list[Bound]:
+    """Bound the friction force, wherever an answer was given and not withheld."""
+    case = outcomes[0].case
+    hard = not case.plant.is_karnopp or case.condition == "100 Hz" or case.excitation[:2] == "in"
+    withheld = Verdict.NOT_IDENTIFIABLE.value
+    errors = [
+        outcome.force_error
+        for outcome in outcomes
+        if not outcome.refusal and outcome.verdicts["coulomb_friction"] != withheld
+    ]
+    if not hard or not errors:
+        return []
+    what = f"{_title(case)}: friction force within {FORCE_BOUND:.0%}"
+    reached = f"worst {max(errors):.2%} of {len(errors)} answers in {len(outcomes)}"
+    return [Bound(what, reached, max(errors) <= FORCE_BOUND)]
+
+
+def _claims(outcomes: Sequence[Outcome]) -> list[Bound]:
+    wrong = [name for outcome in outcomes for name in wrong_claims(outcome)]
+    counts = ", ".join(f"{name} {wrong.count(name)}×" for name in dict.fromkeys(wrong))
+    what = f"{_title(outcomes[0].case)}: identified is within 5 % and 3 intervals"
+    return [Bound(what, counts or "always", not wrong)]
+
+
+def _mass(outcomes: Sequence[Outcome]) -> list[Bound]:
+    if outcomes[0].case.noise == "clean":
+        return []
+    shown = sum(
+        outcome.verdicts.get("mass") not in (None, Verdict.NOT_IDENTIFIABLE.value)
+        for outcome in outcomes
+    )
+    return [Bound(f"{_title(outcomes[0].case)}: mass refused", f"shown {shown}×", not shown)]
+
+
+_CHECKS: tuple[Callable[[Sequence[Outcome]], list[Bound]], ...] = (
+    _square_bounds,
+    _force_bound,
+    _claims,
+    _mass,
+)
+
+
+def case_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
+    """Check every bound that applies to the outcomes of one case."""
+    return [bound for check in _CHECKS for bound in check(outcomes)]
+
+
+def coverage_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
+    """Check the coverage of each parameter that has a true value in one case."""
+    case = outcomes[0].case
+    names = ["coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"]
+    if _slips(case):
+        names.append("static_friction")
+    bounds = []
+    for name in names:
+        share, answers = coverage_of(outcomes, name)
+        what = f"{case.plant_name}: 95 % interval of {name} covers 90 to 99 % of records"
+        met = COVERAGE[0] <= share <= COVERAGE[1]
+        bounds.append(Bound(what, f"{share:.1%} of {answers}", met))
+    return bounds
+
+
+def alarm_bounds(counts: AlarmCounts) -> list[Bound]:
+    """Check false alarms on either side, and friction that has grown."""
+    identifications, pairs = len(counts.unchanged), len(counts.declared)
+    bounds = []
+    for side in ("high", "low"):
+        alarms = counts.unchanged.count(side)
+        met = alarms <= _MOST_FALSE_ALARMS * identifications
+        what = f"unchanged valve: {side} alarms in at most 1 %"
+        bounds.append(Bound(what, f"{alarms} of {identifications}", met))
+    declared = sum(counts.declared)
+    what = "friction grown to 1.5 ×: declared within two identifications in 99 %"
+    met = declared >= _LEAST_DECLARED * pairs
+    bounds.append(Bound(what, f"{declared} of {pairs}", met))
+    return bounds

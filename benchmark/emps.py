@@ -1,0 +1,43 @@
+"""A real machine: EMPS, an electro-mechanical axis with published parameters."""
+
+from pathlib import Path
+
+import numpy as np
+
+from benchmark.bounds import Bound
+from valve_friction_ros.identification import IdentificationSettings, Verdict, assess
+from valve_friction_ros.model import Recording, Valve
+
+__all__ = ["PUBLISHED", "RECORD", "emps_bounds"]
+
+RECORD = (
+    Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "emps_identification.csv"
+)
+
+PUBLISHED = {
+    "mass": 95.1089,
+    "viscous_friction": 203.5034,
+    "coulomb_friction": 20.3935,
+    "spring_preload": -3.1648,
+}
+"""IDIM-LS values of the data set's authors."""
+
+
+def emps_bounds() -> list[Bound] | None:
+    """Identify EMPS with default settings and no spring; None where the record is absent."""
+    if not RECORD.is_file():
+        return None
+    time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
+    record = Recording(float(np.median(np.diff(time))), force, position)
+    settings = IdentificationSettings(fixed={"spring_constant": 0.0})
+    assessment = assess(record, Valve(1.0), settings)
+    bounds = []
+    for name, published in PUBLISHED.items():
+        one = assessment.parameters[name]
+        error = one.value / published - 1
+        inside = abs(one.value - published) <= one.half_width
+        shown = one.verdict is not Verdict.NOT_IDENTIFIABLE
+        what = f"EMPS: {name} within 2 % of {published:g}, or inside its interval"
+        reached = f"{one.value:.4g} ± {one.half_width:.2g}, {error:+.1%}, {one.verdict.value}"
+        bounds.append(Bound(what, reached, shown and (abs(error) <= 0.02 or inside)))
+    return bounds
