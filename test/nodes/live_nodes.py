@@ -287,6 +287,16 @@ class Client:
         topic = f"{NAMESPACE}/identifier/friction/"
         return {name: self.latched(Float64, topic + name).data for name in names}
 
+    def half_widths(self, *names):
+        """Return the latched half widths of the intervals of these parameters."""
+        topic = f"{NAMESPACE}/identifier/half_width/"
+        return {name: self.latched(Float64, topic + name).data for name in names}
+
+    def published(self, *names):
+        """Return the latched results of the published method."""
+        topic = f"{NAMESPACE}/identifier/published/"
+        return {name: self.latched(Float64, topic + name).data for name in names}
+
     def sweep(self):
         """Return the latched sweep as a table and the labels of its columns."""
         message = self.latched(Float64MultiArray, f"{NAMESPACE}/identifier/sweep")

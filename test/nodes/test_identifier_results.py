@@ -26,6 +26,7 @@ from std_msgs.msg import Float64, Header
 from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
+    assess,
     differentiate,
     identify,
 )
@@ -42,7 +43,7 @@ BIAS = 1.13e-3
 
 @pytest.fixture(scope="module")
 def bench(shared):
-    """Identify two periods of a square wave; return client, core's estimate, answers."""
+    """Identify two periods of a square wave; return client, core's assessment, answers."""
     shared.start_identifier({"position_bias": BIAS, "input_timeout": 600.0})
     client = shared.client
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
@@ -50,37 +51,53 @@ def bench(shared):
     stamps = stamps_of(record)
     client.send_without_loss((stamps, record.pressure), (stamps, record.position))
     response = client.trigger("identify")
-    estimate = identify(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
-    return client, estimate, response, early
+    assessment = assess(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
+    return client, assessment, response, early
 
 
 def test_bench_record_is_identified(bench):
-    client, estimate, response, early = bench
+    client, assessment, response, early = bench
     assert response.success, response.message
     client.wait_until(lambda: early, "the result")
-    assert [message.data for message in early] == [estimate.coulomb_friction]
+    assert [message.data for message in early] == [assessment.values["coulomb_friction"]]
     truth = {name: getattr(LOW_FRICTION, name) for name in UNITS}
-    assert estimate.mass == pytest.approx(truth.pop("mass"), rel=0.1)
-    assert {name: getattr(estimate, name) for name in truth} == pytest.approx(truth, rel=1e-3)
+    published = assessment.published.values
+    assert published.pop("mass") == pytest.approx(truth.pop("mass"), rel=0.1)
+    assert published == pytest.approx(truth, rel=1e-3)
+    for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"):
+        refined = assessment.parameters[name]
+        assert abs(refined.value - truth[name]) <= 3 * refined.half_width
+
+
+def as_told(values):
+    """Comparable to the last bit, nan included."""
+    return {name: repr(float(value)) for name, value in values.items()}
 
 
 def test_late_subscriber_gets_every_number_to_the_last_bit(bench):
-    client, estimate, *_ = bench
-    dead_band = (estimate.coulomb_friction + estimate.static_friction) / estimate.spring_constant
+    client, assessment, *_ = bench
+    values, published = assessment.values, assessment.published
+    assert np.isnan(values["static_friction"])  # no slip jump: F_s is F_c in the dead band
+    dead_band = 2 * values["coulomb_friction"] / values["spring_constant"]
     expected = {
-        **estimate.values,
+        **{name: values[name] for name in UNITS},
         "dead_band": dead_band / BENCH_VALVE.travel,
-        "threshold": estimate.threshold,
-        "sigma": estimate.sigma,
-        "r_squared": estimate.r_squared,
+        "fit": assessment.misfit.fit,
+        "rms": assessment.misfit.rms,
+        "threshold": published.threshold,
+        "sigma": published.sigma,
+        "r_squared": published.r_squared,
+        "coulomb_friction_ratio": np.nan,  # no baseline
     }
-    ratio = client.friction("coulomb_friction_ratio")["coulomb_friction_ratio"]
-    assert client.friction(*expected) == expected
-    assert np.isnan(ratio)  # no baseline
+    assert as_told(client.friction(*expected)) == as_told(expected)
+    assert as_told(client.published(*UNITS)) == as_told(published.values)
+    half_widths = {name: one.half_width for name, one in assessment.parameters.items()}
+    assert as_told(client.half_widths(*UNITS)) == as_told(half_widths)
 
 
 def test_sweep_is_labelled_and_holds_the_estimate(bench):
-    client, estimate, *_ = bench
+    client, assessment, *_ = bench
+    estimate = assessment.published
     layout, columns = client.sweep()
     sweep = estimate.sweep
     rows, width = sweep.thresholds.size, len(columns)
@@ -110,7 +127,7 @@ def test_sweep_is_labelled_and_holds_the_estimate(bench):
 
 
 def test_diagnostics(bench):
-    client, estimate, response, _ = bench
+    client, assessment, response, _ = bench
     begun = len(client.statuses)
     client.wait_until(lambda: len(client.statuses) >= begun + 4, "four diagnostics")
     stamps = [stamp_of(stamp) for stamp, _ in client.statuses[begun:]]
@@ -120,14 +137,23 @@ def test_diagnostics(bench):
     assert status.name == f"{NAMESPACE}/identifier: friction"
     assert status.hardware_id == "fv_101"
     values = values_of(status)
-    for name, value in estimate.values.items():
-        assert float(values[f"{name} [{UNITS[name]}]"]) == pytest.approx(value, rel=1e-8)
-    assert float(values["threshold [m/s]"]) == pytest.approx(estimate.threshold, rel=1e-8)
-    assert float(values["sigma [N]"]) == pytest.approx(estimate.sigma, rel=1e-8)
-    assert float(values["r_squared"]) == pytest.approx(estimate.r_squared, rel=1e-8)
+    published = assessment.published
+    for name, one in assessment.parameters.items():
+        key = f"{name} [{UNITS[name]}]"
+        assert float(values[key]) == pytest.approx(one.value, rel=1e-8, nan_ok=True)
+        half_width = float(values[f"{name} half width [{UNITS[name]}]"])
+        assert half_width == pytest.approx(one.half_width, rel=1e-8, nan_ok=True)
+        assert values[f"{name} verdict"] == one.verdict.value
+        assert values.get(f"{name} reason", "") == one.reason
+        told = float(values[f"{name} published [{UNITS[name]}]"])
+        assert told == pytest.approx(published.values[name], rel=1e-8)
+    assert float(values["fit [%]"]) == pytest.approx(100 * assessment.misfit.fit, rel=1e-8)
+    assert float(values["threshold [m/s]"]) == pytest.approx(published.threshold, rel=1e-8)
+    assert float(values["sigma [N]"]) == pytest.approx(published.sigma, rel=1e-8)
+    assert float(values["r_squared"]) == pytest.approx(published.r_squared, rel=1e-8)
     # 2·152.7 N over 2.05e5 N/m, over 28.575 mm
     assert float(values["dead_band [%]"]) == pytest.approx(5.213, rel=1e-3)
-    assert int(values["samples"]) == estimate.samples
+    assert int(values["samples"]) == published.samples
     assert float(values["estimate_age [s]"]) > 0
     assert values["estimate_valid"] == "true"
     assert values["reason"] == ""
@@ -166,11 +192,15 @@ def test_real_machine_gives_the_numbers_of_the_command(live):
     client.send_without_loss((stamps, force), (stamps, position))
     response = client.trigger("identify")
     assert response.success, response.message
-    figures = ("threshold", "sigma", "r_squared")
-    assert client.friction(*UNITS, *figures) == {
+    figures = ("threshold", "sigma", "r_squared", "fit")
+    numbers = {
         **{name: expected["parameters"][name]["value"] for name in UNITS},
         **{name: expected[name] for name in figures},
     }
+    known = {name: np.nan if value is None else value for name, value in numbers.items()}
+    assert as_told(client.friction(*UNITS, *figures)) == as_told(known)
+    published = {name: expected["parameters"][name]["published"] for name in UNITS}
+    assert as_told(client.published(*UNITS)) == as_told(published)
     status = client.status_values(lambda s: "samples" in values_of(s))
     assert int(status["samples"]) == expected["samples"]
 
@@ -210,7 +240,7 @@ def test_signals_of_different_rates(live):
     force = BENCH_VALVE.diaphragm_area * amplitude * (2 * np.pi / wave.period * 4e-3) ** 2 / 8
     assert amplification * force < 0.01  # N: the bound says something
 
-    identified = client.friction("coulomb_friction")["coulomb_friction"]
+    identified = client.published("coulomb_friction")["coulomb_friction"]
     assert identified != expected.coulomb_friction  # it was interpolated
     assert abs(identified - expected.coulomb_friction) <= amplification * force
     assert identified == pytest.approx(LOW_FRICTION.coulomb_friction, rel=1e-3)

@@ -61,12 +61,14 @@ def test_verdict(client, parameters, ratio, level, signal, words):
     status = client.statuses[-1][1]
     assert status.level == level
     assert words in status.message
-    assert f"{ratio:.2f} times its baseline" in status.message
+    assert f"coulomb friction is {ratio:.2f} (" in status.message
     assert status.message == message
     values = values_of(status)
     assert values["NE 107"] == signal
     assert float(values["coulomb_friction_ratio"]) == pytest.approx(ratio, rel=2e-3)
     assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(152.7, rel=1e-3)
+    low, high = (float(values[f"coulomb_friction_ratio {end}"]) for end in ("low", "high"))
+    assert low <= ratio <= high
     published = client.friction("coulomb_friction_ratio")["coulomb_friction_ratio"]
     assert published == pytest.approx(float(values["coulomb_friction_ratio"]), rel=1e-8)
 

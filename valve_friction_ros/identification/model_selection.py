@@ -35,6 +35,9 @@ _OFFSETS = (-2.0, -1.0, -0.5, -0.2, -0.1, 0.1, 0.2, 0.5, 1.0, 2.0)
 _IMPROVEMENT = 0.5
 """Share of its misfit to which a falling friction curve, or another clock, must bring it."""
 
+_LEAST_GAIN = 1e-6
+"""Distance, m, that a part of the model must account for: what is less is in no real record."""
+
 _LEAST_MASS = 0.01
 _LEAST_SLIP = 0.02
 _LEAST_ASYMMETRY = 0.02
@@ -118,9 +121,29 @@ def with_demanded(
         left.remove(name)
         at = {**refinement.coordinates, name: _moderate(name, value)}
         trial = refine(problem, at, (*refinement.names, name))
-        if trial.rms < refinement.rms:
-            refinement = trial
+        if _is_nearer(trial, refinement):
+            refinement = _without_needless_slip(trial)
     return refinement
+
+
+def _without_needless_slip(refinement: Refinement) -> Refinement:
+    """Drop a slip jump that another part of the model has made needless."""
+    if SLIP not in refinement.names or "stribeck_velocity" in refinement.names:
+        return refinement
+    if _is_slip(refinement):
+        return refinement
+    names = tuple(name for name in refinement.names if name != SLIP)
+    return refine(refinement.problem, {**refinement.coordinates, SLIP: 0.0}, names)
+
+
+def _is_nearer(trial: Refinement, before: Refinement) -> bool:
+    """Tell whether a larger model brings the simulated stem nearer by more than nothing."""
+    return before.rms**2 - trial.rms**2 > _LEAST_GAIN**2
+
+
+def _is_slip(refinement: Refinement) -> bool:
+    enough = refinement.coordinates[SLIP] > _least(refinement, SLIP)
+    return enough and deviation(refinement, SLIP) > SIGNIFICANCE
 
 
 def _least(refinement: Refinement, name: str) -> float:
@@ -186,12 +209,7 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
     ]
     fitted = [least_squares_fit(problem, one, names) for one in _nearest(problem, starts)[:2]]
     slip = refine(problem, _nearest(problem, fitted)[0], names)
-    demanded_slip = (
-        slip.rms < plain.rms
-        and deviation(slip, SLIP) > SIGNIFICANCE
-        and slip.coordinates[SLIP] > _least(slip, SLIP)
-    )
-    best = slip if demanded_slip else plain
+    best = slip if _is_nearer(slip, plain) and _is_slip(slip) else plain
     before = misfit_of(best)
     if before.describes:
         return best

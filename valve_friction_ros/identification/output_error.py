@@ -32,6 +32,7 @@ _FORCES = frozenset({"coulomb_friction", "spring_preload", SLIP})
 _UNITY = frozenset({"coulomb_asymmetry", "viscous_asymmetry", OFFSET})
 _LARGEST_ASYMMETRY = 0.95
 _LEAST_MASS = 1e-3
+_UNIT_MASS = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +122,7 @@ class OutputError:
         sizes = {
             **dict.fromkeys(_FORCES, force),
             **dict.fromkeys(_UNITY, 1.0),
+            "mass": max(at["mass"], _UNIT_MASS),
             START: force / max(at["spring_constant"], 1e-6),
         }
         return {name: sizes.get(name, abs(at[name])) or 1.0 for name in names}

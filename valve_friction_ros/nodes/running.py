@@ -38,6 +38,12 @@ def _cannot_start(error: Exception) -> int:
     return 2
 
 
+def _announce(stop: threading.Event, stopped: Future) -> None:
+    """Wake the executor as soon as the stop is requested, busy as it may be."""
+    stop.wait()
+    stopped.set_result(None)
+
+
 def run_node(
     create: Callable[[], Node],
     arguments: Sequence[str] | None = None,
@@ -76,10 +82,11 @@ def run_node(
             return _cannot_start(error)
         executor = create_executor()
         executor.add_node(node)
-        never = Future()
+        stopped = Future(executor=executor)
+        threading.Thread(target=_announce, args=(stop, stopped), daemon=True).start()
         # An unlimited wait is no option: the events executor would turn without a pause.
         while rclpy.ok() and not stop.is_set():
-            executor.spin_until_future_complete(never, _WAKE_UP_PERIOD)
+            executor.spin_until_future_complete(stopped, _WAKE_UP_PERIOD)
     except ExternalShutdownException:
         pass
     finally:
