@@ -162,6 +162,12 @@ def diagnose(
     if math.isnan(friction.value):
         message = f"coulomb friction is not identifiable: {friction.reason}"
         return _with_model_doubt(Diagnosis(Level.OK, StatusSignal.GOOD, message, None), assessment)
+    if friction.value < 0:
+        message = (
+            f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, which cannot "
+            "be: check the direction of both signals"
+        )
+        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
     effect = _consequence(assessment, valve)
     if baseline is None:
         verdict = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
@@ -205,5 +211,9 @@ def _against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
             f"friction has grown: {compared}; {effect}",
             ratio,
         )
-    words = "friction normal" if ratio.value < limits.warn_ratio else "friction perhaps grown"
+    words = "friction normal"
+    if ratio.value >= limits.warn_ratio:
+        words = "friction perhaps grown"
+    elif ratio.value <= limits.low_ratio:
+        words = "friction perhaps collapsed"
     return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {compared}; {effect}", ratio)

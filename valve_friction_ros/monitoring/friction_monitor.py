@@ -1,7 +1,7 @@
 """The monitor of one valve, without any ROS: gather, identify, remember, judge."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from valve_friction_ros.identification import (
     Assessment,
@@ -52,8 +52,10 @@ class MonitorSettings:
     window: float = 60.0
 
     def __post_init__(self) -> None:
-        """Refuse a window that cannot be."""
+        """Refuse windows that cannot be."""
         require_positive("window", self.window)
+        if self.derivative_window is not None:
+            replace(self.identification, window=self.derivative_window)
 
 
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Assessment:
@@ -122,7 +124,7 @@ class FrictionMonitor:
         return self._refusal
 
     def change_settings(self, settings: MonitorSettings) -> None:
-        """Put new settings in force; a new window or sensor range empties the buffer."""
+        """Put new settings in force; a new window or valve empties the buffer."""
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear("valve or window parameters were changed")
