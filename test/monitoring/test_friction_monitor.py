@@ -3,12 +3,12 @@
 import dataclasses
 import math
 
-import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify
-from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave, simulate
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, assess
+from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.monitoring import (
+    Baseline,
     FrictionLimits,
     FrictionMonitor,
     Level,
@@ -26,6 +26,10 @@ def replaced(**changes):
     return dataclasses.replace(SETTINGS, **changes)
 
 
+def coulomb_friction(assessment):
+    return assessment.parameters["coulomb_friction"]
+
+
 def feed(monitor, record):
     period = round(record.sample_period * 1e9)
     pairs = zip(record.pressure.tolist(), record.position.tolist(), strict=True)
@@ -34,33 +38,42 @@ def feed(monitor, record):
         assert monitor.buffer.add_position(START + step * period, position) is None
 
 
-@pytest.fixture(scope="module")
-def record(benches):
-    """Ten seconds of a sine at 100 Hz."""
-    pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
-    return Recording(0.01, pressure, simulate(*benches["low"], pressure, 0.01).position)
-
-
 class TestSettings:
-    @pytest.mark.parametrize("name", ["window", "baseline"])
     @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-    def test_impossible_values_are_named(self, name, value):
-        with pytest.raises(ValueError, match=rf"^{name}\w* must be"):
-            replaced(**{name: value})
+    def test_impossible_windows_are_named(self, value):
+        with pytest.raises(ValueError, match=r"^window must be"):
+            replaced(window=value)
+
+    @pytest.mark.parametrize("value", [0, -5, 3, 30])
+    def test_impossible_derivative_windows_are_named(self, value):
+        """Before a record is gathered for it, not when that record is identified."""
+        with pytest.raises(ValueError, match=r"^window must be odd and at least order \+ 2 = 5"):
+            replaced(derivative_window=value)
+
+    def test_no_baseline_and_no_derivative_window_at_first(self):
+        assert (SETTINGS.baseline, SETTINGS.derivative_window) == (None, None)
 
 
 class TestIdentification:
-    def test_a_full_buffer_gives_what_the_record_gives(self, record):
+    def test_a_full_buffer_gives_what_the_record_gives(self, loose_record):
         monitor = FrictionMonitor(SETTINGS)
-        feed(monitor, record)
+        feed(monitor, loose_record)
         found = identify_snapshot(monitor.buffer.snapshot(), SETTINGS)
-        assert found.values == identify(record, BENCH_VALVE).values
+        expected = assess(loose_record, BENCH_VALVE)
+        assert str(found.parameters) == str(expected.parameters)  # nan is not nan
+        assert found.published.values == expected.published.values
 
-    def test_by_the_settings(self, record):
-        settings = replaced(identification=IdentificationSettings(fixed={"mass": 1.25}))
+    def test_by_the_settings(self, loose_record):
+        settings = replaced(
+            identification=IdentificationSettings(fixed={"mass": 1.25}, window=21),
+            derivative_window=15,
+        )
         monitor = FrictionMonitor(settings)
-        feed(monitor, record)
-        assert identify_snapshot(monitor.buffer.snapshot(), settings).mass == 1.25
+        feed(monitor, loose_record)
+        found = identify_snapshot(monitor.buffer.snapshot(), settings)
+        assert found.values["mass"] == 1.25
+        assert found.published.settings.window == 21
+        assert found.start.settings.window == 15
 
     def test_a_refusal_has_its_cause(self):
         snapshot = FrictionMonitor(SETTINGS).buffer.snapshot()
@@ -81,7 +94,7 @@ class TestIdentification:
 class TestMemory:
     def test_at_first(self):
         monitor = FrictionMonitor(SETTINGS)
-        remembered = (monitor.estimate, monitor.estimate_stamp, monitor.refusal, monitor.baseline)
+        remembered = (monitor.assessment, monitor.stamp, monitor.refusal, monitor.baseline)
         assert remembered == (None, None, None, None)
         diagnosis = monitor.diagnosis()
         assert (diagnosis.level, diagnosis.status_signal) == (Level.OK, StatusSignal.GOOD)
@@ -95,39 +108,45 @@ class TestMemory:
         assert monitor.diagnosis().level == Level.OK
         assert monitor.diagnosis().message == "no estimate: the stem did not move"
 
-    def test_an_estimate_ends_the_refusal(self, estimate):
+    def test_an_estimate_ends_the_refusal(self, assessment):
         monitor = FrictionMonitor(SETTINGS)
         monitor.refuse(RefusalError("the stem did not move"))
-        monitor.accept(estimate, START)
-        assert (monitor.estimate, monitor.estimate_stamp) == (estimate, START)
+        monitor.accept(assessment, START)
+        assert (monitor.assessment, monitor.stamp) == (assessment, START)
         assert monitor.refusal is None
-        assert monitor.diagnosis() == diagnose(estimate, BENCH_VALVE)
+        assert monitor.diagnosis() == diagnose(assessment, BENCH_VALVE)
 
-    def test_a_refusal_leaves_the_estimate(self, estimate):
-        monitor = FrictionMonitor(replaced(baseline=estimate.coulomb_friction / 3))
-        monitor.accept(estimate, START)
+    def test_a_refusal_leaves_the_estimate(self, assessment):
+        monitor = FrictionMonitor(
+            replaced(baseline=Baseline(coulomb_friction(assessment).value / 3))
+        )
+        monitor.accept(assessment, START)
         monitor.refuse(RefusalError("the stem did not move"))
-        assert (monitor.estimate, monitor.estimate_stamp) == (estimate, START)
+        assert (monitor.assessment, monitor.stamp) == (assessment, START)
         assert monitor.refusal == "the stem did not move"
         assert monitor.diagnosis().level == Level.ERROR
 
 
 class TestBaseline:
-    def test_of_the_settings(self, estimate):
-        monitor = FrictionMonitor(replaced(baseline=100.0))
-        assert monitor.baseline == 100.0
-        monitor.accept(estimate, START)
-        assert monitor.diagnosis().ratio == estimate.coulomb_friction / 100.0
+    def test_of_the_settings(self, assessment):
+        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+        assert monitor.baseline == Baseline(100.0, 0.0)
+        monitor.accept(assessment, START)
+        ratio = monitor.diagnosis().ratio
+        assert ratio.value == coulomb_friction(assessment).value / 100.0
 
-    def test_of_the_latest_estimate(self, estimate):
+    def test_of_the_latest_assessment_with_its_interval(self, assessment, with_values, friction):
         monitor = FrictionMonitor(SETTINGS)
-        monitor.accept(estimate, START)
-        assert monitor.set_baseline() == monitor.baseline == estimate.coulomb_friction
-        tight = dataclasses.replace(estimate, coulomb_friction=2.5 * estimate.coulomb_friction)
-        monitor.accept(tight, START + 1)
-        assert monitor.diagnosis().ratio == 2.5
+        monitor.accept(assessment, START)
+        healthy = coulomb_friction(assessment)
+        expected = Baseline(healthy.value, healthy.half_width)
+        assert monitor.set_baseline() == monitor.baseline == expected
+        assert monitor.diagnosis().ratio.value == 1.0
+        tight = friction(2.5 * healthy.value, 7.0)
+        monitor.accept(with_values(coulomb_friction=tight), START + 1)
+        assert monitor.diagnosis().ratio == expected.compared_with(tight)
         assert monitor.diagnosis().level == Level.ERROR
-        assert monitor.set_baseline() == tight.coulomb_friction
+        assert monitor.set_baseline() == Baseline(tight.value, 7.0)
         assert monitor.diagnosis().level == Level.OK
 
     def test_needs_an_estimate(self):
@@ -137,20 +156,33 @@ class TestBaseline:
         assert monitor.baseline is None
 
     @pytest.mark.parametrize("coulomb", [0.0, -3.0])
-    def test_needs_a_friction(self, estimate, coulomb):
-        monitor = FrictionMonitor(replaced(baseline=100.0))
-        monitor.accept(dataclasses.replace(estimate, coulomb_friction=coulomb), START)
+    def test_needs_a_friction(self, with_values, coulomb):
+        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+        monitor.accept(with_values(coulomb_friction=coulomb), START)
         with pytest.raises(
             RefusalError, match=f"^a coulomb friction of {coulomb:.4g} N is no base"
         ):
             monitor.set_baseline()
-        assert monitor.baseline == 100.0
+        assert monitor.baseline == Baseline(100.0)
+
+    @pytest.mark.parametrize("before", [None, Baseline(100.0)])
+    def test_needs_an_identifiable_friction(self, with_values, unknown, before):
+        monitor = FrictionMonitor(replaced(baseline=before))
+        monitor.accept(with_values(coulomb_friction=unknown()), START)
+        with pytest.raises(RefusalError) as refusal:
+            monitor.set_baseline()
+        assert str(refusal.value) == (
+            "coulomb friction is not identifiable, so it is no baseline: "
+            "the record does not tell it"
+        )
+        assert monitor.baseline == before
+        assert monitor.diagnosis().level == Level.OK
 
 
 class TestChangeOfSettings:
-    def filled(self, estimate, settings=SETTINGS):
+    def filled(self, assessment, settings=SETTINGS):
         monitor = FrictionMonitor(settings)
-        monitor.accept(estimate, START)
+        monitor.accept(assessment, START)
         monitor.buffer.add_pressure(START, 1e5)
         return monitor
 
@@ -162,16 +194,16 @@ class TestChangeOfSettings:
         ],
         ids=["window", "valve"],
     )
-    def test_another_window_or_valve_empties_the_buffer(self, estimate, changes):
-        monitor = self.filled(estimate)
+    def test_another_window_or_valve_empties_the_buffer(self, assessment, changes):
+        monitor = self.filled(assessment)
         monitor.change_settings(replaced(**changes))
         assert len(monitor.buffer) == 0
         cause = "valve or window parameters were changed"
         assert monitor.buffer.snapshot().cleared_because == cause
-        assert monitor.estimate is estimate
+        assert monitor.assessment is assessment
 
-    def test_the_new_range_holds(self, estimate):
-        monitor = self.filled(estimate)
+    def test_the_new_range_holds(self, assessment):
+        monitor = self.filled(assessment)
         monitor.change_settings(
             replaced(valve=dataclasses.replace(BENCH_VALVE, pressure_maximum=2e5))
         )
@@ -180,36 +212,39 @@ class TestChangeOfSettings:
     @pytest.mark.parametrize(
         "changes",
         [
-            {"baseline": 3.0},
+            {"baseline": Baseline(3.0)},
+            {"derivative_window": 15},
             {"limits": FrictionLimits(warn_ratio=1.2)},
             {"identification": IdentificationSettings(window=51)},
         ],
-        ids=["baseline", "limits", "identification"],
+        ids=["baseline", "derivative window", "limits", "identification"],
     )
-    def test_other_changes_keep_it(self, estimate, changes):
-        monitor = self.filled(estimate)
+    def test_other_changes_keep_it(self, assessment, changes):
+        monitor = self.filled(assessment)
         changed = replaced(**changes)
         monitor.change_settings(changed)
         assert len(monitor.buffer) == 1
         assert monitor.buffer.snapshot().cleared_because is None
         assert monitor.settings == changed
 
-    def test_a_baseline_that_was_set_survives_other_changes(self, estimate):
-        monitor = self.filled(estimate)
+    def test_a_baseline_that_was_set_survives_other_changes(self, assessment):
+        monitor = self.filled(assessment)
         monitor.set_baseline()
         monitor.change_settings(replaced(limits=FrictionLimits(warn_ratio=1.2)))
-        assert monitor.baseline == estimate.coulomb_friction
+        healthy = coulomb_friction(assessment)
+        assert monitor.baseline == Baseline(healthy.value, healthy.half_width)
 
-    def test_but_not_a_baseline_of_the_settings(self, estimate):
-        monitor = self.filled(estimate, replaced(baseline=100.0))
+    def test_but_not_a_baseline_of_the_settings(self, assessment):
+        monitor = self.filled(assessment, replaced(baseline=Baseline(100.0)))
         monitor.set_baseline()
-        monitor.change_settings(replaced(baseline=120.0))
-        assert monitor.baseline == 120.0
+        monitor.change_settings(replaced(baseline=Baseline(120.0)))
+        assert monitor.baseline == Baseline(120.0)
         monitor.change_settings(SETTINGS)
         assert monitor.baseline is None
 
-    def test_new_limits_judge_the_old_estimate(self, estimate):
-        monitor = self.filled(estimate, replaced(baseline=estimate.coulomb_friction / 1.4))
+    def test_new_limits_judge_the_old_estimate(self, assessment):
+        healthy = Baseline(coulomb_friction(assessment).value / 1.2)
+        monitor = self.filled(assessment, replaced(baseline=healthy))
         assert monitor.diagnosis().level == Level.OK
-        monitor.change_settings(dataclasses.replace(monitor.settings, limits=FrictionLimits(1.3)))
+        monitor.change_settings(dataclasses.replace(monitor.settings, limits=FrictionLimits(1.15)))
         assert monitor.diagnosis().level == Level.WARN
