@@ -7,8 +7,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, identify
-from valve_friction_ros.model import BENCH_VALVE, Recording, SquareWave, Valve
+from valve_friction_ros.identification import Verdict
+from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
 from valve_friction_ros.plots import (
     FORCE,
     Case,
@@ -18,28 +18,22 @@ from valve_friction_ros.plots import (
 )
 from valve_friction_ros.plots.panels import COLOURS
 
-SETTINGS = IdentificationSettings(position_bias=1.13e-3)
+NAN = math.nan
 LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
 
 
 @pytest.fixture(scope="module")
-def record(bench_record):
-    return bench_record("low", SquareWave(), 20.8)
-
-
-@pytest.fixture(scope="module")
-def estimate(record):
-    return identify(record, BENCH_VALVE, SETTINGS)
-
-
-@pytest.fixture(scope="module")
-def figure(record, estimate):
-    return identification_figure(record, BENCH_VALVE, estimate)
+def figure(record, assessment):
+    return identification_figure(record, BENCH_VALVE, assessment)
 
 
 def panels(figure):
     """The axes of a figure by name."""
     return {axes.get_label(): axes for axes in figure.axes}
+
+
+def title_of(figure):
+    return " ".join(figure.get_suptitle().split())
 
 
 def points(line):
@@ -64,97 +58,189 @@ class TestPanels:
 
     def test_the_record_is_drawn_in_these_units(self, figure, record):
         found = panels(figure)
-        (pressure,), (stem,) = found["pressure"].lines, found["stem"].lines
+        (pressure,), (stem, _) = found["pressure"].lines, found["stem"].lines
         (signature,) = found["signature"].lines
         kilopascals, millimetres = record.pressure / 1e3, record.position * 1e3
         np.testing.assert_array_equal(points(pressure), [record.time, kilopascals])
         np.testing.assert_array_equal(points(stem), [record.time, millimetres])
         np.testing.assert_array_equal(points(signature), [kilopascals, millimetres])
 
-    def test_the_sweep_with_the_chosen_threshold(self, figure, estimate):
-        sweep, marker = panels(figure)["coulomb"].lines
-        expected = [estimate.sweep.thresholds, estimate.sweep.estimates["coulomb_friction"]]
+    def test_the_refined_stem_lies_on_the_measured_one(self, figure, record, assessment):
+        """Dotted over the whole record, and no further away than the noise."""
+        _, refined = panels(figure)["stem"].lines
+        assert refined.get_linestyle() == ":"
+        time, position = points(refined)
+        assert (time[0], time[-1]) == (record.time[0], record.time[-1])
+        measured = np.interp(time, record.time, record.position * 1e3)
+        rms = np.sqrt(np.mean((position - measured) ** 2))
+        assert rms == pytest.approx(assessment.misfit.rms * 1e3, rel=1e-9)
+        assert rms < 12e-3
+
+    def test_there_is_none_without_a_refined_model(self, record, assessment):
+        """As of a machine without a spring."""
+        regressed = dataclasses.replace(assessment, refinement=None, misfit=None)
+        found = identification_figure(record, BENCH_VALVE, regressed)
+        assert len(panels(found)["stem"].lines) == 1
+        assert "fit" not in title_of(found)
+
+    def test_the_published_sweep_with_the_chosen_threshold(self, figure, assessment):
+        published = assessment.published
+        sweep, marker, _ = panels(figure)["coulomb"].lines
+        expected = [published.sweep.thresholds, published.sweep.estimates["coulomb_friction"]]
         np.testing.assert_array_equal(points(sweep), expected)
-        chosen = [[estimate.threshold], [estimate.coulomb_friction]]
+        chosen = [[published.threshold], [published.coulomb_friction]]
         np.testing.assert_array_equal(points(marker), chosen)
         sigma, upright = panels(figure)["sigma"].lines
-        np.testing.assert_array_equal(points(sigma)[0], estimate.sweep.thresholds)
-        assert set(upright.get_xdata()) == {estimate.threshold}
-        (note,) = panels(figure)["coulomb"].texts
-        assert note.get_text() == f"$F_c$ = {estimate.coulomb_friction:.1f} N"
+        np.testing.assert_array_equal(points(sigma)[0], published.sweep.thresholds)
+        assert set(upright.get_xdata()) == {published.threshold}
 
-    def test_the_chosen_friction_is_in_sight(self, figure, estimate):
-        low, high = panels(figure)["coulomb"].get_ylim()
-        assert low < estimate.coulomb_friction < high
+    def test_without_a_published_estimate_the_start_is_drawn(self, record, assessment):
+        alone = dataclasses.replace(assessment, published=None)
+        found = panels(identification_figure(record, BENCH_VALVE, alone))
+        start = assessment.start
+        assert start.threshold != assessment.published.threshold
+        chosen = [[start.threshold], [start.coulomb_friction]]
+        np.testing.assert_array_equal(points(found["coulomb"].lines[1]), chosen)
 
-    def test_force_of_a_machine_without_diaphragm(self, record, estimate):
-        found = panels(identification_figure(record, BENCH_VALVE, estimate, FORCE))
+    def test_the_refined_friction_with_its_band_and_verdict(self, record, with_parameters):
+        found = with_parameters(coulomb_friction=(152.25, 3.5, Verdict.WEAK))
+        axes = panels(identification_figure(record, BENCH_VALVE, found))["coulomb"]
+        level = axes.lines[2]
+        assert level.get_linestyle() == "--"
+        assert set(level.get_ydata()) == {152.25}
+        (band,) = axes.patches
+        low, high = band.get_extents().transformed(axes.transData.inverted()).intervaly
+        assert (low, high) == (pytest.approx(148.75), pytest.approx(155.75))
+        (note,) = axes.texts
+        assert note.get_text() == "$F_c$ = 152.2 ± 3.5 N: weak"
+
+    def test_a_given_friction_has_no_interval(self, record, with_parameters):
+        found = with_parameters(coulomb_friction=(152.5, 0.0, Verdict.FIXED))
+        (note,) = panels(identification_figure(record, BENCH_VALVE, found))["coulomb"].texts
+        assert note.get_text() == "$F_c$ = 152.5 N: fixed"
+
+    @pytest.mark.parametrize("coulomb", [40.0, 152.0, 1520.0])
+    def test_both_frictions_are_in_sight(self, record, with_parameters, coulomb):
+        found = with_parameters(coulomb_friction=(coulomb, 1.0, Verdict.IDENTIFIED))
+        axes = panels(identification_figure(record, BENCH_VALVE, found))["coulomb"]
+        low, high = axes.get_ylim()
+        assert low < coulomb < high
+        assert low < found.published.coulomb_friction < high
+
+    def test_force_of_a_machine_without_diaphragm(self, record, assessment):
+        found = panels(identification_figure(record, BENCH_VALVE, assessment, FORCE))
         assert found["pressure"].get_ylabel() == "drive force [N]"
         assert found["signature"].get_xlabel() == "drive force [N]"
         np.testing.assert_array_equal(found["pressure"].lines[0].get_ydata(), record.pressure)
 
-    def test_long_records_are_thinned(self, record, estimate):
+    def test_long_records_are_thinned(self, record, assessment):
         """Not below 20000 points, and to their whole length."""
-        many = Recording(1e-3, np.tile(record.pressure, 3), np.tile(record.position, 3))
-        (line,) = panels(identification_figure(many, BENCH_VALVE, estimate))["stem"].lines
+        many = Recording(1e-3, np.tile(record.pressure, 60), np.tile(record.position, 60))
+        line = panels(identification_figure(many, BENCH_VALVE, assessment))["stem"].lines[0]
         assert 20_000 <= line.get_xdata().size < 40_000
         step = line.get_xdata()[1] - line.get_xdata()[0]
         assert line.get_xdata()[-1] > many.duration - step
 
 
 class TestVerdict:
-    def test_of_a_valve(self, figure, estimate):
-        """2·152.7 N over 2.05e5 N/m and 28.575 mm is 5.2 %."""
-        assert " ".join(figure.get_suptitle().split()) == (
-            f"F_c 152.7 N, F_v {estimate.viscous_friction:.4g} N·s/m, k 2.05e+05 N/m, "
-            "dead band 5.2 % of travel"
+    @pytest.fixture
+    def known(self, with_parameters):
+        return with_parameters(
+            coulomb_friction=(152.7, 1.0, Verdict.IDENTIFIED),
+            static_friction=(NAN, NAN, Verdict.NOT_IDENTIFIABLE),
+            viscous_friction=(4865.0, 400.0, Verdict.WEAK),
+            spring_constant=(2.05e5, 0.0, Verdict.FIXED),
         )
 
-    def test_beyond_the_travel(self, record, estimate):
-        tight = dataclasses.replace(estimate, coulomb_friction=4e3, static_friction=4e3)
-        title = identification_figure(record, BENCH_VALVE, tight).get_suptitle()
-        assert title.endswith("dead band 137 % of travel")
+    def test_each_number_has_its_verdict(self, record, known):
+        """2·152.7 N over 2.05e5 N/m and 28.575 mm is 5.2 %."""
+        known = dataclasses.replace(known, warnings=())
+        assert title_of(identification_figure(record, BENCH_VALVE, known)) == (
+            "F_c 152.7 N (identified); F_v 4865 N·s/m (weak); k 2.05e+05 N/m (fixed); "
+            f"dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
+        )
 
-    def test_without_a_travel(self, record, estimate):
+    def test_a_number_without_a_verdict_is_never_shown(self, record, nothing_known):
+        """What is withheld leaves no number in the title, and no line, band or note of it."""
+        figure = identification_figure(record, BENCH_VALVE, nothing_known)
+        told = title_of(figure).split("; ")[:3]
+        assert told == [f"{name} not identifiable" for name in ("F_c", "F_v", "k")]
+        assert "dead band" not in title_of(figure)
+        axes = panels(figure)["coulomb"]
+        (note,) = axes.texts
+        assert note.get_text() == "$F_c$ not identifiable"
+        assert len(axes.lines) == 2
+        assert not axes.patches
+        everything = " ".join([title_of(figure), *(t.get_text() for t in axes.texts)])
+        assert "nan" not in everything
+
+    def test_warnings_are_told(self, record, known):
+        doubt = "the Karnopp model does not describe this valve: 98 µm are not noise"
+        doubted = dataclasses.replace(known, warnings=(doubt, "check the clocks"))
+        title = title_of(identification_figure(record, BENCH_VALVE, doubted))
+        assert title.endswith(f"; {doubt}; check the clocks")
+
+    def test_a_long_verdict_is_wrapped_within_the_page(self, record, known):
+        doubted = dataclasses.replace(known, warnings=("many words " * 20,))
+        figure = identification_figure(record, BENCH_VALVE, doubted)
+        figure.draw_without_rendering()
+        box = figure._suptitle.get_window_extent()
+        assert box.x1 < figure.bbox.x1
+        assert len(figure.get_suptitle().splitlines()) > 2
+
+    def test_beyond_the_travel(self, record, with_parameters):
+        tight = with_parameters(
+            coulomb_friction=(4e3, 1.0, Verdict.IDENTIFIED),
+            static_friction=(4e3, 1.0, Verdict.IDENTIFIED),
+            spring_constant=(2.05e5, 0.0, Verdict.FIXED),
+        )
+        title = title_of(identification_figure(record, BENCH_VALVE, tight))
+        assert "dead band 137 % of travel" in title
+
+    def test_without_a_travel(self, record, assessment):
         endless = Valve(BENCH_VALVE.diaphragm_area, BENCH_VALVE.pressure_reference)
-        assert "dead band" not in identification_figure(record, endless, estimate).get_suptitle()
+        assert "dead band" not in title_of(identification_figure(record, endless, assessment))
 
 
 class TestSeveralCases:
-    def case(self, record, estimate, number):
-        later = Recording(1e-3, record.pressure, record.position, 100.0 + 30.0 * number)
-        return Case.of(f"case {number}", later, estimate)
+    def case(self, record, assessment, number):
+        later = Recording(0.01, record.pressure, record.position, 100.0 + 30.0 * number)
+        return Case.of(f"case {number}", later, assessment)
 
     @pytest.mark.parametrize("count", [2, len(COLOURS)])
-    def test_each_has_its_line_colour_and_name(self, record, estimate, count):
-        cases = [self.case(record, estimate, number) for number in range(count)]
+    def test_each_has_its_line_colour_and_name(self, record, assessment, count):
+        cases = [self.case(record, assessment, number) for number in range(count)]
         found = panels(friction_figure(cases, "verdict"))
         for name in ("pressure", "stem", "signature"):
-            assert [line.get_color() for line in found[name].lines] == list(COLOURS[:count])
+            drawn = [line.get_color() for line in found[name].lines if line.get_linestyle() == "-"]
+            assert drawn == list(COLOURS[:count])
         names = [text.get_text() for text in found["signature"].get_legend().get_texts()]
         assert names == [case.label for case in cases]
         assert len(found["coulomb"].texts) == count
 
-    def test_time_runs_from_the_first_record(self, record, estimate):
-        cases = [self.case(record, estimate, number) for number in (0, 1)]
-        first, second = panels(friction_figure(cases, "verdict"))["stem"].lines
-        assert first.get_xdata()[0] == 0.0
-        assert second.get_xdata()[0] == 30.0
+    def test_time_runs_from_the_first_record(self, record, assessment):
+        cases = [self.case(record, assessment, number) for number in (0, 1)]
+        lines = panels(friction_figure(cases, "verdict"))["stem"].lines
+        assert [line.get_xdata()[0] for line in lines] == [0.0, 0.0, 30.0, 30.0]
+        ends = [line.get_xdata()[-1] for line in lines[2:]]
+        assert ends == pytest.approx([30.0 + record.duration] * 2, rel=1e-12)
 
     def test_one_alone_needs_no_legend(self, figure):
         assert panels(figure)["signature"].get_legend() is None
 
     @pytest.mark.parametrize("count", [0, 1 + len(COLOURS)])
-    def test_none_or_too_many(self, record, estimate, count):
-        cases = [self.case(record, estimate, number) for number in range(count)]
+    def test_none_or_too_many(self, record, assessment, count):
+        cases = [self.case(record, assessment, number) for number in range(count)]
         with pytest.raises(ValueError, match=f"^one to 4 cases can be drawn, got {count}$"):
             friction_figure(cases, "verdict")
 
 
-def test_case_of_an_estimate(record, estimate):
-    case = Case.of("loose", record, estimate)
-    assert case.chosen_coulomb_friction == estimate.coulomb_friction
-    assert case.threshold == estimate.threshold
+def test_case_of_an_assessment(record, assessment):
+    case = Case.of("loose", record, assessment)
+    assert case.chosen_coulomb_friction == assessment.published.coulomb_friction
+    assert case.threshold == assessment.published.threshold
+    assert case.friction is assessment.parameters["coulomb_friction"]
+    assert case.simulated is assessment.refinement.simulated
     assert math.isclose(case.drive.pascals, 1e3)
 
 

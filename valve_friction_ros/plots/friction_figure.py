@@ -20,7 +20,7 @@ from valve_friction_ros.plots.panels import (
 
 __all__ = ["friction_figure", "identification_figure"]
 
-_VERDICT_WIDTH = 110
+_VERDICT_WIDTH = 95
 
 
 def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
