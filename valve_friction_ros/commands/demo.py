@@ -20,7 +20,7 @@ from valve_friction_ros.commands.bench_processes import (
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.commands.formatting import two_digits
+from valve_friction_ros.commands.formatting import OneLineParser, two_digits
 from valve_friction_ros.identification import (
     UNITS,
     AssessedParameter,
@@ -87,7 +87,7 @@ class _Outcome(NamedTuple):
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="demo",
         description="Start a simulated valve and its monitor as processes, identify the friction, "
         "tighten the packing while it runs, and identify again.",

@@ -1,6 +1,17 @@
-"""How numbers are written for people."""
+"""How commands speak: errors on one line, numbers without an exponent."""
 
-__all__ = ["two_digits"]
+import argparse
+from typing import NoReturn
+
+__all__ = ["OneLineParser", "two_digits"]
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A parser that tells an error on one line; the usage is behind ``--help``."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the error and end with exit code 2."""
+        self.exit(2, f"{self.prog}: {message}; see --help\n")
 
 
 def two_digits(value: float) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import two_digits
+from valve_friction_ros.commands.formatting import OneLineParser, two_digits
 from valve_friction_ros.commands.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.identification import (
     ASSESSED_UNITS,
@@ -37,7 +37,7 @@ _DIRECT_DRIVE = ValveFile(Valve(diaphragm_area=1.0), MappingProxyType({}))
 
 def _parser() -> argparse.ArgumentParser:
     defaults = IdentificationSettings()
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="identify_recording",
         description="Identify the Karnopp friction model from a recorded CSV file.",
         epilog="All values are in SI units. Exit code 2: the file or the record was refused.",
@@ -221,7 +221,7 @@ def _run(options: argparse.Namespace) -> tuple[Assessment, Valve]:
         order=options.order,
         fixed=_fixed(options.fix, description.known),
         position_bias=options.position_bias,
-        assumed_mass=description.known.get("mass", 0.0),
+        assumed_mass=description.known.get("mass", IdentificationSettings().assumed_mass),
     )
     if options.plot is not None:
         from valve_friction_ros import plots  # noqa: PLC0415 - slow to import

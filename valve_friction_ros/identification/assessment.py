@@ -45,7 +45,6 @@ ASSESSED_UNITS: Mapping[str, str] = MappingProxyType(
 """Unit of every parameter that an assessment can hold; those after `UNITS` only on demand."""
 
 _START_TIME = 0.02
-_LEAST_MASS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +144,7 @@ def assess(
     start_settings = replace(settings, window=window or fitting_window(recording, settings.order))
     if not has_spring:
         return _without_spring(recording, valve, start_settings, published, warnings)
-    mass = max(settings.fixed.get("mass", settings.assumed_mass), _LEAST_MASS)
+    mass = settings.fixed.get("mass", settings.assumed_mass)
     start_settings = replace(start_settings, fixed={**settings.fixed, "mass": mass})
     start = identify(recording, valve, start_settings)
     problem = OutputError(

@@ -142,5 +142,6 @@ def require_related_signals(recording: Recording) -> None:
     if step * _LEAST_SAMPLES_A_STROKE > span:
         raise RefusalError(
             f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
-            f"its range between two samples, {recording.sample_period:.3g} s apart; sample faster"
+            f"its range between two samples, {recording.sample_period:.3g} s apart; sample faster, "
+            "or look for a glitch of the stem sensor"
         )

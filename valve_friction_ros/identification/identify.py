@@ -156,6 +156,11 @@ def identify(
         static_friction = _static_friction(
             recording, valve, derivatives, settings, values, warnings
         )
+    elif static_friction < values["coulomb_friction"]:
+        warnings.append(
+            f"the fixed static_friction ({static_friction:.4g} N) lies below the identified "
+            f"coulomb_friction ({values['coulomb_friction']:.4g} N)"
+        )
     return Estimate(
         **values,
         static_friction=static_friction,

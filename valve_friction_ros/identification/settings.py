@@ -25,6 +25,7 @@ FIXABLE = (*REGRESSED, "static_friction", "limit_velocity")
 """Parameters that can be fixed at a known value instead of being identified."""
 
 _MAY_BE_NEGATIVE = ("spring_preload",)
+_POSITIVE = ("mass", "limit_velocity")
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class IdentificationSettings:
         Bias x̄ of (10), m. Given, the regression takes the paper's form of four columns, and the
         preload is F_0 = k·x̄; by default the preload is a regressor of its own.
     assumed_mass : float
-        Mass, kg, that is assumed where the record does not tell it.
+        Mass, kg, above zero, that is assumed where the record does not tell it.
 
     Raises
     ------
@@ -62,7 +63,7 @@ class IdentificationSettings:
     resolution: int = 350
     fixed: Mapping[str, float] = field(default_factory=dict)
     position_bias: float | None = None
-    assumed_mass: float = 0.0
+    assumed_mass: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -76,7 +77,7 @@ class IdentificationSettings:
             raise ValueError(
                 f"steps ({self.steps}) must be above zero and below resolution ({self.resolution})"
             )
-        require_non_negative("assumed_mass", self.assumed_mass)
+        require_positive("assumed_mass", self.assumed_mass)
         object.__setattr__(self, "fixed", MappingProxyType(self._checked_fixed()))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)
@@ -93,7 +94,7 @@ class IdentificationSettings:
                 )
             if name in _MAY_BE_NEGATIVE:
                 checked[name] = require_finite(name, value)
-            elif name == "limit_velocity":
+            elif name in _POSITIVE:
                 checked[name] = require_positive(name, value)
             else:
                 checked[name] = require_non_negative(name, value)

@@ -162,10 +162,14 @@ class FrictionMonitor:
         return self._baseline
 
     def diagnosis(self) -> Diagnosis:
-        """Judge the latest estimate; OK while there is none."""
+        """Judge the latest estimate, also after a refusal; OK while there is none."""
         if self._assessment is None:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
-        return diagnose(
+        verdict = diagnose(
             self._assessment, self._settings.valve, self._baseline, self._settings.limits
         )
+        if self._refusal is None:
+            return verdict
+        message = f"the latest identification was refused: {self._refusal}; before: "
+        return replace(verdict, message=message + verdict.message)

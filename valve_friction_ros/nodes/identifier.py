@@ -10,6 +10,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from sensor_msgs.msg import FluidPressure, JointState
@@ -158,7 +159,8 @@ class Identifier(Node):
             self._monitor.accept(assessment, self.get_clock().now().nanoseconds)
             self._publish_results(assessment)
             response.success = True
-            response.message = self._monitor.diagnosis().message
+            told = (*self._input_problems(), self._monitor.diagnosis().message)
+            response.message = "; ".join(told)
         finally:
             self._identifying = False
         self._publish_diagnostics()
@@ -188,6 +190,12 @@ class Identifier(Node):
         except RefusalError as refusal:
             response.message = str(refusal)
             return response
+        # The parameter shows the baseline in force; its new value stands for an exact baseline,
+        # so the one with its interval is taken again.
+        self.set_parameters(
+            [Parameter("baseline_coulomb_friction", value=baseline.coulomb_friction)]
+        )
+        baseline = self._monitor.set_baseline()
         response.success = True
         response.message = (
             f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
@@ -225,20 +233,19 @@ class Identifier(Node):
             publisher.publish(Float64(data=value))
         self._sweep_publisher.publish(sweep_message((published or assessment.start).sweep))
 
+    def _input_problems(self) -> list[str]:
+        timeout = self.get_parameter("input_timeout").value
+        watches = (self._pressure_watch, self._stem_watch)
+        return [problem for watch in watches if (problem := watch.problem(timeout)) is not None]
+
     def _publish_diagnostics(self) -> None:
         now = self.get_clock().now()
-        timeout = self.get_parameter("input_timeout").value
-        problems = [
-            problem
-            for watch in (self._pressure_watch, self._stem_watch)
-            if (problem := watch.problem(timeout)) is not None
-        ]
         status = friction_status(
             self._monitor,
             f"{self.get_fully_qualified_name()}: friction",
             self.get_parameter("valve_tag").value or self.get_namespace().strip("/"),
             now.nanoseconds,
-            problems,
+            self._input_problems(),
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()

@@ -47,7 +47,10 @@ CHANGEABLE = (
         "Bias x̄ of the position [m], for the paper's four-column form; .nan: identify the preload",
     ),
     ParameterSpec(
-        "assumed_mass", 0.0, "Mass assumed where a record does not tell it [kg]", (0.0, 1e6)
+        "assumed_mass",
+        _DEFAULTS.assumed_mass,
+        "Mass assumed where a record does not tell it [kg]",
+        (1e-6, 1e6),
     ),
     *(
         ParameterSpec(
