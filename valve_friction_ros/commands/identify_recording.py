@@ -86,6 +86,8 @@ def _fixed(entries: Sequence[str], known: Mapping[str, float]) -> dict[str, floa
     for entry in entries:
         name, separator, text = entry.partition("=")
         name = name.strip()
+        if name in fixed:
+            raise ValueError(f"--fix {name} is given twice")
         if separator:
             try:
                 fixed[name] = float(text)

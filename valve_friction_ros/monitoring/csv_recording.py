@@ -42,11 +42,16 @@ class CsvColumns:
     force: str = "force_n"
 
 
+def _is_gzipped(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(2) == b"\x1f\x8b"
+
+
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[IO[str]]:
     """Open a file, gzipped or not; what cannot be read to its end raises a ValueError."""
     try:
-        if path.suffix == ".gz":
+        if _is_gzipped(path):
             with gzip.open(path, "rt", encoding="utf-8-sig", newline="") as stream:
                 yield stream
         else:
@@ -112,7 +117,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     Parameters
     ----------
     path : Path
-        The file; gzipped if it ends in ``.gz``.
+        The file, gzipped or not; told by its first bytes.
     names : sequence of str
         Headers of the wanted columns; others are ignored.
 
@@ -213,7 +218,7 @@ def read_recording(path: Path, valve: Valve, columns: CsvColumns | None = None) 
     Parameters
     ----------
     path : Path
-        The file; gzipped if it ends in ``.gz``.
+        The file, gzipped or not; told by its first bytes.
     valve : Valve
         Turns force into pressure where the file holds a force; tells the sensor's range.
     columns : CsvColumns, optional
