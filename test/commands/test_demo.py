@@ -8,11 +8,19 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from valve_friction_ros.commands import demo
-from valve_friction_ros.identification import IdentificationSettings, identify
+from valve_friction_ros.commands.bench_client import BenchError
+from valve_friction_ros.identification import (
+    UNITS,
+    AssessedParameter,
+    IdentificationSettings,
+    Verdict,
+    assess,
+)
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION
 from valve_friction_ros.monitoring import Level
 from valve_friction_ros.plots import Case
@@ -26,21 +34,34 @@ ASKED = {
 }
 
 
+HALF_WIDTH = 0.01  # of the value
+
+
 @pytest.fixture(scope="module")
 def case(quick_record):
     settings = IdentificationSettings(position_bias=1.13e-3, fixed={"mass": 1.6})
-    return Case.of("loose", quick_record, identify(quick_record, BENCH_VALVE, settings))
+    return Case.of("loose", quick_record, assess(quick_record, BENCH_VALVE, settings))
+
+
+def refined(name, value, verdict=Verdict.IDENTIFIED, reason=""):
+    half_width = HALF_WIDTH * abs(value)
+    return AssessedParameter(name, value, half_width / 2, half_width, verdict, reason)
 
 
 @pytest.fixture
 def outcome(case):
-    """Function of relative errors by name: what was identified."""
+    """Function of relative errors of the published values by name: what was identified.
 
-    def build(label="loose", truth=LOW_FRICTION, **errors):
-        identified = {
+    `assessed` replaces parameters of the refined model, which is right but for them.
+    """
+
+    def build(label="loose", truth=LOW_FRICTION, assessed=(), **errors):
+        published = {
             name: getattr(truth, name) * (1 + errors.get(name, 0.0)) for name in demo._TOLERANCES
         }
-        return demo._Outcome(label, truth, identified, case)
+        right = {name: refined(name, getattr(truth, name)) for name in demo._TOLERANCES}
+        right |= {one.name: one for one in assessed}
+        return demo._Outcome(label, truth, published, right, case)
 
     return build
 
@@ -62,8 +83,26 @@ class TestMissed:
 
     def test_of_the_true_packing(self, outcome):
         """The loose packing's friction is no answer for the tight one."""
-        tight = outcome(truth=HIGH_FRICTION)._replace(identified=outcome().identified)
+        tight = outcome(truth=HIGH_FRICTION)._replace(published=outcome().published)
         assert set(tight.missed()) >= {"viscous_friction", "coulomb_friction", "static_friction"}
+
+    @pytest.mark.parametrize("name", demo._TOLERANCES)
+    @pytest.mark.parametrize("sign", [1, -1])
+    def test_an_interval_that_is_untrue(self, outcome, name, sign):
+        """An identified value may be off by three half widths, at 1 % of the value each."""
+
+        def off_by(half_widths):
+            value = getattr(LOW_FRICTION, name) / (1 - sign * half_widths * HALF_WIDTH)
+            return outcome(assessed=[refined(name, value)])
+
+        assert off_by(2.99).missed() == []
+        assert off_by(3.01).missed() == [name]
+
+    @pytest.mark.parametrize("verdict", [Verdict.WEAK, Verdict.NOT_IDENTIFIABLE, Verdict.FIXED])
+    def test_only_identified_values_are_promised(self, outcome, verdict):
+        value = math.nan if verdict is Verdict.NOT_IDENTIFIABLE else 1.5
+        assert outcome(assessed=[refined("mass", value, verdict)]).missed() == []
+        assert outcome(assessed=[refined("mass", 1.1)]).missed() == ["mass"]
 
 
 class TestReport:
@@ -87,8 +126,20 @@ class TestReport:
         code, words = report([outcome(coulomb_friction=5e-4), outcome("tight")], Level.ERROR)
         assert code == 0
         assert "/diagnostics ERROR: excess friction" in words
-        assert re.search(r"coulomb_friction +N +152\.7 +152\.776 +\+0\.0500 % +±0\.1 %", words)
+        row = r"coulomb_friction +N +152\.7 +152\.776 +\+0\.050 % +152\.7 +1\.5 +identified"
+        assert re.search(row, words)
         assert "outside" not in words
+
+    def test_a_number_without_a_verdict_is_never_shown(self, report, outcome):
+        withheld = refined("static_friction", math.nan, Verdict.NOT_IDENTIFIABLE, "no slip jump")
+        given = AssessedParameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED)
+        _, words = report([outcome(assessed=[withheld, given])], Level.ERROR)
+        row = r"static_friction +N +152\.7 +152\.7 +\+0\.000 % +– +not identifiable *$"
+        assert re.search(row, words, re.MULTILINE)
+        assert re.search(
+            r"mass +kg +1\.542 +1\.542 +\+0\.000 % +1\.6 +fixed *$", words, re.MULTILINE
+        )
+        assert "nan" not in words
 
     def test_a_missed_tolerance(self, report, outcome):
         code, words = report([outcome(), outcome("tight", mass=-0.2)], Level.ERROR)
@@ -100,6 +151,75 @@ class TestReport:
         assert code == 1
         assert "/diagnostics WARN: excess friction" in words
         assert "the excess friction was not diagnosed" in words
+
+
+class FakeClient:
+    """A bench whose identifier has answered; `diagnostic_values` is a new object every time."""
+
+    def __init__(self, recording, values):
+        self._recording = recording
+        self._values = values
+
+    @property
+    def diagnostic_values(self):
+        return dict(self._values)
+
+    def recording(self):
+        return self._recording
+
+    def trigger(self, service):
+        assert service == "identify"
+
+    def wait(self, done, _timeout, what):
+        assert done(), what
+
+    def sweep_columns(self):
+        column = np.array([0.001, 0.002])
+        return dict.fromkeys(("threshold", "coulomb_friction", "sigma"), column)
+
+
+class TestIdentify:
+    """What is read from the diagnostic of the identifier."""
+
+    @pytest.fixture
+    def values(self):
+        diagnostic = {
+            "estimate_valid": "true",
+            "estimate_age [s]": "0.100",
+            "threshold [m/s]": "0.002",
+            "warnings": "check the clocks",
+        }
+        for name in demo._TOLERANCES:
+            diagnostic |= {
+                f"{name} [{UNITS[name]}]": "3.5",
+                f"{name} half width [{UNITS[name]}]": "0.25",
+                f"{name} verdict": "weak",
+                f"{name} reason": "2 strokes only",
+                f"{name} published [{UNITS[name]}]": "3.0",
+            }
+        return diagnostic | {
+            "mass [kg]": "nan",
+            "mass half width [kg]": "nan",
+            "mass verdict": "not identifiable",
+        }
+
+    def test_both_estimates_with_the_verdicts(self, quick_record, values):
+        client = FakeClient(quick_record, values)
+        found = demo._identify(client, "loose", LOW_FRICTION)
+        assert found.published == dict.fromkeys(demo._TOLERANCES, 3.0)
+        friction = found.refined["coulomb_friction"]
+        assert (friction.value, friction.half_width) == (3.5, 0.25)
+        assert (friction.verdict, friction.reason) == (Verdict.WEAK, "2 strokes only")
+        assert found.refined["mass"].verdict is Verdict.NOT_IDENTIFIABLE
+        assert math.isnan(found.refined["mass"].value)
+        assert found.case.friction == friction
+        assert found.case.threshold == 0.002
+
+    def test_no_published_estimate_is_a_failure_with_its_reason(self, quick_record, values):
+        withheld = {name: value for name, value in values.items() if "published" not in name}
+        del withheld["threshold [m/s]"]
+        with pytest.raises(BenchError, match=r"^no published estimate: check the clocks$"):
+            demo._identify(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
 
 
 class TestOptions:
@@ -156,7 +276,18 @@ def test_the_whole_story(ros_environment, tmp_path):
     assert "Traceback" not in done.stderr
     words = " ".join(done.stdout.split())
     assert words.index("the packing is tightened while the valve runs") > words.index("identified;")
-    assert "packing tight coulomb_friction N 606 " in words
-    assert "/diagnostics ERROR: excess friction: coulomb friction is 3.97 times its bas" in words
+    loose, tight = re.findall(
+        r"coulomb_friction N (\S+) (\S+) [+-]\S+ % (\S+) (\S+) identified", words
+    )
+    assert [loose[0], tight[0]] == ["152.7", "606"]
+    for true, published, refined_value, half_width in (loose, tight):
+        assert float(published) == pytest.approx(float(true), rel=1e-3)
+        assert abs(float(refined_value) - float(true)) <= 3 * float(half_width)
+    assert len(re.findall(r"static_friction N \S+ \S+ \S+ % – not identifiable", words)) == 2
+    assert re.search(
+        r"/diagnostics ERROR: excess friction: coulomb friction is 3\.97 \(3\.9\d to 3\.9\d\) "
+        "times its baseline; the stem ignores reversals smaller than 21 % of its travel",
+        words,
+    )
     assert "outside the tolerance" not in words
     assert output.read_bytes().startswith(PNG)

@@ -139,6 +139,8 @@ def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Out
         "diagnostic of the estimate",
     )
     values = client.diagnostic_values
+    if "threshold [m/s]" not in values:
+        raise BenchError(f"no published estimate: {values['warnings']}")
     sweep = client.sweep_columns()
     published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in _TOLERANCES}
     refined = {name: _refined(name, values) for name in _TOLERANCES}
@@ -184,7 +186,7 @@ def _table(outcome: _Outcome) -> Table:
             f"{outcome.published[name]:.6g}",
             f"{100 * error:+.3f} %",
             f"{refined.value:.6g}" if told else "–",
-            two_digits(refined.half_width) if told else "",
+            two_digits(refined.half_width) if refined.half_width > 0 else "",
             refined.verdict.value,
             style="red" if name in outcome.missed() else None,
         )

@@ -186,7 +186,7 @@ def _print_table(assessment: Assessment, valve: Valve) -> None:
             parameter.verdict.value,
             "" if math.isnan(published) else f"{published:.6g}",
         )
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     console.print(table)
     console.print()
     for parameter in assessment.parameters.values():
