@@ -1,5 +1,6 @@
 """Excess and collapsed friction against a baseline, on /diagnostics."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -96,3 +97,36 @@ def test_baseline_is_a_parameter(live):
     assert live.client.set_together(NODE, {"baseline_coulomb_friction": 600.0}).successful
     values = live.client.status_values(lambda status: status.level == OK, "OK")
     assert float(values["coulomb_friction_ratio"]) == pytest.approx(1.01, rel=1e-3)
+
+
+def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):
+    live.start_identifier({"input_timeout": 600.0})
+    client = live.client
+    client.identified(quick_record())
+    assert client.trigger("set_baseline").success
+    (shown,) = client.parameters(NODE, "baseline_coulomb_friction")
+    told = float(client.last_values()["baseline_coulomb_friction [N]"])
+    assert shown == pytest.approx(told, rel=1e-8)
+    assert float(client.last_values()["baseline half width [N]"]) > 0
+
+    assert client.set_together(NODE, {"baseline_coulomb_friction": 100.0}).successful
+    values = client.status_values(
+        lambda status: values_of(status)["baseline_coulomb_friction [N]"] == "100", "100 N"
+    )
+    assert values["baseline half width [N]"] == "0"
+    assert client.set_together(NODE, {"baseline_coulomb_friction": math.nan}).successful
+    client.next_status(
+        lambda status: "baseline_coulomb_friction [N]" not in values_of(status), "no baseline"
+    )
+
+
+def test_refusal_keeps_the_verdict_and_says_so(live):
+    live.start_identifier({"baseline_coulomb_friction": 300.0, "input_timeout": 600.0})
+    client = live.client
+    client.identified(quick_record(HIGH_FRICTION))
+    assert client.trigger("clear").success
+    assert not client.trigger("identify").success
+    status = client.next_status(lambda s: values_of(s)["estimate_valid"] == "false", "a refusal")
+    assert status.level == ERROR
+    assert "the latest identification was refused: " in status.message
+    assert "before: excess friction" in status.message

@@ -29,6 +29,9 @@ _SLIP_BIAS = 0.2
 _STRIBECK_SHARES = (0.5, 0.7)
 """Starts for the Stribeck velocity, as shares of the top speed."""
 
+_PROMISING = 0.9
+"""Share of the rms to which a falling curve must come at first sight to be looked at further."""
+
 _OFFSETS = (-2.0, -1.0, -0.5, -0.2, -0.1, 0.1, 0.2, 0.5, 1.0, 2.0)
 """Starts for the clock offset, s."""
 
@@ -220,6 +223,10 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
         )
         for share in _STRIBECK_SHARES
     ]
-    falling = refine(problem, _nearest(problem, fitted)[0], names)
+    nearest = _nearest(problem, fitted)[0]
+    distance = float(np.sqrt(np.mean(problem.residual(nearest, problem.record.pressure) ** 2)))
+    if distance > _PROMISING * best.rms:
+        return best
+    falling = refine(problem, nearest, names)
     improved = misfit_of(falling).systematic < _IMPROVEMENT * before.systematic
     return falling if improved else best
