@@ -154,7 +154,7 @@ class TestReport:
 
 
 class FakeClient:
-    """A bench whose identifier has answered; `diagnostic_values` is a new object every time."""
+    """A bench whose identifier has answered."""
 
     def __init__(self, recording, values):
         self._recording = recording
@@ -162,7 +162,7 @@ class FakeClient:
 
     @property
     def diagnostic_values(self):
-        return dict(self._values)
+        return self._values
 
     def recording(self):
         return self._recording
@@ -214,6 +214,25 @@ class TestIdentify:
         assert math.isnan(found.refined["mass"].value)
         assert found.case.friction == friction
         assert found.case.threshold == 0.002
+
+    def test_a_friction_that_is_not_identifiable_is_an_outcome_too(self, quick_record, values):
+        """It is judged with the rest, not waited for."""
+        unknown = {
+            "estimate_valid": "false",
+            "coulomb_friction [N]": "nan",
+            "coulomb_friction half width [N]": "nan",
+            "coulomb_friction verdict": "not identifiable",
+        }
+        found = demo._identify(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
+        assert found.refined["coulomb_friction"].verdict is Verdict.NOT_IDENTIFIABLE
+        assert found.published["coulomb_friction"] == 3.0
+
+    @pytest.mark.parametrize("age", [None, "2.5"])
+    def test_an_older_estimate_is_not_the_one_asked_for(self, quick_record, values, age):
+        old = {name: value for name, value in values.items() if name != "estimate_age [s]"}
+        old |= {} if age is None else {"estimate_age [s]": age}
+        with pytest.raises(AssertionError, match="diagnostic of the estimate"):
+            demo._identify(FakeClient(quick_record, old), "loose", LOW_FRICTION)
 
     def test_no_published_estimate_is_a_failure_with_its_reason(self, quick_record, values):
         withheld = {name: value for name, value in values.items() if "published" not in name}

@@ -8,6 +8,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -52,6 +53,7 @@ class BenchClient(Node):
         self._sweep: Float64MultiArray | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
+        self._triggers: dict[str, Client] = {}
         self.create_subscription(FluidPressure, "actuator_pressure", self._on_pressure, stream())
         self.create_subscription(JointState, "stem_state", self._on_stem, stream())
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
@@ -124,10 +126,13 @@ class BenchClient(Node):
 
     def trigger(self, service: str, timeout: float = 30.0) -> str:
         """Call a Trigger service of the identifier and return its message."""
-        client = self.create_client(Trigger, f"{self._identifier}/{service}")
+        # Kept for the next call: a node answers a client that it has not met yet in vain.
+        if service not in self._triggers:
+            name = f"{self._identifier}/{service}"
+            self._triggers[service] = self.create_client(Trigger, name)
+        client = self._triggers[service]
         self.wait(client.service_is_ready, timeout, f"service {service}")
         response = self._result(client.call_async(Trigger.Request()), timeout, service)
-        self.destroy_client(client)
         if not response.success:
             raise BenchError(f"{service}: {response.message}")
         return str(response.message)

@@ -56,6 +56,8 @@ _INTERVALS = 3.0
 _START_TIMEOUT = 30.0
 _UNDER_WAY = 2.0
 """Signal let pass after a change, s: samples still under way belong to the time before it."""
+_NEWEST = 2.0
+"""Age, s, up to which a diagnosed estimate is the one just asked for."""
 _FRICTION = ("mass", "viscous_friction", "coulomb_friction", "static_friction")
 
 
@@ -128,14 +130,9 @@ def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Out
     """Identify the record on the running node and read the result from its topics."""
     recording = client.recording()
     client.trigger("identify")
-    values = client.diagnostic_values
     client.wait(
-        lambda: (
-            client.diagnostic_values.get("estimate_valid") == "true"
-            and client.diagnostic_values is not values
-            and float(client.diagnostic_values["estimate_age [s]"]) < 2.0
-        ),
-        5.0,
+        lambda: float(client.diagnostic_values.get("estimate_age [s]", "inf")) < _NEWEST,
+        _START_TIMEOUT,
         "diagnostic of the estimate",
     )
     values = client.diagnostic_values
