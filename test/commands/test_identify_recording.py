@@ -749,6 +749,8 @@ class TestBadOptions:
                 ["--fix", "weight=1"],
                 "'weight' is not a parameter that can be fixed; choose from mass",
             ),
+            (["--fix", "mass=1", "--fix", " mass =2"], "--fix mass is given twice"),
+            (["--fix", "mass", "--fix", "mass"], "--fix mass is given twice"),
             (["--fix", "mass=-1"], "mass must be above zero, got -1"),
             (["--fix", "mass=nan"], "mass must be finite, got nan"),
             (["--window", "30"], "window must be odd and at least order + 2 = 5, got 30"),

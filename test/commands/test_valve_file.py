@@ -65,6 +65,8 @@ BROKEN = [
     ("diaphragm_area 0.0445", "expected lines such as 'diaphragm_area: 0.0445'"),
     ("diaphragm_area: [0.0445", "not YAML: while parsing a flow sequence"),
     ("diaphragm_area: 1.0\n\ttravel: 1.0", "not YAML: while scanning"),
+    ("diaphragm_area: 1.0\ntravel: 0.02\ntravel: 0.03", "not YAML: travel is given twice in "),
+    ("diaphragm_area: 1.0\n? [travel]\n: 1.0", "not YAML: while constructing a mapping"),
     ("diaphragm_area: 1.0\nmas: 1.0", "unknown key 'mas'; did you mean 'mass'?"),
     ("diaphragm_area: 1.0\n17: 1.0", "unknown key 17; known are diaphragm_area, pressure_ref"),
     ("diaphragm_area: 0.0", "diaphragm_area must be above zero, got 0"),

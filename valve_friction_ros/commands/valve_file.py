@@ -40,7 +40,8 @@ class _StrictLoader(yaml.SafeLoader):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Build a mapping of keys that differ."""
         seen = set()
-        for key, _ in node.value:
+        keys = (key for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+        for key in keys:
             if key.value in seen:
                 raise yaml.MarkedYAMLError(
                     problem=f"{key.value} is given twice", problem_mark=key.start_mark
