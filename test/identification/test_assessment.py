@@ -1,0 +1,153 @@
+"""What the assessment must reach: a quick slice of the benchmark, with its bounds."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmark.bounds import case_bounds
+from benchmark.cases import Case
+from benchmark.emps import RECORD, emps_bounds
+from benchmark.runs import SETTINGS, run
+from valve_friction_ros.identification import (
+    UNITS,
+    IdentificationSettings,
+    Verdict,
+    assess,
+    identify,
+)
+from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
+
+CASES = [
+    *(Case(plant, "square", "28.6 µm", "1 kHz") for plant in ("low", "high", "graphite")),
+    *(Case(plant, "square", "60 µm", "1 kHz") for plant in ("high", "graphite")),
+    *(Case(plant, "square", "28.6 µm", "100 Hz") for plant in ("low", "high", "graphite")),
+    Case("high", "sine", "28.6 µm", "100 Hz"),
+    Case("high", "in service", "28.6 µm", "100 Hz"),
+    Case("low", "in service", "28.6 µm", "100 Hz"),
+]
+
+
+def title(case):
+    return f"{case.plant_name}-{case.excitation}-{case.noise}-{case.condition}"
+
+
+@pytest.mark.parametrize("case", CASES, ids=title)
+def test_bounds_of_the_benchmark(case):
+    bounds = case_bounds([run(case, seed) for seed in range(3)])
+    assert len(bounds) >= 3 if case.condition == "100 Hz" else len(bounds) >= 2
+    missed = [f"{bound.what}: {bound.reached}" for bound in bounds if not bound.met]
+    assert not missed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [Case("stribeck", "square", "28.6 µm", "100 Hz")], ids=title)
+def test_bounds_beyond_karnopp(case):
+    missed = [bound for bound in case_bounds([run(case, 0)]) if not bound.met]
+    assert not missed
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return Case("high", "square", "28.6 µm", "1 kHz").record(0)
+
+
+@pytest.fixture(scope="module")
+def found(noisy):
+    return assess(noisy, BENCH_VALVE, SETTINGS)
+
+
+def test_every_parameter_has_a_verdict(found):
+    assert list(found.parameters)[: len(UNITS)] == list(UNITS)
+    for name, one in found.parameters.items():
+        assert one.name == name
+        assert isinstance(one.verdict, Verdict)
+        assert math.isnan(one.value) == (one.verdict is Verdict.NOT_IDENTIFIABLE)
+        assert bool(one.reason) == (one.verdict is not Verdict.IDENTIFIED)
+
+
+def test_published_estimate_beside_it_is_the_published_method(found, noisy):
+    plain = identify(noisy, BENCH_VALVE, SETTINGS)
+    assert found.published.values == plain.values
+    assert found.published.settings.window == 31
+    assert found.start.settings.window > 31  # as the noise asks for
+
+
+def test_model_reproduces_the_record_to_its_noise(found):
+    record = found.refinement.problem.record
+    assert found.misfit.rms == pytest.approx(record.noise, rel=0.2)
+    assert found.misfit.fit > 0.998
+    model = found.model()
+    assert model.coulomb_friction == found.values["coulomb_friction"]
+    assert model.spring_constant == found.values["spring_constant"]
+
+
+def test_same_record_same_answer(found, noisy):
+    again = assess(noisy, BENCH_VALVE, SETTINGS)
+    np.testing.assert_equal(again.values, found.values)
+
+
+class TestMass:
+    @pytest.mark.parametrize("plant", ["low", "high", "graphite"])
+    def test_refused_on_noisy_records_and_taken_as_assumed(self, plant):
+        case = Case(plant, "square", "10 µm", "1 kHz")
+        found = assess(case.record(0), case.plant.valve, SETTINGS)
+        mass = found.parameters["mass"]
+        assert mass.verdict is Verdict.NOT_IDENTIFIABLE
+        assert mass.reason.endswith("1.6 kg assumed")
+        assert found.model().mass == 1.6
+
+    def test_fixed_is_fixed(self, noisy):
+        found = assess(noisy, BENCH_VALVE, IdentificationSettings(fixed={"mass": 2.0}))
+        mass = found.parameters["mass"]
+        assert (mass.verdict, mass.value) == (Verdict.FIXED, 2.0)
+        assert found.model().mass == 2.0
+
+    @pytest.mark.xfail(reason="the test for the mass does not see it beside a spring")
+    def test_recovered_where_it_is_in_the_data(self):
+        """150 kg, thrown about on a soft spring."""
+        from valve_friction_ros.model import KarnoppParameters, simulate
+
+        time = 1e-3 * np.arange(20_000)
+        valve = Valve(0.01)
+        truth = KarnoppParameters(150.0, 800.0, 60.0, 60.0, 4000.0)
+        force = 200 * np.sin(2 * np.pi * 0.2 * time) + 250 * np.sin(2 * np.pi * 0.5 * time)
+        pressure = (force + 400) / valve.diaphragm_area
+        noise = np.random.default_rng(0).standard_normal((2, time.size))
+        position = simulate(valve, truth, pressure, 1e-3).position + 5e-6 * noise[0]
+        found = assess(Recording(1e-3, pressure + 10 * noise[1], position), valve)
+        mass = found.parameters["mass"]
+        assert mass.verdict is Verdict.IDENTIFIED
+        assert mass.value == pytest.approx(150.0, rel=0.02)
+
+
+class TestRealMachine:
+    @pytest.fixture(scope="class")
+    def bounds(self):
+        if not RECORD.is_file():
+            pytest.skip("the benchmark record is not the project's to distribute; it is not here")
+        return {bound.what.split()[1]: bound for bound in emps_bounds()}
+
+    @pytest.mark.parametrize(
+        "name", ["mass", "viscous_friction", "coulomb_friction", "spring_preload"]
+    )
+    def test_published_value(self, bounds, name):
+        assert bounds[name].met, bounds[name].reached
+
+    def test_verdicts(self):
+        if not RECORD.is_file():
+            pytest.skip("the benchmark record is not the project's to distribute; it is not here")
+        time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
+        settings = IdentificationSettings(fixed={"spring_constant": 0.0})
+        record = Recording(float(np.median(np.diff(time))), force, position)
+        found = assess(record, Valve(1.0), settings)
+        verdicts = {name: one.verdict for name, one in found.parameters.items()}
+        assert verdicts["mass"] is Verdict.IDENTIFIED
+        shown = {Verdict.IDENTIFIED, Verdict.WEAK}
+        assert verdicts["viscous_friction"] in shown
+        assert verdicts["coulomb_friction"] in shown
+        assert verdicts["static_friction"] is Verdict.NOT_IDENTIFIABLE
+        assert verdicts["spring_constant"] is Verdict.FIXED
+        assert found.misfit is None
+        assert found.refinement is None
+        assert found.force_fit > 0.9
