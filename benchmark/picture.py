@@ -67,7 +67,7 @@ def _draw_errors(axes: Axes, outcomes: Sequence[Outcome]) -> None:
             axes.plot(len(labels) + spread, errors, ".", color=_COLOURS["28.6 µm"], ms=3)
             labels.append(f"{case.plant_name}\n{_SYMBOLS[name]}\n±{limit:g} %")
     axes.axhspan(-1, 1, color="0.92", zorder=0)
-    axes.set_xticks(range(len(labels)), labels, fontsize=8)
+    axes.set_xticks(range(len(labels)), labels, fontsize=7)
     axes.set_ylabel("error over what is allowed [1]")
     axes.set_title("square wave, 28.6 µm / 165 Pa, 1 kHz: every record (grey: allowed)")
 
@@ -86,7 +86,7 @@ def _draw_coverage(axes: Axes, outcomes: Sequence[Outcome]) -> None:
             labels.append(f"{case.plant_name}\n{symbol}")
     axes.axhspan(100 * COVERAGE[0], 100 * COVERAGE[1], color="0.92", zorder=0)
     axes.set_ylim(top=101)
-    axes.set_xticks(range(len(labels)), labels, fontsize=8)
+    axes.set_xticks(range(len(labels)), labels, fontsize=7)
     axes.set_ylabel("records whose 95 % interval holds the truth [%]")
     axes.set_title("coverage of the intervals (grey: required; bars: ± 1 standard error)")
 
