@@ -103,7 +103,6 @@ class TestMass:
         assert (mass.verdict, mass.value) == (Verdict.FIXED, 2.0)
         assert found.model().mass == 2.0
 
-    @pytest.mark.xfail(reason="the test for the mass does not see it beside a spring")
     def test_recovered_where_it_is_in_the_data(self):
         """150 kg, thrown about on a soft spring."""
         from valve_friction_ros.model import KarnoppParameters, simulate

@@ -20,7 +20,7 @@ _CORNER_TIME = 0.04
 _CORNER_SAMPLES = 8
 """Time and samples over which the slopes on both sides of a corner are compared, at least."""
 
-_LONGEST_SMOOTHING = 1.0
+_LONGEST_SMOOTHING = 0.5
 _SAMPLES_A_WINDOW = 32
 _LONGEST_PERIOD = 5e-3
 """Longest sample period to thin out to, s: within it a corner of the pressure may lie."""

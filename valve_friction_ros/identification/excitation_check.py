@@ -22,7 +22,9 @@ _LEAST_SHARE_OF_DIRECTION = 0.02
 _LEAST_TRAVEL = 0.01
 _MOST_AT_A_STOP = 0.5
 _OUTSIDE = 0.05
-_LEAST_CORRELATION = 0.5
+_LEAST_FOLLOWED = 0.5
+_FOLLOWED_BLOCK = 0.1
+_MOVING_SHARE = 0.05
 _LEAST_SAMPLES_A_STROKE = 10
 
 
@@ -121,21 +123,50 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
             )
 
 
+def _followed(recording: Recording) -> tuple[float, float]:
+    """Fit the pressure of the moving stem by its position and the way it moves.
+
+    While the stem moves, pressure follows position, shifted up or down by the friction; while it
+    rests, pressure may do anything within the dead band, so rests are left out.
+
+    Returns
+    -------
+    slope, share : float
+        Pressure over position, Pa/m, and the share of the variance that is explained.
+    """
+    length = max(round(_FOLLOWED_BLOCK / recording.sample_period), 1)
+    blocks = len(recording) // length
+    position, pressure = (
+        signal[: blocks * length].reshape(blocks, length).mean(axis=1)
+        for signal in (recording.position, recording.pressure)
+    )
+    moves = np.diff(position)
+    moving = np.abs(moves) > _MOVING_SHARE * np.abs(moves).max()
+    place, target = (0.5 * (one[1:] + one[:-1])[moving] for one in (position, pressure))
+    columns = np.column_stack([place - place.mean(), np.sign(moves[moving]), np.ones(place.size)])
+    fitted, *_ = np.linalg.lstsq(columns, target, rcond=None)
+    left = target - columns @ fitted
+    total = float(np.sum((target - target.mean()) ** 2))
+    share = 1 - float(left @ left) / total if total > 0 else 0.0
+    return float(fitted[0]), share
+
+
 def require_related_signals(recording: Recording) -> None:
     """Refuse pressure and stem that do not move together, or move too fast for the sampling."""
     pressure, position = recording.pressure, recording.position
     if np.ptp(pressure) == 0:
         raise RefusalError("the pressure did not change: excite the valve, or check its sensor")
-    correlation = float(np.corrcoef(pressure, position)[0, 1])
-    if correlation < -_LEAST_CORRELATION:
+    slope, share = _followed(recording)
+    if share < _LEAST_FOLLOWED:
         raise RefusalError(
-            f"the stem moves against the pressure (correlation {correlation:.2f}): count the "
-            "position in the direction in which pressure pushes the stem"
+            "pressure and stem do not move together (place and way of the moving stem explain "
+            f"{100 * share:.0f} % of the pressure): check for the wrong valve, a dead sensor, "
+            "swapped signals or clocks far apart"
         )
-    if correlation < _LEAST_CORRELATION:
+    if slope < 0:
         raise RefusalError(
-            f"pressure and stem do not move together (correlation {correlation:.2f}): check for "
-            "the wrong valve, a dead sensor, swapped signals or clocks far apart"
+            "the stem moves against the pressure: count the position in the direction in which "
+            "pressure pushes the stem"
         )
     step = float(np.max(np.abs(np.diff(position))))
     span = float(np.ptp(position))

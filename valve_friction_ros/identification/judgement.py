@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.estimate import UNITS, Estimate
 from valve_friction_ros.identification.model_honesty import Misfit
 from valve_friction_ros.identification.output_error import OFFSET, SLIP, START
-from valve_friction_ros.identification.refinement import Refinement
+from valve_friction_ros.identification.refinement import Refinement, estimating_equation
 from valve_friction_ros.identification.regression_uncertainty import RegressionUncertainty
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.uncertainty import (
@@ -47,12 +47,14 @@ def judge_refinement(
     """Judge every parameter of a refined model.
 
     The half width of an interval is the t-quantile of the scatter between strokes, and, where
-    the misfit is more than noise, what it can have done at the worst (`worst_case`).
+    the misfit is more than noise, what it can have done at the worst (`worst_case`), and, where
+    a mass is assumed, what an error of the mass by its own size would do.
     """
     stroke = stroke_length(refinement.simulated)
     covariance, freedom = block_covariance(*refinement.equation, stroke)
     samples = refinement.simulated.size
     systematic = worst_case(refinement.equation.curvature, samples, misfit.excess)
+    by_mass = _shift_by_assumed_mass(refinement, settings)
     values = {
         **vars(refinement.problem.model(refinement.coordinates)),
         OFFSET: refinement.coordinates[OFFSET],
@@ -75,7 +77,8 @@ def judge_refinement(
         else:
             error = _root(float(gradient @ covariance @ gradient))
             bound = _root(float(gradient @ systematic @ gradient))
-            width = max(half_width(error, freedom) + bound, _FINEST * abs(values[name]))
+            lean = abs(float(gradient @ by_mass))
+            width = max(half_width(error, freedom) + bound + lean, _FINEST * abs(values[name]))
             reason = few or (doubt if name in _FRICTION else "")
             judgements[name] = judged(name, values[name], error, width, reason)
     return judgements
@@ -101,6 +104,21 @@ def judge_regression(
             width = max(half_width(error, freedom), _FINEST * abs(value))
             judgements[name] = judged(name, value, error, width, few)
     return judgements
+
+
+def _shift_by_assumed_mass(
+    refinement: Refinement, settings: IdentificationSettings
+) -> NDArray[np.float64]:
+    """Change of the free coordinates with an assumed mass that is wrong by its own size."""
+    if "mass" in settings.fixed or "mass" in refinement.names:
+        return np.zeros(len(refinement.names))
+    at = refinement.coordinates
+    units = refinement.problem.units((*refinement.names, "mass"), at)
+    curvature = estimating_equation(refinement.problem, at, units).curvature
+    own, cross = curvature[:-1, :-1], curvature[:-1, -1]
+    step = np.linalg.lstsq(own, cross, rcond=1e-14)[0]
+    sizes = np.array([*units.values()])[:-1]
+    return np.asarray(step * sizes * (at["mass"] / units["mass"]), dtype=np.float64)
 
 
 def _root(variance: float) -> float:

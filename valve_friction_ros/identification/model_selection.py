@@ -15,7 +15,9 @@ from valve_friction_ros.identification.refinement import (
 )
 from valve_friction_ros.identification.uncertainty import block_covariance, stroke_length
 
-__all__ = ["SIGNIFICANCE", "demanded", "deviation", "one_step", "with_demanded"]
+__all__ = ["SIGNIFICANCE", "deviation", "one_step", "suspected", "with_demanded"]
+
+_SUSPICION = 1.5
 
 SIGNIFICANCE = 4.0
 """Standard errors by which a part of the model must differ from nothing to be estimated."""
@@ -28,6 +30,9 @@ _SLIP_BIAS = 0.2
 
 _STRIBECK_SHARES = (0.5, 0.7)
 """Starts for the Stribeck velocity, as shares of the top speed."""
+
+_NEUTRAL = frozenset({SLIP, OFFSET, "coulomb_asymmetry", "viscous_asymmetry"})
+"""Parts of the model that are absent at zero."""
 
 _PROMISING = 0.9
 """Share of the rms to which a falling curve must come at first sight to be looked at further."""
@@ -77,15 +82,19 @@ def one_step(refinement: Refinement, name: str) -> tuple[float, float]:
     return at[name] + float(step[-1]) * units[name], error * units[name]
 
 
-def demanded(refinement: Refinement, candidates: Sequence[str]) -> tuple[str, float] | None:
-    """Return the candidate that the residual asks for most, and its value, if it does at all."""
-    best, largest = None, SIGNIFICANCE
+def suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, float]:
+    """Return the candidates that the residual asks for, and the values it asks for.
+
+    The misfit that a missing part leaves counts as scatter here and hides some of it, so a
+    suspicion is enough; whether the part is there is judged when it has been refined.
+    """
+    suspects = {}
     for name in candidates:
         value, error = one_step(refinement, name)
         change = abs(value - refinement.coordinates[name])
-        if error > 0 and change > largest * error and change > _least(refinement, name):
-            best, largest = (name, value), change / error
-    return best
+        if error > 0 and change > _SUSPICION * error and change > _least(refinement, name):
+            suspects[name] = value
+    return suspects
 
 
 def with_demanded(
@@ -119,24 +128,46 @@ def with_demanded(
     if SLIP in candidates:
         refinement = _with_slip(refinement, start)
     left = [name for name in candidates if name != SLIP and name not in refinement.names]
-    while left and (found := demanded(refinement, left)):
-        name, value = found
-        left.remove(name)
-        at = {**refinement.coordinates, name: _moderate(name, value)}
-        trial = refine(problem, at, (*refinement.names, name))
-        if _is_nearer(trial, refinement):
-            refinement = _without_needless_slip(trial)
+    while trials := _sure_trials(refinement, left):
+        refinement = min(trials, key=lambda trial: trial.rms)
+        left = [name for name in left if name not in refinement.names]
     return refinement
 
 
-def _without_needless_slip(refinement: Refinement) -> Refinement:
-    """Drop a slip jump that another part of the model has made needless."""
-    if SLIP not in refinement.names or "stribeck_velocity" in refinement.names:
+def _sure_trials(refinement: Refinement, candidates: Sequence[str]) -> list[Refinement]:
+    """Refine with each suspected candidate in turn; return those in which it surely is there."""
+    sure = []
+    for name, value in suspected(refinement, candidates).items():
+        at = {**refinement.coordinates, name: _moderate(name, value)}
+        trial = _pruned(refine(refinement.problem, at, (*refinement.names, name)), name)
+        if _is_nearer(trial, refinement) and _is_sure(trial, name, refinement.coordinates[name]):
+            sure.append(trial)
+    return sure
+
+
+def _is_sure(trial: Refinement, name: str, before: float) -> bool:
+    """Tell whether a refined coordinate has surely and noticeably left its former value."""
+    value = trial.coordinates[name]
+    change = abs(value - before)
+    error = abs(value / deviation(trial, name)) if deviation(trial, name) else math.inf
+    return change > SIGNIFICANCE * error and change > _least(trial, name)
+
+
+def _pruned(refinement: Refinement, newest: str) -> Refinement:
+    """Drop what the newest part of the model has made needless."""
+    if "stribeck_velocity" in refinement.names:
         return refinement
-    if _is_slip(refinement):
-        return refinement
-    names = tuple(name for name in refinement.names if name != SLIP)
-    return refine(refinement.problem, {**refinement.coordinates, SLIP: 0.0}, names)
+    for name in refinement.names:
+        if name not in _NEUTRAL or name == newest or _stays(refinement, name):
+            continue
+        names = tuple(one for one in refinement.names if one != name)
+        rest = refine(refinement.problem, {**refinement.coordinates, name: 0.0}, names)
+        return _pruned(rest, newest)
+    return refinement
+
+
+def _stays(refinement: Refinement, name: str) -> bool:
+    return _is_slip(refinement) if name == SLIP else _is_sure(refinement, name, 0.0)
 
 
 def _is_nearer(trial: Refinement, before: Refinement) -> bool:
@@ -196,7 +227,9 @@ def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
     """Try clocks that differ; keep the best if it halves the misfit."""
     problem = plain.problem
     starts = [{**start, SLIP: 0.0, OFFSET: offset} for offset in _OFFSETS]
-    trial = refine(problem, _nearest(problem, starts)[0], (*plain.names, OFFSET))
+    names = (*plain.names, OFFSET)
+    fitted = [least_squares_fit(problem, one, names) for one in starts]
+    trial = refine(problem, _nearest(problem, fitted)[0], names)
     improved = misfit_of(trial).systematic < _IMPROVEMENT * misfit_of(plain).systematic
     return trial if improved else plain
 
@@ -229,4 +262,5 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
         return best
     falling = refine(problem, nearest, names)
     improved = misfit_of(falling).systematic < _IMPROVEMENT * before.systematic
-    return falling if improved else best
+    sure = _is_slip(falling) and deviation(falling, "stribeck_velocity") > SIGNIFICANCE
+    return falling if improved and sure else best

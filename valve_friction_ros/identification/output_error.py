@@ -33,6 +33,7 @@ _UNITY = frozenset({"coulomb_asymmetry", "viscous_asymmetry", OFFSET})
 _LARGEST_ASYMMETRY = 0.95
 _LEAST_MASS = 1e-3
 _UNIT_MASS = 1.0
+_UNIT_SPEED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +124,7 @@ class OutputError:
             **dict.fromkeys(_FORCES, force),
             **dict.fromkeys(_UNITY, 1.0),
             "mass": max(at["mass"], _UNIT_MASS),
+            "viscous_friction": max(at["viscous_friction"], force / _UNIT_SPEED),
             START: force / max(at["spring_constant"], 1e-6),
         }
         return {name: sizes.get(name, abs(at[name])) or 1.0 for name in names}
