@@ -22,7 +22,8 @@ _LEAST_SHARE_OF_DIRECTION = 0.02
 _LEAST_TRAVEL = 0.01
 _MOST_AT_A_STOP = 0.5
 _OUTSIDE = 0.05
-_LEAST_FOLLOWED = 0.5
+_LEAST_FOLLOWED = 0.1
+_SURELY_FOLLOWED = 0.5
 _FOLLOWED_BLOCK = 0.1
 _MOVING_SHARE = 0.05
 _LEAST_SAMPLES_A_STROKE = 10
@@ -163,7 +164,7 @@ def require_related_signals(recording: Recording) -> None:
             f"{100 * share:.0f} % of the pressure): check for the wrong valve, a dead sensor, "
             "swapped signals or clocks far apart"
         )
-    if slope < 0:
+    if slope < 0 and share > _SURELY_FOLLOWED:
         raise RefusalError(
             "the stem moves against the pressure: count the position in the direction in which "
             "pressure pushes the stem"

@@ -12,6 +12,7 @@ __all__ = ["Misfit", "misfit_of"]
 _NOISE_SHARE = 0.2
 _MOVED_SHARE = 1.0
 _EXPECTED_SHARE = 0.75
+_GROSS = 0.9
 _LEAST = 2e-4
 """Misfit tolerated in any case, as a share of the stem's movement."""
 
@@ -42,6 +43,11 @@ class Misfit:
         """Systematic misfit beyond what chance makes of it, m."""
         expected = _EXPECTED_SHARE * self.tolerated
         return math.sqrt(max(self.systematic**2 - expected**2, 0.0))
+
+    @property
+    def is_gross(self) -> bool:
+        """Whether so little of the movement is reproduced that no number means anything."""
+        return self.fit < _GROSS and not self.describes
 
     @property
     def describes(self) -> bool:
