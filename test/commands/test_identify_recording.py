@@ -666,11 +666,11 @@ class TestRecordsThatCannotTell:
             ),
             (
                 lambda r: {"position_m": 0.028 - r.position},
-                "the stem moves against the pressure (correlation -0.99): count the position",
+                "the stem moves against the pressure: count the position in the direction",
             ),
             (
                 lambda r: {"pressure_pa": np.roll(r.pressure, len(r) // 4)},
-                "pressure and stem do not move together (correlation 0.10): check for the wrong",
+                "no friction model reproduces the record (fit ",
             ),
             (
                 lambda r: {"pressure_pa": np.full(len(r), 1e5)},
@@ -683,7 +683,7 @@ class TestRecordsThatCannotTell:
             "lower stop",
             "upper stop",
             "against",
-            "unrelated",
+            "a quarter period apart",
             "dead",
         ],
     )

@@ -53,7 +53,11 @@ class BenchClient(Node):
         self._sweep: Float64MultiArray | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
-        self._triggers: dict[str, Client] = {}
+        # Made long before their use: a node answers a client that it has not met yet in vain.
+        self._triggers: dict[str, Client] = {
+            service: self.create_client(Trigger, f"{self._identifier}/{service}")
+            for service in ("identify", "set_baseline", "clear")
+        }
         self.create_subscription(FluidPressure, "actuator_pressure", self._on_pressure, stream())
         self.create_subscription(JointState, "stem_state", self._on_stem, stream())
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
@@ -126,7 +130,6 @@ class BenchClient(Node):
 
     def trigger(self, service: str, timeout: float = 30.0) -> str:
         """Call a Trigger service of the identifier and return its message."""
-        # Kept for the next call: a node answers a client that it has not met yet in vain.
         if service not in self._triggers:
             name = f"{self._identifier}/{service}"
             self._triggers[service] = self.create_client(Trigger, name)

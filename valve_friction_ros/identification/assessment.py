@@ -160,6 +160,12 @@ def assess(
         _candidates(settings),
     )
     misfit = misfit_of(refinement)
+    if misfit.is_gross:
+        raise RefusalError(
+            f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
+            f"{misfit.systematic * 1e3:.2g} mm of misfit): check for the wrong valve, clocks far "
+            "apart, or a packing that changed meanwhile (then clear the buffer and record anew)"
+        )
     if not misfit.describes:
         warnings.append(
             f"the Karnopp model does not describe this valve: {misfit.systematic * 1e6:.3g} µm "

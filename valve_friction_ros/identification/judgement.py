@@ -72,8 +72,6 @@ def judge_refinement(
             judgements[name] = not_identifiable(
                 name, f"inertia is too small a part of the force to be seen; {assumed:g} kg assumed"
             )
-        elif misfit.is_gross:
-            judgements[name] = not_identifiable(name, doubt)
         elif name == "static_friction" and SLIP not in refinement.names:
             judgements[name] = not_identifiable(name, _NO_SLIP)
         else:
