@@ -17,6 +17,9 @@ from valve_friction_ros.identification.uncertainty import block_covariance, stro
 
 __all__ = ["SIGNIFICANCE", "deviation", "one_step", "suspected", "with_demanded"]
 
+_OFFSET_SIGNIFICANCE = 8.0
+"""The same for the clock offset, which on a square wave F_c and F_0 nearly make up for."""
+
 _SUSPICION = 1.5
 
 SIGNIFICANCE = 4.0
@@ -128,6 +131,8 @@ def with_demanded(
     if SLIP in candidates:
         refinement = _with_slip(refinement, start)
     left = [name for name in candidates if name != SLIP and name not in refinement.names]
+    if "stribeck_velocity" in refinement.names and OFFSET in left:
+        left.remove(OFFSET)  # presliding looks like a stem that is early
     while trials := _sure_trials(refinement, left):
         refinement = min(trials, key=lambda trial: trial.rms)
         left = [name for name in left if name not in refinement.names]
@@ -150,7 +155,8 @@ def _is_sure(trial: Refinement, name: str, before: float) -> bool:
     value = trial.coordinates[name]
     change = abs(value - before)
     error = abs(value / deviation(trial, name)) if deviation(trial, name) else math.inf
-    return change > SIGNIFICANCE * error and change > _least(trial, name)
+    needed = _OFFSET_SIGNIFICANCE if name == OFFSET else SIGNIFICANCE
+    return change > needed * error and change > _least(trial, name)
 
 
 def _pruned(refinement: Refinement, newest: str) -> Refinement:
@@ -231,7 +237,7 @@ def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
     fitted = [least_squares_fit(problem, one, names) for one in starts]
     trial = refine(problem, _nearest(problem, fitted)[0], names)
     improved = misfit_of(trial).systematic < _IMPROVEMENT * misfit_of(plain).systematic
-    return trial if improved else plain
+    return trial if improved and _is_sure(trial, OFFSET, 0.0) else plain
 
 
 def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
