@@ -20,6 +20,9 @@ __all__ = ["SIGNIFICANCE", "deviation", "one_step", "suspected", "with_demanded"
 _OFFSET_SIGNIFICANCE = 8.0
 """The same for the clock offset, which on a square wave F_c and F_0 nearly make up for."""
 
+_OTHER_FRICTIONS = ((0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
+"""Factors of F_c and F_v to start from again."""
+
 _SUSPICION = 1.5
 
 SIGNIFICANCE = 4.0
@@ -125,7 +128,7 @@ def with_demanded(
     Refinement
         With as many free coordinates as the record demands.
     """
-    refinement = refine(problem, {**start, SLIP: 0.0}, names)
+    refinement = _without_extensions(problem, {**start, SLIP: 0.0}, names)
     if OFFSET in candidates and not misfit_of(refinement).describes:
         refinement = _with_offset(refinement, start)
     if SLIP in candidates:
@@ -137,6 +140,26 @@ def with_demanded(
         refinement = min(trials, key=lambda trial: trial.rms)
         left = [name for name in left if name not in refinement.names]
     return refinement
+
+
+def _without_extensions(
+    problem: OutputError, start: Coordinates, names: tuple[str, ...]
+) -> Refinement:
+    """Refine the plain model, from other frictions too if the first start leads nowhere."""
+    refinement = refine(problem, start, names)
+    if misfit_of(refinement).describes:
+        return refinement
+    others = [
+        {
+            **start,
+            "coulomb_friction": coulomb * start["coulomb_friction"],
+            "viscous_friction": viscous * start["viscous_friction"],
+        }
+        for coulomb, viscous in _OTHER_FRICTIONS
+    ]
+    fitted = [least_squares_fit(problem, one, names) for one in others]
+    again = refine(problem, _nearest(problem, fitted)[0], names)
+    return again if again.rms < refinement.rms else refinement
 
 
 def _sure_trials(refinement: Refinement, candidates: Sequence[str]) -> list[Refinement]:
