@@ -29,7 +29,17 @@ setup(
         (f"share/{NAME}/config", files("config/*.yaml")),
         (f"share/{NAME}/launch", files("launch/*.launch.py")),
     ],
-    install_requires=["setuptools", "matplotlib", "numba", "numpy", "PyYAML", "rich", "scipy"],
+    install_requires=[
+        "setuptools",
+        "Jinja2",
+        "matplotlib",
+        "numba",
+        "numpy",
+        "PyYAML",
+        "rich",
+        "rosbags",
+        "scipy",
+    ],
     zip_safe=False,
     entry_points={
         "console_scripts": [
