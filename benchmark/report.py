@@ -8,9 +8,10 @@ import numpy as np
 from rich.table import Table
 
 from benchmark.bounds import Bound, by_case, case_bounds, coverage_of, worst
+from benchmark.information import Information
 from benchmark.runs import Outcome
 
-__all__ = ["bounds_table", "cases_table"]
+__all__ = ["bounds_table", "cases_table", "information_table"]
 
 _SHOWN = ("coulomb_friction", "viscous_friction", "spring_constant", "static_friction")
 _LETTERS = {"identified": "i", "weak": "w", "not identifiable": "n", "fixed": "f"}
@@ -65,4 +66,19 @@ def bounds_table(bounds: Sequence[Bound]) -> Table:
         if not (bound.met and bound.reached in ("always", "shown 0×")):
             mark = "[green]met[/]" if bound.met else "[red]missed[/]"
             table.add_row(bound.what, bound.reached, mark)
+    return table
+
+
+def information_table(limits: Sequence[Information]) -> Table:
+    """Tabulate the smallest standard errors that any method can have, in %."""
+    table = Table(title="least standard error in %: pressure known exactly … by its samples alone")
+    columns = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+    for column in ("valve", "noise", *columns):
+        table.add_column(column)
+    for one in limits:
+        cells = [
+            f"{_percent(one.pressure_known[name])} … {_percent(one.pressure_measured[name])}"
+            for name in columns
+        ]
+        table.add_row(one.plant_name, one.noise, *cells)
     return table
