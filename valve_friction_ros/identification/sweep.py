@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from valve_friction_ros.identification.force_balance_regression import ForceBalanceRegression
+from valve_friction_ros.identification.triangular_factors import factors_above
 
 __all__ = ["Sweep", "sweep_thresholds"]
 
@@ -66,48 +66,31 @@ def sweep_thresholds(regression: ForceBalanceRegression, thresholds: NDArray[np.
 
     Notes
     -----
-    From the highest threshold down, each step only adds the samples between two thresholds, so
-    the triangular factor of the regressors with the force beside them is updated by those rows:
-    ``[Φ_s F_s] = Q R``. The leading block of R gives the estimates, its last diagonal entry the
-    residual norm. The columns, nine orders of magnitude apart, are scaled to unit length first;
-    a triangular factor, unlike the sums of products in (7), does not square their condition.
+    The triangular factor of the regressors with the force beside them, ``[Φ_s F_s] = Q R``, is
+    carried from the highest threshold down (`factors_above`). Its leading block gives the
+    estimates, its last diagonal entry the residual norm.
     """
     free = len(regression.names)
     table = np.column_stack([regression.columns, regression.force])
-    scale = np.linalg.norm(table, axis=0)
-    scale[scale == 0] = 1.0
-    table = table / scale
-    steps = thresholds.size
-    bins = np.searchsorted(thresholds, regression.speed, side="left") - 1
-    order = np.argsort(bins, kind="stable")
-    table = table[order]
-    starts = np.searchsorted(bins[order], np.arange(steps + 1))
+    factors, sums, samples = factors_above(table, regression.speed, thresholds)
+    regressors, force = factors[:, :free, :free], factors[:, :free, free]
+    own = np.abs(np.diagonal(regressors, axis1=1, axis2=2))
+    lengths = np.linalg.norm(regressors, axis=1)
+    told = (samples > free + 1) & np.all(own > _DEPENDENT * lengths, axis=1)
 
-    estimates = np.full((steps, free), np.nan)
-    sigma, r_squared, log_information = (np.full(steps, np.nan) for _ in range(3))
-    samples = (table.shape[0] - starts[:-1]).astype(np.int64)
-    factor = np.empty((0, free + 1))
-    sums = np.zeros(free + 1)
-    for step in range(steps - 1, -1, -1):
-        rows = table[starts[step] : starts[step + 1]]
-        sums += rows.sum(axis=0)
-        factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
-        count = samples[step]
-        if count <= free + 1:
-            continue
-        lengths = np.linalg.norm(factor[:, :free], axis=0)
-        own = np.abs(np.diag(factor)[:free])
-        if np.any(own <= _DEPENDENT * lengths):
-            continue
-        solution = solve_triangular(factor[:free, :free], factor[:free, free])
-        estimates[step] = solution * scale[free] / scale[:free]
-        sigma[step] = abs(factor[free, free]) * scale[free] / np.sqrt(count - free)
-        mean = sums[free] / count
-        explained = factor[:free, free] @ factor[:free, free]
-        spread = explained - 2 * mean * (sums[:free] @ solution) + count * mean**2
-        total = explained + factor[free, free] ** 2 - count * mean**2
-        r_squared[step] = spread / total if total > 0 else np.nan
-        log_information[step] = 2 * np.sum(np.log(own * scale[:free]))
+    estimates = np.full((thresholds.size, free), np.nan)
+    sigma, r_squared, log_information = (np.full(thresholds.size, np.nan) for _ in range(3))
+    solved = np.linalg.solve(regressors[told], force[told][..., None])[..., 0]
+    count, residual = samples[told], factors[told, free, free]
+    mean = sums[told, free] / count
+    explained = np.sum(force[told] ** 2, axis=1)
+    modelled = np.sum(sums[told, :free] * solved, axis=1)
+    spread = explained - 2 * mean * modelled + count * mean**2
+    total = explained + residual**2 - count * mean**2
+    estimates[told] = solved
+    sigma[told] = np.abs(residual) / np.sqrt(count - free)
+    r_squared[told] = np.divide(spread, total, out=np.full(total.size, np.nan), where=total > 0)
+    log_information[told] = 2 * np.sum(np.log(own[told]), axis=1)
     return Sweep(
         thresholds,
         regression.complete(estimates),

@@ -10,7 +10,7 @@ from typing import ParamSpec, TypeVar
 
 import numba
 
-__all__ = ["compiled"]
+__all__ = ["compiled", "compiled_reductions"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -19,4 +19,16 @@ _R = TypeVar("_R")
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` with numba, without the interpreter lock, cached on disk."""
     kernel: Callable[_P, _R] = numba.njit(cache=True, nogil=True)(function)
+    return kernel
+
+
+def compiled_reductions(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` like `compiled`, and let it add up in any order.
+
+    Sums over an array then run several terms at once; the last digit of a result may differ from
+    that of a sum taken in order.
+    """
+    kernel: Callable[_P, _R] = numba.njit(
+        cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}
+    )(function)
     return kernel
