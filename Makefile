@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV ?= .venv
 PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
+BENCH_ARGS ?=
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -60,6 +61,10 @@ venv-test:  ## the same, with what checks it
 .PHONY: accuracy
 accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--seeds 3" for less
 	@"$(VENV)/bin/python" -m benchmark.accuracy $(ACCURACY_ARGS)
+
+.PHONY: bench
+bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some
+	@"$(VENV)/bin/python" -m benchmark.speed $(BENCH_ARGS)
 
 .PHONY: clean
 clean:  ## remove what make and colcon made

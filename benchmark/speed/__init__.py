@@ -1,0 +1,1 @@
+"""What identification costs, each item beside its peers: `make bench`."""

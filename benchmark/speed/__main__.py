@@ -1,0 +1,64 @@
+"""Run the speed benchmark: python -m benchmark.speed, or `make bench`."""
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmark.speed import parts
+from benchmark.speed.rows import Row, Settings
+from benchmark.speed.table import machine_shape, rows_table, write_json
+
+__all__ = ["main"]
+
+
+def _part_names() -> list[str]:
+    return [module.name for module in pkgutil.iter_modules(parts.__path__)]
+
+
+def _parser() -> argparse.ArgumentParser:
+    names, usual = _part_names(), Settings()
+    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
+    parser.add_argument("--parts", nargs="+", choices=names, default=names, help="what to run")
+    parser.add_argument(
+        "--repeats", type=int, default=usual.repeats, help="repetitions, of which the median counts"
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=usual.seconds, help="how long each stream runs"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=Path("speed.json"), help="where to write the rows"
+    )
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the parts that were asked for; return 1 if a goal is missed."""
+    options = _parser().parse_args(arguments)
+    console = Console()
+    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
+    measured: dict[str, list[Row]] = {}
+    for name in options.parts:
+        part = importlib.import_module(f"{parts.__name__}.{name}")
+        title = part.__doc__.strip().splitlines()[0].rstrip(".")
+        rows = measured[name] = []
+        with console.status(title) as status:
+            for row in part.measure(Settings(options.repeats, options.seconds, status.update)):
+                rows.append(row)
+                console.log(f"{row.item}: {row.ours:.3g} {row.unit}")
+        console.print(rows_table(title, rows))
+        write_json(measured, options.output)
+    goals = [row for rows in measured.values() for row in rows if row.met is not None]
+    missed = [row for row in goals if not row.met]
+    for row in missed:
+        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
+    console.print(f"{len(goals) - len(missed)} of {len(goals)} goals are met")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
