@@ -64,7 +64,7 @@ accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--
 
 .PHONY: bench
 bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some
-	@"$(VENV)/bin/python" -m benchmark.speed $(BENCH_ARGS)
+	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.speed $(BENCH_ARGS)
 
 .PHONY: clean
 clean:  ## remove what make and colcon made

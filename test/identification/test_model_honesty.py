@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification.conditioned_record import ConditionedRecord
+from valve_friction_ros.identification.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.model_honesty import Misfit, misfit_of
 from valve_friction_ros.identification.output_error import OutputError
-from valve_friction_ros.identification.refinement import EstimatingEquation, Refinement
+from valve_friction_ros.identification.refinement import Refinement
 from valve_friction_ros.model import Valve
 
 SIZE = 4000
 PLACE = 2 * np.pi * np.arange(SIZE) / SIZE
 STEM = 5e-3 * np.sin(PLACE)  # moves by 10 mm, 5/√2 mm about its mean
-NO_EQUATION = EstimatingEquation(np.empty((SIZE, 0)), np.empty((0, 0)))
+NO_EQUATION = EstimatingEquation.of_least_squares(np.empty((SIZE, 0)), np.empty(SIZE))
 
 
 def wave(cycles, rms):

@@ -1,6 +1,7 @@
 """Verdicts on the parameters of a refinement or of a regression."""
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,8 @@ from valve_friction_ros.identification.refinement import Refinement, estimating_
 from valve_friction_ros.identification.regression_uncertainty import RegressionUncertainty
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.uncertainty import (
+    CONFIDENCE,
     block_covariance,
-    half_width,
     stroke_length,
     worst_case,
 )
@@ -35,8 +36,12 @@ FEWEST_STROKES = 3
 
 _FRICTION = ("viscous_friction", "coulomb_friction", "static_friction")
 _FINEST = 5e-4
+_FINEST_SPRING = 2e-4
 """No interval is narrower than this share of the value, however quiet the record is: smoothing
-and sampling leave no more."""
+and sampling leave no more. A spring constant suffers less from them."""
+
+_RECTANGLE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) / math.sqrt(3)
+"""Half width of an interval over the half width of a rectangular distribution."""
 
 _NO_SLIP = "no slip jump seen: F_s cannot be told from F_c"
 
@@ -46,12 +51,13 @@ def judge_refinement(
 ) -> dict[str, AssessedParameter]:
     """Judge every parameter of a refined model.
 
-    The half width of an interval is the t-quantile of the scatter between strokes, and, where
-    the misfit is more than noise, what it can have done at the worst (`worst_case`), and, where
-    a mass is assumed, what an error of the mass by its own size would do.
+    The half width of an interval is the t-quantile of the scatter between strokes. Where a mass
+    is assumed, what an error of it would do is added in squares, the error taken to lie anywhere
+    within the mass's own size. Where the misfit is more than noise, what it can have done at the
+    worst (`worst_case`) is added in full.
     """
     stroke = stroke_length(refinement.simulated)
-    covariance, freedom = block_covariance(*refinement.equation, stroke)
+    covariance = block_covariance(refinement.equation, stroke)
     samples = refinement.simulated.size
     systematic = worst_case(refinement.equation.curvature, samples, misfit.excess)
     by_mass = _shift_by_assumed_mass(refinement, settings)
@@ -75,10 +81,11 @@ def judge_refinement(
         elif name == "static_friction" and SLIP not in refinement.names:
             judgements[name] = not_identifiable(name, _NO_SLIP)
         else:
-            error = _root(float(gradient @ covariance @ gradient))
+            error = covariance.standard_error(gradient)
             bound = _root(float(gradient @ systematic @ gradient))
-            lean = abs(float(gradient @ by_mass))
-            width = max(half_width(error, freedom) + bound + lean, _FINEST * abs(values[name]))
+            lean = _RECTANGLE * abs(float(gradient @ by_mass))
+            width = math.hypot(covariance.half_width(gradient), lean) + bound
+            width = max(width, _finest(name, settings) * abs(values[name]))
             reason = few or (doubt if name in _FRICTION else "")
             judgements[name] = judged(name, values[name], error, width, reason)
     return judgements
@@ -88,7 +95,7 @@ def judge_regression(
     estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
 ) -> dict[str, AssessedParameter]:
     """Judge every parameter of a regression, for a machine without a spring."""
-    covariance, freedom = regression.covariance
+    covariance = regression.covariance
     few = _too_few(regression.strokes)
     judgements = {}
     for name, value in estimate.values.items():
@@ -99,9 +106,9 @@ def judge_regression(
         elif name not in regression.names:
             judgements[name] = not_identifiable(name, "the record does not tell it")
         else:
-            index = regression.names.index(name)
-            error = _root(covariance[index, index])
-            width = max(half_width(error, freedom), _FINEST * abs(value))
+            gradient = np.eye(len(regression.names))[regression.names.index(name)]
+            error = covariance.standard_error(gradient)
+            width = max(covariance.half_width(gradient), _finest(name, settings) * abs(value))
             judgements[name] = judged(name, value, error, width, few)
     return judgements
 
@@ -119,6 +126,11 @@ def _shift_by_assumed_mass(
     step = np.linalg.lstsq(own, cross, rcond=1e-14)[0]
     sizes = np.array([*units.values()])[:-1]
     return np.asarray(step * sizes * (at["mass"] / units["mass"]), dtype=np.float64)
+
+
+def _finest(name: str, settings: IdentificationSettings) -> float:
+    by_spring = name == "spring_preload" and settings.position_bias is not None
+    return _FINEST_SPRING if name == "spring_constant" or by_spring else _FINEST
 
 
 def _root(variance: float) -> float:

@@ -13,19 +13,24 @@ from valve_friction_ros.identification.refinement import (
     least_squares_fit,
     refine,
 )
-from valve_friction_ros.identification.uncertainty import block_covariance, stroke_length
+from valve_friction_ros.identification.uncertainty import (
+    block_covariance,
+    plain_sandwich,
+    stroke_length,
+)
 
 __all__ = ["SIGNIFICANCE", "deviation", "one_step", "suspected", "with_demanded"]
 
-_OFFSET_SIGNIFICANCE = 8.0
+_OFFSET_SIGNIFICANCE = 11.0
 """The same for the clock offset, which on a square wave F_c and F_0 nearly make up for."""
 
 _OTHER_FRICTIONS = ((0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
 """Factors of F_c and F_v to start from again."""
 
-_SUSPICION = 1.5
+_SUSPICION = 1.8
+"""Standard errors of the score test from which on a part of the model is tried."""
 
-SIGNIFICANCE = 4.0
+SIGNIFICANCE = 5.5
 """Standard errors by which a part of the model must differ from nothing to be estimated."""
 
 _DROPS = (0.15, 0.35)
@@ -62,9 +67,8 @@ _LEAST_OFFSET = 1e-3
 def deviation(refinement: Refinement, name: str) -> float:
     """Distance of a free coordinate from zero, in standard errors."""
     block = stroke_length(refinement.simulated)
-    covariance = block_covariance(*refinement.equation, block).matrix
-    index = refinement.names.index(name)
-    error = math.sqrt(float(covariance[index, index]))
+    gradient = np.eye(len(refinement.names))[refinement.names.index(name)]
+    error = block_covariance(refinement.equation, block).standard_error(gradient)
     return refinement.coordinates[name] / error if error > 0 else 0.0
 
 
@@ -82,10 +86,9 @@ def one_step(refinement: Refinement, name: str) -> tuple[float, float]:
     problem, at = refinement.problem, refinement.coordinates
     units = problem.units((*refinement.names, name), {**at, name: at[name] or 0.0})
     equation = estimating_equation(problem, at, units)
-    covariance = block_covariance(*equation, stroke_length(refinement.simulated)).matrix
-    step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
-    error = math.sqrt(max(float(covariance[-1, -1]), 0.0))
-    return at[name] + float(step[-1]) * units[name], error * units[name]
+    covariance = plain_sandwich(equation, stroke_length(refinement.simulated))
+    error = math.sqrt(float(covariance[-1, -1]))
+    return at[name] + float(equation.newton_step()[-1]) * units[name], error * units[name]
 
 
 def suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, float]:

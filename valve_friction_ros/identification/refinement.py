@@ -9,35 +9,20 @@ sensitivities under the other half, whose noise is independent of it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from valve_friction_ros.identification.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.output_error import Coordinates, OutputError
 
-__all__ = ["EstimatingEquation", "Refinement", "estimating_equation", "least_squares_fit", "refine"]
+__all__ = ["Refinement", "estimating_equation", "least_squares_fit", "refine"]
 
 _INSTRUMENT_STEPS = 12
 _CONVERGED = 1e-5
 _LARGEST_STEP = 0.3
 _LARGEST_GROWTH = 1.5
-
-
-class EstimatingEquation(NamedTuple):
-    """Terms of an equation whose sum vanishes at the estimate, and its derivative.
-
-    Attributes
-    ----------
-    scores : ndarray of float, shape (n, p)
-        Terms, a row a sample.
-    curvature : ndarray of float, shape (p, p)
-        Derivative of their sum by the coordinates.
-    """
-
-    scores: NDArray[np.float64]
-    curvature: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,20 +75,21 @@ def estimating_equation(
     halves = problem.record.halves
     if halves[0] is halves[1]:
         return _plain_equation(problem, at, units)
-    residuals = [problem.residual(at, half) for half in halves]
-    slopes = [problem.sensitivity(at, half, units) for half in halves]
-    scores = slopes[0] * residuals[1][:, None] + slopes[1] * residuals[0][:, None]
-    mixed = slopes[0].T @ slopes[1]
-    return EstimatingEquation(scores, mixed + mixed.T)
+    one, two = halves
+    return EstimatingEquation(
+        (problem.sensitivity(at, one, units), problem.sensitivity(at, two, units)),
+        (problem.residual(at, one), problem.residual(at, two)),
+    )
 
 
 def _plain_equation(
     problem: OutputError, at: Coordinates, units: Mapping[str, float]
 ) -> EstimatingEquation:
     """Set up the equation of least squares, without instruments."""
-    slope = problem.sensitivity(at, problem.record.pressure, units)
-    residual = problem.residual(at, problem.record.pressure)
-    return EstimatingEquation(2 * slope * residual[:, None], 2 * slope.T @ slope)
+    pressure = problem.record.pressure
+    return EstimatingEquation.of_least_squares(
+        problem.sensitivity(at, pressure, units), problem.residual(at, pressure)
+    )
 
 
 def _moved(at: Coordinates, units: Mapping[str, float], step: NDArray[np.float64]) -> Coordinates:
@@ -150,7 +136,7 @@ def _instrumented(
         if not is_near(at):
             return fitted, _plain_equation(problem, fitted, units)
         equation = estimating_equation(problem, at, units)
-        step = -np.linalg.lstsq(equation.curvature, equation.scores.sum(axis=0), rcond=1e-14)[0]
+        step = equation.newton_step()
         largest = float(np.max(np.abs(step)))
         if largest < _CONVERGED:
             break
@@ -180,13 +166,12 @@ def refine(problem: OutputError, start: Coordinates, names: tuple[str, ...]) -> 
     fitted = least_squares_fit(problem, start, names)
     units = problem.units(names, fitted)
     at, equation = _instrumented(problem, fitted, units)
-    scale = np.array([*units.values()])
     halves = problem.record.halves
     return Refinement(
         problem,
         at,
         names,
-        EstimatingEquation(equation.scores / scale, equation.curvature / np.outer(scale, scale)),
+        equation.in_units(np.array([*units.values()])),
         problem.simulated(at, problem.record.pressure),
         (problem.residual(at, halves[0]), problem.residual(at, halves[1])),
     )

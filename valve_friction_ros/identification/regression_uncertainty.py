@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.derivatives import differentiate
 from valve_friction_ros.identification.estimate import Estimate
+from valve_friction_ros.identification.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.force_balance_regression import force_balance_regression
-from valve_friction_ros.identification.refinement import EstimatingEquation
 from valve_friction_ros.identification.uncertainty import (
     Covariance,
     block_covariance,
@@ -61,9 +61,9 @@ def regression_uncertainty(
     values = np.array([estimate.values[name] for name in regression.names])
     residual: NDArray[np.float64] = regression.columns @ values - regression.force
     columns = regression.columns * moving[:, None]
-    equation = EstimatingEquation(columns * residual[:, None], columns.T @ columns)
+    equation = EstimatingEquation.of_least_squares(columns, residual)
     stroke = stroke_length(np.cumsum(derivatives.velocity * moving))
-    covariance = block_covariance(*equation, stroke)
+    covariance = block_covariance(equation, stroke)
     force = regression.force[moving]
     fit = 1 - float(np.linalg.norm(residual[moving]) / np.linalg.norm(force - force.mean()))
     return RegressionUncertainty(
