@@ -1,0 +1,114 @@
+"""The simulation of the stem, 62.4 s at 1 kHz; what is told is for one sample."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmark.speed.peer_simulations import bare_recursion, euler, ivp
+from benchmark.speed.records import PERIOD, PRESSURES, VALVES, pressure
+from benchmark.speed.rows import Row, Settings, medians
+from valve_friction_ros.model import BENCH_VALVE, KarnoppParameters, simulate
+
+__all__ = ["measure"]
+
+_ACCURACY = 1e-6
+"""Largest error of the position that a peer may make, m; ours is 0.4 nm."""
+
+_PEER_SAMPLES = 10_400
+"""Samples that the peers simulate: one period of the square wave."""
+
+_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+_SUBSTEPS = (10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
+_TIMES_FASTER = 1000
+_TIMES_FLOOR = 2
+
+Simulation = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def _loosest(
+    candidates: Sequence[tuple[str, Simulation]],
+    driving: NDArray[np.float64],
+    expected: NDArray[np.float64],
+) -> tuple[str, Simulation] | None:
+    """Return the first candidate that is accurate enough, or None."""
+    for name, candidate in candidates:
+        with np.errstate(all="ignore"):
+            error = np.max(np.abs(candidate(driving) - expected))
+        if error <= _ACCURACY:
+            return name, candidate
+    return None
+
+
+def _ladders(parameters: KarnoppParameters) -> Iterator[list[tuple[str, Simulation]]]:
+    """Yield each peer in settings from the loosest to the strictest."""
+    for method in ("LSODA", "Radau"):
+        yield [
+            (
+                f"solve_ivp {method}, rtol {tolerance:g}",
+                lambda p, m=method, t=tolerance: ivp(BENCH_VALVE, parameters, p, PERIOD, m, t),
+            )
+            for tolerance in _TOLERANCES
+        ]
+    yield [
+        (
+            f"Euler, compiled, {substeps} steps a sample",
+            lambda p, s=substeps: euler(BENCH_VALVE, parameters, p, PERIOD, s),
+        )
+        for substeps in _SUBSTEPS
+    ]
+
+
+def _rows(valve_name: str, pressure_name: str, settings: Settings) -> Iterator[Row]:
+    parameters, driving = VALVES[valve_name], pressure(pressure_name)
+    item = f"{pressure_name}, {valve_name} friction"
+    settings.say(f"simulation, {item}")
+    forces = BENCH_VALVE.actuator_force(driving)
+    ours = partial(simulate, BENCH_VALVE, parameters, sample_period=PERIOD)
+    seconds = medians(
+        {"ours": lambda: ours(driving), "floor": lambda: bare_recursion(forces)},
+        10 * settings.repeats,
+    )
+    each = 1e9 * seconds["ours"] / driving.size
+    floor = 1e9 * seconds["floor"] / driving.size
+    yield Row(
+        item,
+        each,
+        "ns",
+        floor,
+        "bare recursion",
+        f"within {_TIMES_FLOOR} times",
+        each <= _TIMES_FLOOR * floor,
+    )
+    short = driving[:_PEER_SAMPLES]
+    expected = ours(short).position
+    best_ivp = np.inf
+    for ladder in _ladders(parameters):
+        found = _loosest(ladder, short, expected)
+        if found is None:
+            settings.say(f"{ladder[0][0]}: not accurate at any setting")
+            continue
+        name, simulation = found
+        repeats = settings.repeats if "Euler" in name else 1
+        cost = medians({"peer": partial(simulation, short)}, repeats)["peer"]
+        peer = 1e9 * cost / short.size
+        if "solve_ivp" in name:
+            best_ivp = min(best_ivp, peer)
+        yield Row(item, each, "ns", peer, name)
+    yield Row(
+        item,
+        each,
+        "ns",
+        float(best_ivp),
+        "the better solve_ivp",
+        f"{_TIMES_FASTER} times faster",
+        bool(best_ivp >= _TIMES_FASTER * each),
+    )
+
+
+def measure(settings: Settings) -> Iterator[Row]:
+    """Measure the simulation against a bare recursion, `solve_ivp` and Euler's method."""
+    for pressure_name in PRESSURES:
+        for valve_name in VALVES:
+            yield from _rows(valve_name, pressure_name, settings)
