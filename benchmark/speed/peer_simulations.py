@@ -158,14 +158,20 @@ def euler(
 
 
 @numba.njit(cache=True)
-def bare_recursion(forces: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Step a linear second-order system: four products for either state, and nothing else."""
-    positions = np.empty_like(forces)
+def bare_recursion(forces: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Step a linear second-order system by a force that is linear between samples, and no more.
+
+    Returns
+    -------
+    positions, velocities : ndarray of float, shape (n,)
+    """
+    positions, velocities = np.empty_like(forces), np.empty_like(forces)
     position, velocity = 0.0, 0.0
-    for sample in range(forces.size):
-        force = forces[sample]
-        after = 0.999 * position + 9e-4 * velocity + 1e-9 * force
-        velocity = -0.1 * position + 0.9 * velocity + 1e-6 * force
-        position = after
-        positions[sample] = position
-    return positions
+    positions[0], velocities[0] = position, velocity
+    for sample in range(1, forces.size):
+        force, change = forces[sample - 1], forces[sample] - forces[sample - 1]
+        place = 0.999 * position + 9e-4 * velocity + 1e-9 * force + 1e-10 * change
+        velocity = -0.1 * position + 0.9 * velocity + 1e-6 * force + 1e-7 * change
+        position = place
+        positions[sample], velocities[sample] = position, velocity
+    return positions, velocities

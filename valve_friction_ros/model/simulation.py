@@ -5,7 +5,6 @@ sample, and within each phase of the motion (rest, sliding up, sliding down, hel
 stop) the exact solution is stepped, with breakaway and stopping located inside the sample.
 """
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,15 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_finite, require_positive
-from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.linear_motion import (
-    Motion,
-    Response,
-    impulse_response,
-    motion_after,
-)
 from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
+from valve_friction_ros.model.stem_run import run_stem
 from valve_friction_ros.model.valve import Valve
 
 __all__ = [
@@ -92,87 +85,6 @@ def _dynamics(valve: Valve, parameters: KarnoppParameters) -> _Ways:
         )
     )
     return _Ways(upward, downward)
-
-
-@compiled
-def _surely_rests(pull: float, change: float, upward: Dynamics, downward: Dynamics) -> bool:
-    """Tell whether a resting stem stays, under a `pull` that changes linearly by `change`."""
-    highest, lowest = max(pull, pull + change), min(pull, pull + change)
-    return highest <= upward.static_friction and -lowest <= downward.static_friction
-
-
-@compiled
-def _surely_slides(
-    start: Motion, end: Motion, side: float, turns_once: bool, dynamics: Dynamics
-) -> bool:
-    """Tell whether a stem that slides to `side` at `start` has slid all the way to `end`.
-
-    Both ends are faster than the limit velocity, the speed has no minimum between them, and no
-    travel stop has been passed.
-    """
-    fast = min(side * start.velocity, side * end.velocity) > dynamics.limit_velocity
-    no_minimum = side * start.acceleration >= 0 or side * end.acceleration <= 0
-    inside = dynamics.travel == np.inf or 0 < end.position < dynamics.travel
-    return turns_once and fast and no_minimum and inside
-
-
-@compiled
-def _response(dynamics: Dynamics, period: float) -> Response:
-    """Impulse response of the sliding stem after one period."""
-    damping = dynamics.viscous_friction / dynamics.mass
-    return impulse_response(damping, dynamics.spring_constant / dynamics.mass, period)
-
-
-@compiled
-def _turns_once(dynamics: Dynamics, period: float) -> bool:
-    """Tell whether the velocity can turn once at the most within a period."""
-    damping = dynamics.viscous_friction / dynamics.mass
-    stiffness = dynamics.spring_constant / dynamics.mass
-    return (stiffness - damping * damping / 4) * period * period < math.pi**2
-
-
-@compiled
-def _run(
-    position: float,
-    velocity: float,
-    forces: NDArray[np.float64],
-    period: float,
-    upward: Dynamics,
-    downward: Dynamics,
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-) -> None:
-    """Step through `forces` (actuator less preload, N), writing one state a sample.
-
-    Samples in which the stem surely rests or surely slides on take a short cut; all others,
-    those with an event among them, go through `advance_stem`.
-    """
-    responses = _response(upward, period), _response(downward, period)
-    turns_once = _turns_once(upward, period), _turns_once(downward, period)
-    straight = upward.stribeck_velocity == 0.0
-    positions[0], velocities[0] = position, velocity
-    for sample in range(1, forces.size):
-        force, change = forces[sample - 1], forces[sample] - forces[sample - 1]
-        slope = change / period
-        pull = force - upward.spring_constant * position
-        simple = False
-        if velocity == 0.0:
-            simple = _surely_rests(pull, change, upward, downward)
-        elif straight:
-            way = 0 if velocity > 0 else 1
-            side, dynamics = (1.0, upward) if velocity > 0 else (-1.0, downward)
-            friction = side * dynamics.coulomb_friction + dynamics.viscous_friction * velocity
-            start = Motion(position, velocity, (pull - friction) / dynamics.mass)
-            jerk = (slope - dynamics.spring_constant * velocity) / dynamics.mass
-            end = motion_after(start, jerk, responses[way], period)
-            simple = _surely_slides(start, end, side, turns_once[way], dynamics)
-            if simple:
-                position, velocity = end.position, end.velocity
-        if not simple:
-            position, velocity = advance_stem(
-                position, velocity, force, slope, period, upward, downward
-            )
-        positions[sample], velocities[sample] = position, velocity
 
 
 def balanced_state(valve: Valve, parameters: KarnoppParameters, pressure: float) -> StemState:
@@ -278,15 +190,8 @@ def simulate(
     state = start or balanced_state(valve, parameters, float(samples[0]))
     forces = valve.actuator_force(samples) - parameters.spring_preload
     positions, velocities = np.empty_like(forces), np.empty_like(forces)
-    _run(
-        state.position,
-        state.velocity,
-        forces,
-        period,
-        *_dynamics(valve, parameters),
-        positions,
-        velocities,
-    )
+    positions[0], velocities[0] = state.position, state.velocity
+    run_stem(forces, period, *_dynamics(valve, parameters), positions, velocities)
     return Trajectory(positions, velocities)
 
 

@@ -20,6 +20,8 @@ from valve_friction_ros.model.linear_motion import (
 __all__ = ["Dynamics", "advance_stem"]
 
 _ROOT_ITERATIONS = 100
+_ROOT_TOLERANCE = 1e-11
+"""Step of Newton's method, over the time searched, after which only rounding is left."""
 
 _STRIBECK_STEP = 0.02
 """Share of the Stribeck velocity by which the speed may change while one tangent is used."""
@@ -55,10 +57,9 @@ def _time_of_velocity(
         newton = (
             time - (now.velocity - target) / now.acceleration if now.acceleration < 0 else early
         )
-        following = newton if early < newton < late else 0.5 * (early + late)
-        if abs(following - time) <= 1e-15 * late:
-            break
-        time = following
+        if abs(newton - time) <= _ROOT_TOLERANCE * late:
+            return min(max(newton, early), late)
+        time = newton if early < newton < late else 0.5 * (early + late)
     return time
 
 
@@ -78,10 +79,9 @@ def _time_of_position(
         else:
             late = time
         newton = time - (now.position - target) / now.velocity if now.velocity > 0 else late
-        following = newton if early < newton < late else 0.5 * (early + late)
-        if abs(following - time) <= 1e-15 * late:
-            break
-        time = following
+        if abs(newton - time) <= _ROOT_TOLERANCE * late:
+            return min(max(newton, early), late)
+        time = newton if early < newton < late else 0.5 * (early + late)
     return time
 
 
