@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.signal import savgol_coeffs
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from valve_friction_ros.identification.pressure_smoothing import (
     find_corners,
@@ -95,6 +95,17 @@ class TestSmoothing:
         kept = np.linalg.norm(savgol_coeffs(51, 3))
         # n/d independent values, five standard errors.
         assert smooth.std() == pytest.approx(kept, rel=5 / np.sqrt(2 * 100_000 / 51))
+
+
+@pytest.mark.parametrize("window", [5, 31, 151])
+def test_between_corners_it_is_the_filter_of_savitzky_and_golay(window):
+    signal = 1e5 + 1e3 * np.random.default_rng(0).standard_normal(1000)
+    corners = np.array([400, 460])
+    found = smooth_between(signal, corners, window)
+    for begin, end in ((0, 400), (400, 460), (460, 1000)):
+        length = min(window, end - begin - 1 + (end - begin) % 2)
+        expected = savgol_filter(signal[begin:end], length, 3, mode="interp")
+        np.testing.assert_allclose(found[begin:end], expected, rtol=1e-12, atol=1e-6)
 
 
 class TestHalves:

@@ -134,7 +134,7 @@ def with_demanded(
     refinement = _without_extensions(problem, {**start, SLIP: 0.0}, names)
     if OFFSET in candidates and not misfit_of(refinement).describes:
         refinement = _with_offset(refinement, start)
-    if SLIP in candidates:
+    if SLIP in candidates and _may_slip(refinement):
         refinement = _with_slip(refinement, start)
     left = [name for name in candidates if name != SLIP and name not in refinement.names]
     if "stribeck_velocity" in refinement.names and OFFSET in left:
@@ -143,6 +143,12 @@ def with_demanded(
         refinement = min(trials, key=lambda trial: trial.rms)
         left = [name for name in left if name not in refinement.names]
     return refinement
+
+
+def _may_slip(refinement: Refinement) -> bool:
+    """Tell whether a slip jump is worth trying: without one something is left to be explained."""
+    value, error = one_step(refinement, SLIP)
+    return value > error or not misfit_of(refinement).describes
 
 
 def _without_extensions(
