@@ -51,6 +51,9 @@ _PROMISING = 0.9
 _OFFSETS = (-2.0, -1.0, -0.5, -0.2, -0.1, 0.1, 0.2, 0.5, 1.0, 2.0)
 """Starts for the clock offset, s."""
 
+_OFFSETS_TRIED = 4
+"""Of these, the nearest to the measured stem are refined."""
+
 _IMPROVEMENT = 0.5
 """Share of its misfit to which a falling friction curve, or another clock, must bring it."""
 
@@ -264,9 +267,9 @@ def _nearest(problem: OutputError, candidates: Sequence[Coordinates]) -> list[Co
 def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
     """Try clocks that differ; keep the best if it halves the misfit."""
     problem = plain.problem
-    starts = [{**start, SLIP: 0.0, OFFSET: offset} for offset in _OFFSETS]
+    starts = _nearest(problem, [{**start, SLIP: 0.0, OFFSET: offset} for offset in _OFFSETS])
     names = (*plain.names, OFFSET)
-    fitted = [least_squares_fit(problem, one, names) for one in starts]
+    fitted = [least_squares_fit(problem, one, names) for one in starts[:_OFFSETS_TRIED]]
     trial = refine(problem, _nearest(problem, fitted)[0], names)
     improved = misfit_of(trial).systematic < _IMPROVEMENT * misfit_of(plain).systematic
     return trial if improved and _is_sure(trial, OFFSET, 0.0) else plain

@@ -7,6 +7,7 @@ instruments: the residual under either half of the pressure samples is weighted 
 sensitivities under the other half, whose noise is independent of it.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -21,6 +22,9 @@ __all__ = ["Refinement", "estimating_equation", "least_squares_fit", "refine"]
 
 _INSTRUMENT_STEPS = 12
 _CONVERGED = 1e-5
+_JITTER = 1e-3
+"""Steps below this that no longer halve follow single stick events, and lead nowhere."""
+
 _LARGEST_STEP = 0.3
 _LARGEST_GROWTH = 1.5
 
@@ -131,15 +135,16 @@ def _instrumented(
         distances = [np.linalg.norm(problem.residual(at, half)) for half in record.halves]
         return bool(max(distances) <= allowed)
 
-    at = fitted
+    at, previous = fitted, math.inf
     for _ in range(_INSTRUMENT_STEPS):
         if not is_near(at):
             return fitted, _plain_equation(problem, fitted, units)
         equation = estimating_equation(problem, at, units)
         step = equation.newton_step()
         largest = float(np.max(np.abs(step)))
-        if largest < _CONVERGED:
+        if largest < _CONVERGED or 0.5 * previous < largest < _JITTER:
             break
+        previous = largest
         at = _moved(at, units, step * min(1.0, _LARGEST_STEP / max(largest, 1e-300)))
     return at, equation
 

@@ -3,7 +3,7 @@
 The stem is described by position and velocity alone; a velocity of exactly zero means rest.
 Sliding is treated in a mirrored frame in which the stem moves up, so each rule stands once; the
 friction of the two ways may differ. Friction that falls with the speed (Stribeck) is followed by
-its tangent, which is a Coulomb and a viscous friction, in steps short enough for it to hold.
+chords, each of them a Coulomb and a viscous friction, in steps short enough for it to hold.
 """
 
 import math
@@ -17,14 +17,20 @@ from valve_friction_ros.model.linear_motion import (
     motion_after,
 )
 
-__all__ = ["Dynamics", "advance_stem"]
+__all__ = ["STRIBECK_STEP", "Dynamics", "advance_stem", "sliding_friction"]
+
+_NARROW = 1e-3
+"""Least width of a chord, over the change of speed that it may serve."""
+
+_FALLEN = 20.0
+"""Speed over the Stribeck velocity from which on friction is taken not to fall any further."""
 
 _ROOT_ITERATIONS = 100
 _ROOT_TOLERANCE = 1e-11
 """Step of Newton's method, over the time searched, after which only rounding is left."""
 
-_STRIBECK_STEP = 0.02
-"""Share of the Stribeck velocity by which the speed may change while one tangent is used."""
+STRIBECK_STEP = 0.04
+"""Share of the Stribeck velocity by which the speed may change while one chord is used, about."""
 
 
 class Dynamics(NamedTuple):
@@ -138,19 +144,22 @@ def _slide_up(
 
 
 @compiled
-def _tangent(dynamics: Dynamics, speed: float) -> Dynamics:
-    """Linearise Stribeck friction at `speed`: Coulomb and viscous friction of its tangent.
-
-    Where friction falls faster with the speed than the viscous part rises, the tangent is
-    taken level, which keeps the motion within a step monotone.
-    """
-    excess = dynamics.static_friction - dynamics.coulomb_friction
-    if dynamics.stribeck_velocity == 0.0 or excess == 0.0:
-        return dynamics
+def sliding_friction(dynamics: Dynamics, speed: float) -> float:
+    """Friction of the sliding stem, N."""
     ratio = speed / dynamics.stribeck_velocity
-    fall = excess * math.exp(-ratio * ratio)
-    friction = dynamics.coulomb_friction + fall + dynamics.viscous_friction * speed
-    slope = max(dynamics.viscous_friction - 2 * ratio / dynamics.stribeck_velocity * fall, 0.0)
+    fall = (dynamics.static_friction - dynamics.coulomb_friction) * math.exp(-ratio * ratio)
+    return dynamics.coulomb_friction + fall + dynamics.viscous_friction * speed
+
+
+@compiled
+def _chord(dynamics: Dynamics, speed: float, other: float) -> Dynamics:
+    """Linearise Stribeck friction between two different speeds, exact at `speed`.
+
+    Where friction falls with the speed faster than its viscous part rises, the chord is taken
+    level, which keeps the motion within a step monotone.
+    """
+    friction = sliding_friction(dynamics, speed)
+    slope = max((sliding_friction(dynamics, other) - friction) / (other - speed), 0.0)
     return Dynamics(
         dynamics.mass,
         slope,
@@ -164,6 +173,13 @@ def _tangent(dynamics: Dynamics, speed: float) -> Dynamics:
 
 
 @compiled
+def _chord_reach(dynamics: Dynamics, speed: float) -> float:
+    """Change of the speed over which one chord holds: the longer, the further friction fell."""
+    ratio = min(speed / dynamics.stribeck_velocity, _FALLEN)
+    return STRIBECK_STEP * dynamics.stribeck_velocity * math.exp(0.25 * ratio * ratio)
+
+
+@compiled
 def _slide_one_way(
     position: float,
     speed: float,
@@ -173,22 +189,28 @@ def _slide_one_way(
     duration: float,
     stop: float,
 ) -> tuple[float, float, float]:
-    """Slide upwards as `_slide_up`, for no longer than the tangent of the friction holds."""
-    local = _tangent(dynamics, speed)
+    """Slide upwards as `_slide_up`, for no longer than a chord of the friction holds."""
     pull = force - dynamics.spring_constant * position
     if speed == 0.0:
         pull = max(pull, dynamics.static_friction)
-    excess = pull - local.coulomb_friction - local.viscous_friction * speed
-    start = Motion(position, speed, excess / dynamics.mass)
-    step = duration
+    if dynamics.stribeck_velocity == 0.0:
+        excess = pull - dynamics.coulomb_friction - dynamics.viscous_friction * speed
+        start = Motion(position, speed, excess / dynamics.mass)
+        return _slide_up(start, dynamics, force, slope, duration, stop)
+    start = Motion(position, speed, (pull - sliding_friction(dynamics, speed)) / dynamics.mass)
+    largest = _chord_reach(dynamics, speed)
+    change = abs(start.acceleration) * duration
+    step = duration if change <= largest else duration * largest / change
     while True:
+        gain = min(max(start.acceleration * step, -0.5 * speed), largest)
+        other = speed + (gain if abs(gain) > _NARROW * largest else _NARROW * largest)
+        local = _chord(dynamics, speed, other)
         reached, final, time = _slide_up(start, local, force, slope, step, stop)
-        change = abs(final - speed)
-        if dynamics.stribeck_velocity == 0.0 or final == 0.0 or step < 1e-9 * duration:
+        strays = abs(final - speed)
+        allowed = min(largest, _chord_reach(dynamics, final))
+        if final == 0.0 or strays <= 1.5 * allowed or step < 1e-9 * duration:
             return reached, final, time
-        if change <= _STRIBECK_STEP * dynamics.stribeck_velocity:
-            return reached, final, time
-        step *= max(0.5 * _STRIBECK_STEP * dynamics.stribeck_velocity / change, 0.01)
+        step *= max(allowed / strays, 0.01)
 
 
 @compiled

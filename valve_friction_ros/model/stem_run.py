@@ -8,9 +8,17 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled, compiled_products
 from valve_friction_ros.model.linear_motion import impulse_response
-from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
+from valve_friction_ros.model.stem_motion import (
+    STRIBECK_STEP,
+    Dynamics,
+    advance_stem,
+    sliding_friction,
+)
 
 __all__ = ["run_stem"]
+
+_FALLEN = 6.0
+"""Speed over the Stribeck velocity above which the fall of the friction is below rounding."""
 
 
 class _Slide(NamedTuple):
@@ -58,11 +66,34 @@ def _slide(dynamics: Dynamics, period: float) -> _Slide:
 
 @compiled
 def _has_short_cut(dynamics: Dynamics, period: float) -> bool:
-    """Tell whether sliding is linear, and its velocity turns once at the most within a period."""
+    """Tell whether the velocity of a sliding stem turns once at the most within a period.
+
+    Chords of a falling friction damp less than the viscous friction does, so the undamped swing
+    decides there.
+    """
     damping = dynamics.viscous_friction / dynamics.mass
+    if dynamics.stribeck_velocity > 0.0:
+        damping = 0.0
     stiffness = dynamics.spring_constant / dynamics.mass
-    turns_once = (stiffness - damping * damping / 4) * period * period < math.pi**2
-    return turns_once and dynamics.stribeck_velocity == 0.0
+    return (stiffness - damping * damping / 4) * period * period < math.pi**2
+
+
+@compiled_products
+def _slid(
+    slide: _Slide, position: float, velocity: float, excess: float, change: float
+) -> tuple[float, float]:
+    """Position and velocity after one sample of sliding."""
+    place = (
+        slide.position_kept * position
+        + slide.position_by_velocity * velocity
+        + (slide.position_by_force * excess + slide.position_by_change * change)
+    )
+    following = (
+        slide.velocity_kept * velocity
+        + slide.velocity_by_position * position
+        + (slide.velocity_by_force * excess + slide.velocity_by_change * change)
+    )
+    return place, following
 
 
 @compiled
@@ -116,16 +147,7 @@ def _slide_on(
     while sample < forces.size - 1:
         after = forces[sample + 1] - friction
         change = after - excess
-        following = (
-            slide.velocity_kept * velocity
-            + slide.velocity_by_position * position
-            + (slide.velocity_by_force * excess + slide.velocity_by_change * change)
-        )
-        place = (
-            slide.position_kept * position
-            + slide.position_by_velocity * velocity
-            + (slide.position_by_force * excess + slide.position_by_change * change)
-        )
+        place, following = _slid(slide, position, velocity, excess, change)
         final_push = side * (after - spring * place - viscous * following)
         no_minimum = push >= 0 or final_push <= 0
         slowest = side * velocity + slide.reach * push
@@ -138,6 +160,99 @@ def _slide_on(
         sample += 1
         positions[sample], velocities[sample] = place, following
         position, velocity, excess, push = place, following, after, final_push
+    return sample
+
+
+class _Ladder(NamedTuple):
+    """Chords of a falling friction over short ranges of speed, and their maps.
+
+    The chords join, so the friction is continuous. The last range has no end; the friction does
+    not fall in it.
+
+    Attributes
+    ----------
+    spacing : float
+        Width of a range, m/s.
+    chords : ndarray of float, shape (r, 2)
+        Coulomb and viscous friction of each chord.
+    slides : ndarray of float, shape (r, 9)
+        The map of each, in the order of `_Slide`.
+    """
+
+    spacing: float
+    chords: NDArray[np.float64]
+    slides: NDArray[np.float64]
+
+
+@compiled
+def _ladder(way: Dynamics, period: float) -> _Ladder:
+    """Set up the chords of one way of motion; none where friction does not depend on Stribeck."""
+    spacing = 0.5 * STRIBECK_STEP * way.stribeck_velocity
+    rungs = int(_FALLEN * way.stribeck_velocity / spacing) + 1 if spacing > 0.0 else 0
+    chords, slides = np.empty((rungs, 2)), np.empty((rungs, 9))
+    for rung in range(rungs):
+        speed = rung * spacing
+        low, high = sliding_friction(way, speed), sliding_friction(way, speed + spacing)
+        viscous = (high - low) / spacing
+        chords[rung, 0], chords[rung, 1] = low - viscous * speed, viscous
+        local = Dynamics(
+            way.mass,
+            max(viscous, 0.0),
+            0.0,
+            0.0,
+            way.spring_constant,
+            0.0,
+            way.travel,
+            0.0,
+        )
+        for index, value in enumerate(_slide(local, period)):
+            slides[rung, index] = value
+    return _Ladder(spacing, chords, slides)
+
+
+@compiled_products
+def _slide_on_falling(
+    sample: int,
+    side: float,
+    way: Dynamics,
+    ladder: _Ladder,
+    forces: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> int:
+    """Fill in samples as `_slide_on` where friction falls with the speed.
+
+    Each sample takes the chord at its speed, if that rises, and the speed must not leave it by
+    more than half its width.
+    """
+    lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
+    position, velocity = positions[sample], velocities[sample]
+    if side * velocity <= way.limit_velocity:
+        return sample
+    top = ladder.slides.shape[0] - 1
+    while sample < forces.size - 1:
+        rung = min(int(side * velocity / ladder.spacing), top)
+        friction, viscous = side * ladder.chords[rung, 0], ladder.chords[rung, 1]
+        row = ladder.slides[rung]
+        slide = _Slide(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
+        excess, after = forces[sample] - friction, forces[sample + 1] - friction
+        place, following = _slid(slide, position, velocity, excess, after - excess)
+        push = side * (excess - way.spring_constant * position - viscous * velocity)
+        final_push = side * (after - way.spring_constant * place - viscous * following)
+        no_minimum = push >= 0 or final_push <= 0
+        place_on_rung = side * following / ladder.spacing - rung
+        if not (
+            side * following > way.limit_velocity
+            and no_minimum
+            and viscous >= 0.0
+            and place_on_rung >= -0.5
+            and (place_on_rung <= 1.5 or rung == top)
+            and lowest < place < highest
+        ):
+            return sample
+        sample += 1
+        positions[sample], velocities[sample] = place, following
+        position, velocity = place, following
     return sample
 
 
@@ -156,18 +271,24 @@ def run_stem(
     event among them, go through `advance_stem`.
     """
     up, down = _slide(upward, period), _slide(downward, period)
+    steps_up, steps_down = _ladder(upward, period), _ladder(downward, period)
     is_quick = _has_short_cut(upward, period) and _has_short_cut(downward, period)
+    falls = upward.stribeck_velocity > 0.0
     sample = 0
     while True:
         velocity = velocities[sample]
+        side = 1.0 if velocity > 0 else -1.0
+        way = upward if velocity > 0 else downward
         if velocity == 0.0:
             sample = _rest_on(
                 sample, positions[sample], forces, upward, downward, positions, velocities
             )
-        elif is_quick and velocity > 0:
-            sample = _slide_on(sample, 1.0, upward, up, forces, positions, velocities)
+        elif is_quick and falls:
+            ladder = steps_up if velocity > 0 else steps_down
+            sample = _slide_on_falling(sample, side, way, ladder, forces, positions, velocities)
         elif is_quick:
-            sample = _slide_on(sample, -1.0, downward, down, forces, positions, velocities)
+            slide = up if velocity > 0 else down
+            sample = _slide_on(sample, side, way, slide, forces, positions, velocities)
         if sample == forces.size - 1:
             return
         force, change = forces[sample], forces[sample + 1] - forces[sample]
