@@ -23,7 +23,7 @@ def quick_executor() -> Executor:
     """Return the executor with the least work per message that this rclpy has.
 
     The events executor costs about a third of the default one. It cannot run service callbacks
-    that wait, so a node that has one needs the default.
+    that wait; `create_service_with_late_answers` is for those.
     """
     try:
         from rclpy.experimental import EventsExecutor  # noqa: PLC0415 - newer than early Jazzy
@@ -47,7 +47,7 @@ def _announce(stop: threading.Event, stopped: Future) -> None:
 def run_node(
     create: Callable[[], Node],
     arguments: Sequence[str] | None = None,
-    create_executor: Callable[[], Executor] = SingleThreadedExecutor,
+    create_executor: Callable[[], Executor] = quick_executor,
 ) -> int:
     """Run a node until Ctrl-C, SIGTERM or shutdown.
 
@@ -70,7 +70,7 @@ def run_node(
     stop = threading.Event()
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, lambda *_: stop.set())
-    node = None
+    node = executor = None
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except _WRONG_REQUESTS as error:
@@ -90,6 +90,9 @@ def run_node(
     except ExternalShutdownException:
         pass
     finally:
+        # An executor that still holds the node's entities would keep them alive.
+        if executor is not None:
+            executor.shutdown()
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
