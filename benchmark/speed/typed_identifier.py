@@ -12,7 +12,7 @@ from valve_friction_ros.monitoring import RecordBuffer
 from valve_friction_ros.nodes import identifier
 from valve_friction_ros.nodes.inputs import InputWatch
 from valve_friction_ros.nodes.messages import position_of, stamp_of
-from valve_friction_ros.nodes.running import run_node
+from valve_friction_ros.nodes.running import run_nodes
 from valve_friction_ros.nodes.streams import qos_overrides, stream
 
 
@@ -55,4 +55,4 @@ class TypedInputs:
 if __name__ == "__main__":
     identifier.ValveInputs = TypedInputs
     with ThreadPoolExecutor(max_workers=1) as worker:
-        sys.exit(run_node(lambda: identifier.Identifier(worker), None, SingleThreadedExecutor))
+        sys.exit(run_nodes(lambda: [identifier.Identifier(worker)], None, SingleThreadedExecutor))

@@ -27,15 +27,18 @@ from valve_friction_ros.nodes.identifier_parameters import (
 from valve_friction_ros.nodes.late_answers import create_service_with_late_answers
 from valve_friction_ros.nodes.messages import sweep_message
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
-from valve_friction_ros.nodes.running import run_node
+from valve_friction_ros.nodes.running import run_nodes
 from valve_friction_ros.nodes.streams import LATCHED
 from valve_friction_ros.nodes.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.valve_parameters import JOINT
 
-__all__ = ["Identifier", "identification_worker", "main"]
+__all__ = ["PAUSE", "Identifier", "identification_worker", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
+PAUSE = 0.05
+"""Time, s, for which messages gather before they are taken."""
+
 _FIGURES = (
     "dead_band",
     "coulomb_friction_ratio",
@@ -236,7 +239,7 @@ class Identifier(Node):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
     with identification_worker() as worker:
-        return run_node(lambda: Identifier(worker), arguments)
+        return run_nodes(lambda: [Identifier(worker)], arguments, pause=PAUSE)
 
 
 if __name__ == "__main__":
