@@ -123,6 +123,20 @@ class Observer:
                 return True
         return False
 
+    def wait_for_answer(self, valve: str) -> float:
+        """Ask a valve's identifier until it answers; return the time of its answer, s."""
+        client = self._node.create_client(Trigger, f"/{valve}/identifier/clear")
+        end = time.monotonic() + _PATIENCE
+        while time.monotonic() < end:
+            # A node that has not met its client yet answers it in vain, so it is asked again.
+            if client.service_is_ready():
+                future = client.call_async(Trigger.Request())
+                self._executor.spin_until_future_complete(future, 0.3)
+                if future.done():
+                    return time.time()
+            self.spin(0.02)
+        raise TimeoutError(f"/{valve}/identifier does not answer")
+
     def identify(self, valve: str) -> tuple[bool, str]:
         """Call the identification of a valve; return whether it succeeded, and its message."""
         client = self._node.create_client(Trigger, f"/{valve}/identifier/identify")
