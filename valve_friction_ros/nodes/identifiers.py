@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from rclpy.node import Node
+from rclpy.validate_namespace import validate_namespace
 
 from valve_friction_ros.nodes.identifier import PAUSE, Identifier, identification_worker
 from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters
@@ -23,7 +24,9 @@ def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
     Raises
     ------
     ValueError
-        If no valve is named, or two identifiers would have the same name.
+        If no valve is named, or one twice, or ROS arguments remap their namespaces.
+    rclpy.exceptions.InvalidNamespaceException
+        If a name is no namespace.
     """
     host = Node("identifiers")
     yield host
@@ -31,16 +34,20 @@ def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
     valves = [valve for valve in host.get_parameter(_VALVES.name).value if valve]
     if not valves:
         raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
-    names: set[str] = set()
-    for valve in valves:
-        identifier = Identifier(worker, valve)
+    places = [f"/{valve.strip('/')}" for valve in valves]
+    repeated = {place for place in places if places.count(place) > 1}
+    if repeated:
+        raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
+    for place in places:
+        validate_namespace(place)
+    for place in places:
+        identifier = Identifier(worker, place)
         yield identifier
-        name = identifier.get_fully_qualified_name()
-        if name in names:
+        if identifier.get_namespace() != place:
             raise ValueError(
-                f"two identifiers would be {name}: name each valve once, and do not remap __ns"
+                f"the namespace {place} is remapped to {identifier.get_namespace()}: start without "
+                "__ns, the valves have namespaces of their own"
             )
-        names.add(name)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
