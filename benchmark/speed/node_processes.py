@@ -18,6 +18,8 @@ __all__ = ["DOMAIN", "Observer", "Process"]
 
 DOMAIN = 77
 _PATIENCE = 60.0
+_SILENCE = 5.0
+"""Time without new samples after which no more are expected, s."""
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PROFILE = (
     Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "fast_discovery.xml"
@@ -114,13 +116,19 @@ class Observer:
             self._executor.spin_once(timeout_sec=left)
 
     def wait_for(self, valves: Sequence[str], process: Process, buffered: int = 0) -> bool:
-        """Listen until all valves hold `buffered` samples; return whether that came true."""
-        end = time.monotonic() + _PATIENCE
+        """Listen until all valves hold `buffered` samples, or no more come; return whether all do.
+
+        They are patiently waited for until the first diagnostics and the first samples.
+        """
+        most, end = 0, time.monotonic() + _PATIENCE
         while time.monotonic() < end:
             process.require_running()
             self.spin(0.1)
             if all(self.buffered.get(valve, -1) >= buffered for valve in valves):
                 return True
+            held = sum(self.buffered.values())
+            if held > most:
+                most, end = held, time.monotonic() + _SILENCE
         return False
 
     def wait_for_answer(self, valve: str) -> float:

@@ -1,7 +1,7 @@
 """The streams: an identifier as a process, fed over DDS.
 
-Costs are processor seconds of all threads of the process in a second of streaming. A stream has
-lost nothing if the identifier's buffer holds every sample that was published.
+Costs are processor seconds of all threads of the process in a second of streaming, told as cores.
+A stream has lost nothing if the identifier's buffer holds every sample that was published.
 """
 
 import statistics
@@ -25,7 +25,7 @@ _VALVE = "fv_1"
 _VALVES = [f"fv_{number}" for number in range(100)]
 _SETTLING = 3.0
 _LONGEST_REPEAT = 20.0
-_UNIT = "CPU s/s"
+_UNIT = "cores"
 
 
 class Outcome(NamedTuple):
