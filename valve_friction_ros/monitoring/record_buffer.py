@@ -188,7 +188,8 @@ class RecordBuffer:
     def snapshot(self) -> Snapshot:
         """Copy the samples and the rejections of the last window."""
         pressure, position = self._pressure.samples(), self._position.samples()
-        newest = int(np.concatenate((pressure.stamps, position.stamps)).max(initial=0))
+        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
+        newest = max((stamp for stamp in last_stamps if stamp is not None), default=0)
         rejections = tuple(
             rejection for rejection in self._rejections if rejection.stamp >= newest - self._window
         )

@@ -103,10 +103,12 @@ class ValveInputs:
         A valve that is fed by blocks needs no topics, and one that has topics needs no blocks.
         """
         told = [] if self._bad_block is None else [self._bad_block]
-        if self._block_watch.silence() <= timeout and self._block_watch.is_used():
-            return told
-        watches = (self._pressure_watch, self._stem_watch)
-        silent = [problem for watch in watches if (problem := watch.problem(timeout)) is not None]
-        if silent and self._block_watch.is_used():
-            silent = [problem for problem in (self._block_watch.problem(timeout),) if problem]
-        return told + silent
+        watches: tuple[InputWatch, ...] = (self._pressure_watch, self._stem_watch)
+        if self._is_fed_by_blocks():
+            watches = (self._block_watch,)
+        return told + [found for watch in watches if (found := watch.problem(timeout)) is not None]
+
+    def _is_fed_by_blocks(self) -> bool:
+        """Tell whether blocks are what came last, or what is offered while nothing came."""
+        since_topics = min(self._pressure_watch.silence(), self._stem_watch.silence())
+        return self._block_watch.silence() <= since_topics and self._block_watch.is_used()
