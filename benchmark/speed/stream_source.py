@@ -31,7 +31,7 @@ _DEPTH = 20_000
 _STAMP = struct.Struct("<iI")
 _NUMBER = struct.Struct("<d")
 _MARK = 1.2345e67
-_PUBLISHED_BLOCK_RATE = 10
+_BLOCKS_PER_SECOND = 10
 
 
 def _signals(rate: int) -> tuple[np.ndarray, np.ndarray]:
@@ -67,37 +67,38 @@ def _due(rate: float, count: int) -> Iterator[range]:
         time.sleep(max(0.0, begin + (sent / rate) - time.monotonic(), _TURN / 10))
 
 
-def _publish_samples(node: Node, valve: str, rate: int, count: int) -> None:
+def _publish_samples(node: Node, valves: list[str], rate: int, count: int) -> None:
     quality = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.RELIABLE)
-    publishers = [
-        node.create_publisher(kind, f"/{valve}/{topic}", quality)
-        for kind, topic in ((FluidPressure, "actuator_pressure"), (JointState, "stem_state"))
-    ]
     header = Header(frame_id="actuator")
-    send_pressure, send_stem = (
-        _sender(publisher, message)
-        for publisher, message in zip(
-            publishers,
-            (
-                FluidPressure(header=header, fluid_pressure=_MARK),
-                JointState(header=header, name=["stem"], position=[_MARK], velocity=[0.0]),
-            ),
-            strict=True,
-        )
-    )
+    messages = {
+        "actuator_pressure": FluidPressure(header=header, fluid_pressure=_MARK),
+        "stem_state": JointState(header=header, name=["stem"], position=[_MARK], velocity=[0.0]),
+    }
+    publishers = [
+        {
+            topic: node.create_publisher(type(message), f"/{valve}/{topic}", quality)
+            for topic, message in messages.items()
+        }
+        for valve in valves
+    ]
+    senders = [
+        tuple(_sender(one[topic], message) for topic, message in messages.items())
+        for one in publishers
+    ]
     pressure, position = (signal.tolist() for signal in _signals(rate))
-    _wait_for_readers(publishers)
+    _wait_for_readers([publisher for one in publishers for publisher in one.values()])
     period = _SECOND // rate
-    for due in _due(rate / max(1, round(rate * _TURN)), count // max(1, round(rate * _TURN))):
-        at_once = max(1, round(rate * _TURN))
+    at_once = max(1, round(rate * _TURN))
+    for due in _due(rate / at_once, count // at_once):
         for sample in range(due.start * at_once, due.stop * at_once):
-            stamp = _START * _SECOND + sample * period
-            send_pressure(stamp, pressure[sample % len(pressure)])
-            send_stem(stamp, position[sample % len(position)])
+            stamp, place = _START * _SECOND + sample * period, sample % len(pressure)
+            for send_pressure, send_stem in senders:
+                send_pressure(stamp, pressure[place])
+                send_stem(stamp, position[place])
 
 
 def _publish_blocks(node: Node, valves: list[str], rate: int, count: int) -> None:
-    size = rate // _PUBLISHED_BLOCK_RATE
+    size = rate // _BLOCKS_PER_SECOND
     quality = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
     publishers = [
         node.create_publisher(Float64MultiArray, f"/{valve}/identifier/samples", quality)
@@ -116,7 +117,7 @@ def _publish_blocks(node: Node, valves: list[str], rate: int, count: int) -> Non
     pressure, position = _signals(rate)
     _wait_for_readers(publishers)
     # The valves take turns, as they would come from a data-acquisition system.
-    for due in _due(_PUBLISHED_BLOCK_RATE * len(valves), count // size * len(valves)):
+    for due in _due(_BLOCKS_PER_SECOND * len(valves), count // size * len(valves)):
         for number in due:
             first = number // len(valves) * size
             sample = first + np.arange(size)
@@ -148,7 +149,7 @@ def main() -> int:
     if options.blocks:
         _publish_blocks(node, options.valves, options.rate, count)
     else:
-        _publish_samples(node, options.valves[0], options.rate, count)
+        _publish_samples(node, options.valves, options.rate, count)
     sys.stdout.write(f"{count}\n")
     sys.stdout.flush()
     sys.stdin.read()

@@ -95,7 +95,8 @@ def run_nodes(
         return _cannot_start(error)
     try:
         try:
-            nodes.extend(create())
+            for node in create():
+                nodes.append(node)  # noqa: PERF402 - those before a refused one are destroyed too
         except _WRONG_REQUESTS as error:
             return _cannot_start(error)
         executor = create_executor()
