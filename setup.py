@@ -44,6 +44,7 @@ setup(
     entry_points={
         "console_scripts": [
             "identifier = valve_friction_ros.nodes.start:identifier",
+            "identifiers = valve_friction_ros.nodes.start:identifiers",
             "simulator = valve_friction_ros.nodes.start:simulator",
             "pressure_source = valve_friction_ros.nodes.start:pressure_source",
             "demo = valve_friction_ros.commands.demo:main",

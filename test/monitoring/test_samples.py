@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from valve_friction_ros.monitoring import nanoseconds
-from valve_friction_ros.monitoring.samples import SampleBuffer
+from valve_friction_ros.monitoring.samples import SampleBuffer, Samples
 
 START = 1_700_000_000_000_000_000  # ns, where float seconds are 238 ns apart
 
@@ -88,3 +88,39 @@ def test_keeps_the_last_window_and_little_more(pauses, window):
     found = buffer.samples()
     np.testing.assert_array_equal(found.stamps, expected)
     np.testing.assert_array_equal(found.values, (expected - START).astype(float))
+
+
+@given(
+    pauses=st.lists(st.integers(1, 8_000_000), min_size=1, max_size=60),
+    repeats=st.integers(1, 80),
+    block=st.integers(1, 3000),
+    window=st.integers(1, 3 * 10**9),
+)
+def test_blocks_are_what_their_samples_are(pauses, repeats, block, window):
+    """Chunks whose stamps fit 32 bits and chunks whose stamps do not, cut anywhere."""
+    stamps = START + np.cumsum(pauses * repeats)
+    values = np.sqrt(np.arange(stamps.size))
+    buffer = SampleBuffer(window / 1e9)
+    for begin in range(0, stamps.size, block):
+        part = slice(begin, begin + block)
+        buffer.extend(Samples(stamps[part], values[part]))
+        last = stamps[part][-1]
+        assert buffer.last_stamp == last
+        assert len(buffer) == np.count_nonzero((stamps >= last - window) & (stamps <= last))
+    inside = stamps >= stamps[-1] - window
+    np.testing.assert_array_equal(buffer.samples().stamps, stamps[inside])
+    np.testing.assert_array_equal(buffer.samples().values, values[inside])
+
+
+@pytest.mark.parametrize("period", [1, 4_194_304, 5_000_000, 10**10])
+def test_single_samples_and_blocks_make_the_same(period):
+    """5 ms: a chunk lasts longer than 32 bits of nanoseconds."""
+    stamps = START + period * np.arange(5000)
+    values = np.cos(np.arange(5000.0))
+    whole, single = (SampleBuffer(3000 * period / 1e9) for _ in range(2))
+    whole.extend(Samples(stamps, values))
+    for stamp, value in zip(stamps.tolist(), values.tolist(), strict=True):
+        single.append(stamp, value)
+    for buffer in (whole, single):
+        np.testing.assert_array_equal(buffer.samples().stamps, stamps[-3001:])
+        np.testing.assert_array_equal(buffer.samples().values, values[-3001:])

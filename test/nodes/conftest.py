@@ -4,7 +4,7 @@ import contextlib
 from pathlib import Path
 
 import pytest
-from live_nodes import Client, Domain, NodeProcess
+from live_nodes import NAMESPACE, Client, Domain, NodeProcess
 
 _PROFILE = Path(__file__).with_name("fast_discovery.xml")
 
@@ -33,9 +33,11 @@ class Live:
         self._stack.callback(self.client.close)
         self.nodes = []
 
-    def start(self, name, parameters=None, arguments=(), script=None):
+    def start(self, name, parameters=None, arguments=(), script=None, namespace=NAMESPACE):
         """Start a node whose end is checked; return its process."""
-        process = NodeProcess(name, self.domain, self._folder, parameters, arguments, script)
+        process = NodeProcess(
+            name, self.domain, self._folder, parameters, arguments, script, namespace
+        )
         self.nodes.append(process)
         self.client.watched.append(process)
         return process

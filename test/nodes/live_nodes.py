@@ -74,12 +74,15 @@ class Domain:
 class NodeProcess:
     """A node, started as a person would start it."""
 
-    def __init__(self, name, domain, folder, parameters=None, arguments=(), script=None):
-        self.name = f"{NAMESPACE}/{name}"
+    def __init__(
+        self, name, domain, folder, parameters=None, arguments=(), script=None, namespace=NAMESPACE
+    ):
+        self.name = f"{namespace or ''}/{name}"
         self._output = folder / f"{name}-{time.monotonic_ns()}.out"
         self._errors = self._output.with_suffix(".err")
         what = ["-m", f"valve_friction_ros.nodes.{name}"] if script is None else [str(script)]
-        command = [sys.executable, *what, "--ros-args", "-r", f"__ns:={NAMESPACE}", *arguments]
+        place = [] if namespace is None else ["-r", f"__ns:={namespace}"]
+        command = [sys.executable, *what, "--ros-args", *place, *arguments]
         for key, value in (parameters or {}).items():
             command += ["-p", f"{key}:={value}"]
         path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))

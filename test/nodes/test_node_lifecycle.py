@@ -25,6 +25,10 @@ BAD_STARTS = {  # node, parameters, words of the only line
     ),
     "excitation": ("pressure_source", {"excitation": "noise"}, "'noise' is unknown"),
     "levels": ("pressure_source", {"low": 2e5}, "low (200000) must be below high"),
+    "no valves": ("identifiers", {}, "no valve is named"),
+    "valve twice": ("identifiers", {"valves": "[fv_1, fv_1]"}, "valve /fv_1 is named twice"),
+    "one namespace": ("identifiers", {"valves": "[fv_1, fv_2]"}, "/fv_1 is remapped to /fv_101"),
+    "no namespace": ("identifiers", {"valves": "[fv-1]"}, "fv-1"),
     "no file": ("pressure_source", {"excitation": "file", "file": "no.csv"}, "no.csv"),
     "no file name": ("pressure_source", {"excitation": "file"}, "file"),
 }

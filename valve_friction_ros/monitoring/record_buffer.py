@@ -9,12 +9,14 @@ import numpy as np
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.monitoring.arrivals import Arrivals, Kind
 from valve_friction_ros.monitoring.resampling import uniform_recording
 from valve_friction_ros.monitoring.samples import SampleBuffer, Samples, nanoseconds
 
-__all__ = ["RecordBuffer", "Rejection", "Snapshot"]
+__all__ = ["Complaints", "RecordBuffer", "Rejection", "Snapshot"]
 
 _REJECTIONS_KEPT = 10_000
+_CLEARED = ": the buffer was cleared"
 
 
 class Rejection(NamedTuple):
@@ -22,6 +24,13 @@ class Rejection(NamedTuple):
 
     stamp: int
     cause: str
+
+
+class Complaints(NamedTuple):
+    """What was wrong with arrivals: the first rejection, and the first clearing of the buffer."""
+
+    rejected: str | None = None
+    cleared: str | None = None
 
 
 class Snapshot(NamedTuple):
@@ -53,6 +62,15 @@ class Snapshot(NamedTuple):
         return uniform_recording(self.pressure, self.position)
 
 
+def _are_good(last_stamp: int | None, samples: Samples) -> bool:
+    """Tell whether all values are finite and all stamps later than the one before."""
+    stamps, values = samples
+    if stamps.size == 0:
+        return True
+    follows = last_stamp is None or bool(stamps[0] > last_stamp)
+    return follows and bool((stamps[1:] > stamps[:-1]).all() and np.isfinite(values).all())
+
+
 class RecordBuffer:
     """The last seconds of pressure and stem position of one valve.
 
@@ -80,6 +98,11 @@ class RecordBuffer:
         """Count the samples of both signals."""
         return len(self._pressure) + len(self._position)
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that the samples of both signals take, bytes."""
+        return self._pressure.nbytes + self._position.nbytes
+
     def add_pressure(self, stamp: int, pressure: float) -> str | None:
         """Take a pressure (Pa) stamped `stamp` (ns); return what was wrong with it, if anything."""
         lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
@@ -97,6 +120,41 @@ class RecordBuffer:
             return self._reject(stamp, "stem_state without a position of the joint")
         return self._add("stem_state", self._position, stamp, position, None)
 
+    def add_arrivals(self, arrivals: Arrivals) -> Complaints:
+        """Take samples of both signals in the order in which they came.
+
+        Arrivals without any fault are taken as a whole. Else each is taken or rejected for itself,
+        by the methods above: which samples a clearing leaves depends on their order.
+        """
+        pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
+        lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
+        if not (
+            pressure.stamps.size + position.stamps.size == arrivals.stamps.size
+            and _are_good(self._pressure.last_stamp, pressure)
+            and _are_good(self._position.last_stamp, position)
+            and ((lowest <= pressure.values) & (pressure.values <= highest)).all()
+        ):
+            return self._add_one_by_one(arrivals)
+        self._pressure.extend(pressure)
+        self._position.extend(position)
+        if self._first_stamp is None and arrivals.stamps.size:
+            self._first_stamp = int(arrivals.stamps[0])
+        return Complaints()
+
+    def _add_one_by_one(self, arrivals: Arrivals) -> Complaints:
+        rejected: str | None = None
+        cleared: str | None = None
+        for kind, stamp, value in zip(*(part.tolist() for part in arrivals), strict=True):
+            if kind == Kind.PRESSURE:
+                problem = self.add_pressure(stamp, value)
+            else:
+                problem = self.add_position(stamp, value if kind == Kind.POSITION else None)
+            if problem is not None and problem.endswith(_CLEARED):
+                cleared = cleared or problem
+            else:
+                rejected = rejected or problem
+        return Complaints(rejected, cleared)
+
     def _add(
         self, name: str, buffer: SampleBuffer, stamp: int, value: float, cause: str | None
     ) -> str | None:
@@ -104,7 +162,7 @@ class RecordBuffer:
         if last is not None and stamp < last:
             cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
             self.clear(cause)
-            return cause + ": the buffer was cleared"
+            return cause + _CLEARED
         if last is not None and stamp == last:
             cause = f"{name} repeats a stamp"
         elif not math.isfinite(value):
@@ -130,7 +188,8 @@ class RecordBuffer:
     def snapshot(self) -> Snapshot:
         """Copy the samples and the rejections of the last window."""
         pressure, position = self._pressure.samples(), self._position.samples()
-        newest = int(np.concatenate((pressure.stamps, position.stamps)).max(initial=0))
+        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
+        newest = max((stamp for stamp in last_stamps if stamp is not None), default=0)
         rejections = tuple(
             rejection for rejection in self._rejections if rejection.stamp >= newest - self._window
         )

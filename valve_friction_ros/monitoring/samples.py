@@ -1,6 +1,6 @@
 """One stamped signal: the samples of a stream, and the buffer that keeps its last seconds."""
 
-from array import array
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 __all__ = ["SampleBuffer", "Samples", "nanoseconds"]
 
-_SLACK = 0.1
-"""Share of the window by which a buffer may run over before it is cut, so that cuts are rare."""
+_CHUNK = 1024
+"""Samples that are kept and dropped together."""
+
+_LONGEST_OFFSET = int(np.iinfo(np.uint32).max)
 
 
 def nanoseconds(seconds: float) -> int:
@@ -32,8 +34,34 @@ class Samples(NamedTuple):
     values: NDArray[np.float64]
 
 
+class _Chunk(NamedTuple):
+    """Consecutive samples, their stamps as offsets (ns) from the first."""
+
+    first: int
+    last: int
+    offsets: NDArray[np.uint32] | NDArray[np.int64]
+    values: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, stamps: NDArray[np.int64], values: NDArray[np.float64]) -> "_Chunk":
+        first, last = int(stamps[0]), int(stamps[-1])
+        offsets = stamps - first
+        fits = last - first <= _LONGEST_OFFSET
+        return cls(first, last, offsets.astype(np.uint32) if fits else offsets, values.copy())
+
+    @property
+    def nbytes(self) -> int:
+        return self.offsets.nbytes + self.values.nbytes
+
+    def count_before(self, stamp: int) -> int:
+        return int(np.searchsorted(self.offsets, max(stamp - self.first, 0)))
+
+
 class SampleBuffer:
-    """The last seconds of one signal, in bounded memory (16 bytes a sample).
+    """The last seconds of one signal, in bounded memory.
+
+    A sample takes 12 bytes, or 16 where 1024 samples last longer than the 4.29 s that 32 bits of
+    nanoseconds hold; at most 1024 samples older than the window are still in memory.
 
     Parameters
     ----------
@@ -43,41 +71,83 @@ class SampleBuffer:
 
     def __init__(self, window: float) -> None:
         self._window = nanoseconds(window)
-        self._stamps = array("q")
-        self._values = array("d")
+        self._open = Samples(np.empty(_CHUNK, np.int64), np.empty(_CHUNK, np.float64))
+        self._filled = 0
+        self._closed: deque[_Chunk] = deque()
+        self._last_stamp: int | None = None
 
     def __len__(self) -> int:
-        """Count the samples."""
-        return len(self._stamps)
+        """Count the samples of the last window."""
+        return self._filled + sum(len(chunk.values) for chunk in self._closed) - self._outside()
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that the samples take, bytes."""
+        opened = sum(part.nbytes for part in self._open)
+        return opened + sum(chunk.nbytes for chunk in self._closed)
 
     @property
     def last_stamp(self) -> int | None:
         """Stamp of the newest sample, ns, or None."""
-        return self._stamps[-1] if self._stamps else None
+        return self._last_stamp
 
     def append(self, stamp: int, value: float) -> None:
         """Add a sample; its stamp (ns) must be later than the last one."""
-        self._stamps.append(stamp)
-        self._values.append(value)
-        if stamp - self._stamps[0] > self._window * (1 + _SLACK):
-            self._cut()
+        self._open.stamps[self._filled] = stamp
+        self._open.values[self._filled] = value
+        self._last_stamp = stamp
+        self._filled += 1
+        if self._filled == _CHUNK:
+            self._close()
+
+    def extend(self, samples: Samples) -> None:
+        """Add samples; their stamps must increase, and be later than the last one."""
+        begin, count = 0, samples.stamps.size
+        while begin < count:
+            taken = min(count - begin, _CHUNK - self._filled)
+            free = slice(self._filled, self._filled + taken)
+            self._open.stamps[free] = samples.stamps[begin : begin + taken]
+            self._open.values[free] = samples.values[begin : begin + taken]
+            begin += taken
+            self._filled += taken
+            self._last_stamp = int(samples.stamps[begin - 1])
+            if self._filled == _CHUNK:
+                self._close()
 
     def clear(self) -> None:
         """Forget all samples."""
-        self._stamps = array("q")
-        self._values = array("d")
+        self._filled = 0
+        self._closed.clear()
+        self._last_stamp = None
 
-    def _cut(self) -> None:
-        stamps = np.array(self._stamps)
-        outside = int(np.searchsorted(stamps, stamps[-1] - self._window))
-        del self._stamps[:outside]
-        del self._values[:outside]
+    def _close(self) -> None:
+        """Keep the open chunk in its short form, and drop those that the window has left."""
+        self._closed.append(_Chunk.of(*self._open))
+        self._filled = 0
+        while self._closed[0].last < self._begin():
+            self._closed.popleft()
+
+    def _begin(self) -> int:
+        """Return the stamp with which the last window begins."""
+        return 0 if self._last_stamp is None else self._last_stamp - self._window
+
+    def _outside(self) -> int:
+        """Count the samples still in memory that are older than the window."""
+        begin, outside = self._begin(), 0
+        for chunk in self._closed:
+            before = chunk.count_before(begin)
+            outside += before
+            if before < len(chunk.values):
+                return outside
+        return outside + int(np.searchsorted(self._open.stamps[: self._filled], begin))
 
     def samples(self) -> Samples:
         """Copy the samples of the last window."""
-        stamps = np.array(self._stamps, dtype=np.int64)
-        values = np.array(self._values, dtype=np.float64)
-        if stamps.size == 0:
-            return Samples(stamps, values)
-        inside = stamps >= stamps[-1] - self._window
-        return Samples(stamps[inside], values[inside])
+        outside = self._outside()
+        filled = slice(self._filled)
+        stamps = [chunk.first + chunk.offsets.astype(np.int64) for chunk in self._closed]
+        values = [chunk.values for chunk in self._closed]
+        return Samples(
+            np.concatenate((*stamps, self._open.stamps[filled]))[outside:],
+            np.concatenate((*values, self._open.values[filled]))[outside:],
+        )

@@ -1,42 +1,44 @@
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
+import contextlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future as ThreadFuture
 from concurrent.futures import ThreadPoolExecutor
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.subscription import Subscription
 from rclpy.task import Future
-from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import UNITS, Assessment, RefusalError
 from valve_friction_ros.model import compile_kernels
-from valve_friction_ros.monitoring import FrictionMonitor, dead_band, identify_snapshot
+from valve_friction_ros.monitoring import Arrivals, FrictionMonitor, dead_band, identify_snapshot
 from valve_friction_ros.nodes.friction_status import friction_status
 from valve_friction_ros.nodes.identifier_parameters import (
     CHANGEABLE,
     FIXED_AT_START,
     monitor_settings,
 )
-from valve_friction_ros.nodes.inputs import InputWatch
-from valve_friction_ros.nodes.messages import position_of, stamp_of, sweep_message
+from valve_friction_ros.nodes.late_answers import create_service_with_late_answers
+from valve_friction_ros.nodes.messages import sweep_message
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
-from valve_friction_ros.nodes.running import run_node
-from valve_friction_ros.nodes.streams import LATCHED, qos_overrides, stream
+from valve_friction_ros.nodes.running import run_nodes
+from valve_friction_ros.nodes.streams import LATCHED
+from valve_friction_ros.nodes.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.valve_parameters import JOINT
 
-__all__ = ["Identifier", "main"]
+__all__ = ["PAUSE", "Identifier", "identification_worker", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
+PAUSE = 0.05
+"""Time, s, for which messages gather before they are taken."""
+
 _FIGURES = (
     "dead_band",
     "coulomb_friction_ratio",
@@ -48,33 +50,44 @@ _FIGURES = (
 )
 
 
+@contextlib.contextmanager
+def identification_worker() -> Iterator[ThreadPoolExecutor]:
+    """Provide the thread that identifies; what waits for it at the end is dropped."""
+    worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="identify")
+    worker.submit(compile_kernels)
+    try:
+        yield worker
+    finally:
+        worker.shutdown(wait=False, cancel_futures=True)
+
+
 class Identifier(Node):
     """Gathers pressure and stem position, identifies them on request, publishes the verdict.
 
     The identification runs in a thread of its own on a copy of the buffer, while the executor
     goes on receiving; its result comes back into the executor's thread, which alone touches the
     monitor.
+
+    Parameters
+    ----------
+    worker : ThreadPoolExecutor
+        Identifies.
+    namespace : str, optional
+        Namespace of the valve, where it is not given by a ROS argument.
     """
 
-    def __init__(self) -> None:
-        super().__init__("identifier")
+    def __init__(self, worker: ThreadPoolExecutor, namespace: str | None = None) -> None:
+        super().__init__("identifier", namespace=namespace)
         declare_parameters(self, (*CHANGEABLE, *FIXED_AT_START, JOINT))
         self._monitor = FrictionMonitor(monitor_settings(values_of(self, CHANGEABLE)))
         reject_invalid(self, CHANGEABLE, monitor_settings)
-        self.add_post_set_parameters_callback(self._take_parameters)
-        self._joint = self.get_parameter(JOINT.name).value
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="identify")
-        self._worker.submit(compile_kernels)
-        self._identifying = False
+        self._worker = worker
         self._create_outputs()
-        self._pressure_watch = self._subscribe(
-            FluidPressure, "actuator_pressure", self._on_pressure
-        )
-        self._stem_watch = self._subscribe(JointState, "stem_state", self._on_stem)
-        # While an identification is awaited, its group is taken: the default one has to go on.
-        self.create_service(
-            Trigger, "~/identify", self._identify, callback_group=ReentrantCallbackGroup()
-        )
+        joint = self.get_parameter(JOINT.name).value
+        self._inputs = ValveInputs(self, joint, self._take_samples)
+        self.add_post_set_parameters_callback(self._take_parameters)
+        self._identifying = False
+        create_service_with_late_answers(self, Trigger, "~/identify", self._identify)
         self.create_service(Trigger, "~/set_baseline", self._set_baseline)
         self.create_service(Trigger, "~/clear", self._clear)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
@@ -97,60 +110,51 @@ class Identifier(Node):
         self._sweep_publisher = self.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
 
-    def _subscribe(self, message_type: type, topic: str, callback: object) -> InputWatch:
-        subscription: Subscription = self.create_subscription(
-            message_type, topic, callback, stream(), qos_overriding_options=qos_overrides()
-        )
-        package, name = message_type.__module__.split(".")[0], message_type.__name__
-        return InputWatch(self, subscription, f"{package}/msg/{name}")
-
     def destroy_node(self) -> None:
-        """Stop the worker and the clock's callback, then the node."""
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        """Stop the clock's callback, then the node."""
         self._jump_handle.unregister()
         super().destroy_node()
 
     def _take_parameters(self, _: object) -> None:
+        self._inputs.flush()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
 
     def _on_time_jump(self, jump: TimeJump) -> None:
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
+        self._inputs.flush()
         self._monitor.buffer.clear(cause)
         self.get_logger().warning(f"{cause}: the buffer was cleared")
 
-    def _on_pressure(self, message: FluidPressure) -> None:
-        self._pressure_watch.arrived()
-        buffer = self._monitor.buffer
-        held = len(buffer)
-        problem = buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
-        self._report(problem, held)
-
-    def _on_stem(self, message: JointState) -> None:
-        self._stem_watch.arrived()
-        buffer = self._monitor.buffer
-        held = len(buffer)
-        problem = buffer.add_position(
-            stamp_of(message.header.stamp), position_of(message, self._joint)
-        )
-        self._report(problem, held)
-
-    def _report(self, problem: str | None, held: int) -> None:
-        """Log what was wrong with a sample that came when the buffer held `held` samples."""
-        if problem is None:
-            return
+    def _take_samples(self, arrivals: Arrivals) -> None:
+        rejected, cleared = self._monitor.buffer.add_arrivals(arrivals)
         # Each call is throttled for itself, so bad samples do not hide that the buffer was cleared.
-        if len(self._monitor.buffer) < held:
-            self.get_logger().warning(problem, throttle_duration_sec=_LOG_EVERY)
-        else:
-            self.get_logger().warning(problem, throttle_duration_sec=_LOG_EVERY)
+        if rejected is not None:
+            self.get_logger().warning(rejected, throttle_duration_sec=_LOG_EVERY)
+        if cleared is not None:
+            self.get_logger().warning(cleared, throttle_duration_sec=_LOG_EVERY)
 
-    async def _identify(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _identify(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> "Trigger.Response | Future":
+        """Begin to identify a copy of the buffer; its result arrives in the executor's thread."""
         if self._identifying:
             response.message = "an identification is already running: wait for it"
             return response
+        self._inputs.flush()
         self._identifying = True
+        answer, executor = Future(), self.executor
+        job = self._worker.submit(
+            identify_snapshot, self._monitor.buffer.snapshot(), self._monitor.settings
+        )
+        job.add_done_callback(lambda done: executor.create_task(self._conclude, done, answer))
+        return answer
+
+    def _conclude(self, done: "ThreadFuture[Assessment]", answer: Future) -> None:
+        """Take over a finished identification, and answer the request for it."""
+        self._identifying = False
+        response = Trigger.Response()
         try:
-            assessment = await self._in_worker()
+            assessment = done.result()
         except RefusalError as refusal:
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
@@ -161,28 +165,8 @@ class Identifier(Node):
             response.success = True
             told = (*self._input_problems(), self._monitor.diagnosis().message)
             response.message = "; ".join(told)
-        finally:
-            self._identifying = False
+        answer.set_result(response)
         self._publish_diagnostics()
-        return response
-
-    def _in_worker(self) -> Future:
-        """Identify a copy of the buffer in the worker; the result arrives in the executor."""
-        executor = self.executor
-        result = Future(executor=executor)
-
-        def deliver(done: "ThreadFuture[Assessment]") -> None:
-            error = done.exception()
-            if error is not None:
-                result.set_exception(error)
-            else:
-                result.set_result(done.result())
-
-        job = self._worker.submit(
-            identify_snapshot, self._monitor.buffer.snapshot(), self._monitor.settings
-        )
-        job.add_done_callback(lambda done: executor.create_task(deliver, done))
-        return result
 
     def _set_baseline(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
@@ -205,6 +189,7 @@ class Identifier(Node):
         return response
 
     def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._inputs.flush()
         self._monitor.buffer.clear("on request")
         response.success = True
         response.message = "the buffer is empty; estimate and baseline are kept"
@@ -234,11 +219,10 @@ class Identifier(Node):
         self._sweep_publisher.publish(sweep_message((published or assessment.start).sweep))
 
     def _input_problems(self) -> list[str]:
-        timeout = self.get_parameter("input_timeout").value
-        watches = (self._pressure_watch, self._stem_watch)
-        return [problem for watch in watches if (problem := watch.problem(timeout)) is not None]
+        return self._inputs.problems(self.get_parameter("input_timeout").value)
 
     def _publish_diagnostics(self) -> None:
+        self._inputs.flush()
         now = self.get_clock().now()
         status = friction_status(
             self._monitor,
@@ -254,7 +238,8 @@ class Identifier(Node):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(Identifier, arguments)
+    with identification_worker() as worker:
+        return run_nodes(lambda: [Identifier(worker)], arguments, pause=PAUSE)
 
 
 if __name__ == "__main__":

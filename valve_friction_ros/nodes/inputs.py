@@ -19,20 +19,29 @@ class InputWatch:
         The node that subscribes.
     subscription : Subscription
         Its subscription.
-    message_type : str
-        Type that it expects, such as ``sensor_msgs/msg/JointState``.
     """
 
-    def __init__(self, node: Node, subscription: Subscription, message_type: str) -> None:
+    def __init__(self, node: Node, subscription: Subscription) -> None:
         self._node = node
         self._subscription = subscription
         self._topic = subscription.topic_name
-        self._type = message_type
+        package = subscription.msg_type.__module__.split(".")[0]
+        self._type = f"{package}/msg/{subscription.msg_type.__name__}"
         self._since = node.get_clock().now().nanoseconds
+        self._has_arrived = False
 
-    def arrived(self) -> None:
-        """Note that a message came."""
-        self._since = self._node.get_clock().now().nanoseconds
+    def arrived(self, ago: float = 0.0) -> None:
+        """Note that a message came, the last one `ago` seconds before now."""
+        self._since = self._node.get_clock().now().nanoseconds - round(ago * 1e9)
+        self._has_arrived = True
+
+    def silence(self) -> float:
+        """Return the time since the last message, or the start, s."""
+        return float(self._node.get_clock().now().nanoseconds - self._since) / 1e9
+
+    def is_used(self) -> bool:
+        """Tell whether a message has ever come, or somebody publishes the topic."""
+        return self._has_arrived or self._node.count_publishers(self._topic) > 0
 
     def _is_unreliable(self, publishers: Sequence[TopicEndpointInfo]) -> bool:
         asked = self._subscription.qos_profile.reliability
@@ -41,7 +50,7 @@ class InputWatch:
 
     def problem(self, timeout: float) -> str | None:
         """Say what is wrong if nothing has come for `timeout` seconds, else None."""
-        silence = (self._node.get_clock().now().nanoseconds - self._since) / 1e9
+        silence = self.silence()
         if silence <= timeout:
             return None
         publishers = self._node.get_publishers_info_by_topic(self._topic)

@@ -1,7 +1,7 @@
 """Between messages and plain numbers."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -9,8 +9,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from valve_friction_ros.identification import Sweep
+from valve_friction_ros.monitoring import Arrivals, rows_arrived
 
-__all__ = ["position_of", "stamp_of", "sweep_message", "time_message"]
+__all__ = ["joint_index", "position_of", "rows_of", "stamp_of", "sweep_message", "time_message"]
 
 _NANOSECONDS = 1_000_000_000
 
@@ -27,14 +28,47 @@ def time_message(stamp: int) -> Time:
     return Time(sec=seconds, nanosec=nanoseconds)
 
 
+def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
+    """Place of `joint` among `positions` positions; None if it is not there.
+
+    An empty name stands for the first joint, and so does any where the joints have no names.
+    """
+    index = 0
+    if joint and names:
+        if joint not in names:
+            return None
+        index = names.index(joint)
+    return index if index < positions else None
+
+
 def position_of(message: JointState, joint: str) -> float | None:
     """Position of `joint` in m, of the first joint for an empty name; None if it is not there."""
-    index = 0
-    if joint and message.name:
-        if joint not in message.name:
-            return None
-        index = message.name.index(joint)
-    return message.position[index] if index < len(message.position) else None
+    index = joint_index(message.name, len(message.position), joint)
+    return None if index is None else message.position[index]
+
+
+def rows_of(message: Float64MultiArray) -> Arrivals:
+    """Take the samples out of a block: a row each of s, Pa and m.
+
+    Raises
+    ------
+    ValueError
+        If the layout is not that of such a block; the message says what it should be.
+    """
+    dimensions = message.layout.dim
+    if len(dimensions) != 2:
+        raise ValueError(f"the layout has {len(dimensions)} dimensions, not sample × columns")
+    rows, columns = dimensions
+    if rows.label != "sample":
+        raise ValueError(f"the first dimension is labelled {rows.label!r}, not 'sample'")
+    count = rows.size * columns.size
+    if message.layout.data_offset or len(message.data) != count:
+        raise ValueError(
+            f"there are {len(message.data)} numbers from offset {message.layout.data_offset}, "
+            f"not {rows.size} × {columns.size} from 0"
+        )
+    table = np.asarray(message.data, dtype=np.float64).reshape(rows.size, columns.size)
+    return rows_arrived(table, columns.label.split(","))
 
 
 def sweep_message(sweep: Sweep) -> Float64MultiArray:

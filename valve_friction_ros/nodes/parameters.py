@@ -25,7 +25,7 @@ class ParameterSpec:
     ----------
     name : str
         Its name.
-    default : bool, int, float or str
+    default : bool, int, float, str or list of str
         Its default, which also fixes its type.
     description : str
         What it means, with its unit.
@@ -37,7 +37,7 @@ class ParameterSpec:
     """
 
     name: str
-    default: bool | int | float | str
+    default: bool | int | float | str | list[str]
     description: str
     limits: tuple[float, float] | None = None
     read_only: bool = False

@@ -21,7 +21,7 @@ from valve_friction_ros.model import (
 from valve_friction_ros.monitoring.csv_recording import read_columns
 from valve_friction_ros.nodes.messages import time_message
 from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters, values_of
-from valve_friction_ros.nodes.running import quick_executor, run_node
+from valve_friction_ros.nodes.running import run_node
 from valve_friction_ros.nodes.streams import qos_overrides, stream
 
 __all__ = ["PressureSource", "main"]
@@ -153,7 +153,7 @@ class PressureSource(Node):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(PressureSource, arguments, quick_executor)
+    return run_node(PressureSource, arguments)
 
 
 if __name__ == "__main__":

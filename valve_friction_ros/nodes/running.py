@@ -1,9 +1,10 @@
-"""Starting and stopping a node as a process."""
+"""Starting and stopping nodes as a process."""
 
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -12,7 +13,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-__all__ = ["quick_executor", "run_node"]
+__all__ = ["quick_executor", "run_node", "run_nodes"]
 
 _WAKE_UP_PERIOD = 0.2
 _WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
@@ -23,7 +24,7 @@ def quick_executor() -> Executor:
     """Return the executor with the least work per message that this rclpy has.
 
     The events executor costs about a third of the default one. It cannot run service callbacks
-    that wait, so a node that has one needs the default.
+    that wait; `create_service_with_late_answers` is for those.
     """
     try:
         from rclpy.experimental import EventsExecutor  # noqa: PLC0415 - newer than early Jazzy
@@ -44,21 +45,37 @@ def _announce(stop: threading.Event, stopped: Future) -> None:
     stopped.set_result(None)
 
 
-def run_node(
-    create: Callable[[], Node],
+def _spin(executor: Executor, stop: threading.Event, stopped: Future, pause: float) -> None:
+    """Run callbacks until the stop is requested."""
+    # An unlimited wait is no option: the events executor would turn without a pause.
+    wake_up_period = _WAKE_UP_PERIOD
+    if pause and not isinstance(executor, SingleThreadedExecutor):
+        wake_up_period = 0.0  # the events executor runs all that has gathered, then returns
+    while rclpy.ok() and not stop.is_set():
+        executor.spin_until_future_complete(stopped, wake_up_period)
+        if not wake_up_period:
+            time.sleep(pause)
+
+
+def run_nodes(
+    create: Callable[[], Iterable[Node]],
     arguments: Sequence[str] | None = None,
-    create_executor: Callable[[], Executor] = SingleThreadedExecutor,
+    create_executor: Callable[[], Executor] = quick_executor,
+    pause: float = 0.0,
 ) -> int:
-    """Run a node until Ctrl-C, SIGTERM or shutdown.
+    """Run nodes in one process until Ctrl-C, SIGTERM or shutdown.
 
     Parameters
     ----------
     create : callable
-        Builds the node; what it or rclpy refuses is told in one line.
+        Builds the nodes; what they or rclpy refuse is told in one line.
     arguments : sequence of str, optional
         ROS arguments, by default those of the process.
     create_executor : callable
         Builds the executor.
+    pause : float
+        Time, s, for which the events executor lets messages gather before it runs their callbacks.
+        To be woken for each message costs more than to take it.
 
     Returns
     -------
@@ -70,27 +87,39 @@ def run_node(
     stop = threading.Event()
     for request in (signal.SIGINT, signal.SIGTERM):
         signal.signal(request, lambda *_: stop.set())
-    node = None
+    nodes: list[Node] = []
+    executor = None
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except _WRONG_REQUESTS as error:
         return _cannot_start(error)
     try:
         try:
-            node = create()
+            for node in create():
+                nodes.append(node)  # noqa: PERF402 - those before a refused one are destroyed too
         except _WRONG_REQUESTS as error:
             return _cannot_start(error)
         executor = create_executor()
-        executor.add_node(node)
+        for node in nodes:
+            executor.add_node(node)
         stopped = Future(executor=executor)
-        threading.Thread(target=_announce, args=(stop, stopped), daemon=True).start()
-        # An unlimited wait is no option: the events executor would turn without a pause.
-        while rclpy.ok() and not stop.is_set():
-            executor.spin_until_future_complete(stopped, _WAKE_UP_PERIOD)
+        announcer = threading.Thread(target=_announce, args=(stop, stopped), daemon=True)
+        announcer.start()
+        _spin(executor, stop, stopped, pause)
+        if stop.is_set():
+            announcer.join()
     except ExternalShutdownException:
         pass
     finally:
-        if node is not None:
+        # An executor that still holds the node's entities would keep them alive.
+        if executor is not None:
+            executor.shutdown()
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def run_node(create: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
+    """Run one node, as `run_nodes` does."""
+    return run_nodes(lambda: [create()], arguments)

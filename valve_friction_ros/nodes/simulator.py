@@ -24,7 +24,7 @@ from valve_friction_ros.nodes.parameters import (
     reject_invalid,
     values_of,
 )
-from valve_friction_ros.nodes.running import quick_executor, run_node
+from valve_friction_ros.nodes.running import run_node
 from valve_friction_ros.nodes.streams import qos_overrides, stream
 from valve_friction_ros.nodes.valve_parameters import (
     JOINT,
@@ -126,7 +126,7 @@ class Simulator(Node):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(Simulator, arguments, quick_executor)
+    return run_node(Simulator, arguments)
 
 
 if __name__ == "__main__":

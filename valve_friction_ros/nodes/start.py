@@ -2,7 +2,7 @@
 
 import importlib
 
-__all__ = ["identifier", "pressure_source", "simulator"]
+__all__ = ["identifier", "identifiers", "pressure_source", "simulator"]
 
 
 def _start(node: str) -> int:
@@ -18,6 +18,11 @@ def _start(node: str) -> int:
 def identifier() -> int:
     """Run the node `identifier`."""
     return _start("identifier")
+
+
+def identifiers() -> int:
+    """Run the node `identifiers`."""
+    return _start("identifiers")
 
 
 def simulator() -> int:

@@ -3,7 +3,7 @@
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-__all__ = ["LATCHED", "qos_overrides", "stream"]
+__all__ = ["LATCHED", "blocks", "qos_overrides", "stream"]
 
 LATCHED = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
@@ -23,6 +23,16 @@ def stream() -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=20_000,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.VOLATILE,
+    )
+
+
+def blocks() -> QoSProfile:
+    """Return the quality of service of a stream of blocks: deep enough for 100 s at 10 Hz."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=1_000,
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE,
     )

@@ -1,0 +1,180 @@
+"""The streams: an identifier as a process, fed over DDS.
+
+Costs are processor seconds of all threads of the process in a second of streaming, told as cores.
+A stream has lost nothing if the identifier's buffer holds every sample that was published.
+"""
+
+import statistics
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmark.speed.node_processes import Observer, Process, observer
+from benchmark.speed.rows import Row, Settings
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.monitoring import RecordBuffer, rows_arrived
+
+__all__ = ["measure"]
+
+_OURS = "valve_friction_ros.nodes.identifier"
+_PEER = "benchmark.speed.typed_identifier"
+_PEER_NAME = "typed, default executor"
+_VALVE = "fv_1"
+_VALVES = [f"fv_{number}" for number in range(100)]
+_SETTLING = 3.0
+_LONGEST_REPEAT = 20.0
+_UNIT = "cores"
+
+
+class Outcome(NamedTuple):
+    """What a stream did to the process that took it."""
+
+    idle: float
+    busy: float
+    sent: int
+    arrived: int
+    seconds_to_start: float
+    megabytes: float
+
+
+def _identifier(module: str, window: float) -> Process:
+    arguments = ["--ros-args", "-r", f"__ns:=/{_VALVE}", "-p", f"window:={window:.1f}"]
+    return Process(module, arguments)
+
+
+def _fleet(count: int, window: float) -> Process:
+    valves = ",".join(_VALVES[:count])
+    arguments = ["--ros-args", "-p", f"valves:=[{valves}]", "-p", f"window:={window:.1f}"]
+    return Process("valve_friction_ros.nodes.identifiers", arguments)
+
+
+def _cost(process: Process, listener: Observer, seconds: float) -> float:
+    before, begin = process.cpu(), time.monotonic()
+    listener.spin(seconds)
+    return (process.cpu() - before) / (time.monotonic() - begin)
+
+
+def _nothing(_: Observer) -> None:
+    pass
+
+
+def _stream(
+    start: Callable[[float], Process],
+    valves: Sequence[str],
+    rate: int,
+    seconds: float,
+    options: Sequence[str] = (),
+    meanwhile: Callable[[Observer], object] = _nothing,
+) -> Outcome:
+    """Start identifiers, stream for `seconds`, and count what arrived."""
+    with observer() as listener, start(2 * seconds + 60) as process:
+        if not listener.wait_for(valves, process):
+            raise RuntimeError("the identifiers do not publish their diagnostics")
+        started = max(listener.first_seen.values()) - process.begin
+        listener.spin(_SETTLING)
+        idle = _cost(process, listener, 5.0)
+        stream = ["--rate", str(rate), "--seconds", str(seconds), *options]
+        with Process("benchmark.speed.stream_source", [*valves, *stream]) as source:
+            listener.wait_for(valves, process, 1)
+            busy = _cost(process, listener, seconds - 2 * _SETTLING)
+            meanwhile(listener)
+            sent = 2 * int(source.output.readline())
+            listener.wait_for(valves, process, sent)
+        arrived = min(listener.buffered.values())
+        return Outcome(idle, busy, sent, arrived, started, process.resident())
+
+
+def _one_valve(settings: Settings) -> Iterator[Row]:
+    seconds = min(settings.seconds, _LONGEST_REPEAT)
+    found: dict[str, list[Outcome]] = {_OURS: [], _PEER: []}
+    for repeat in range(settings.repeats):
+        for module, outcomes in found.items():
+            settings.say(f"1 kHz × 2 topics, {module}, {repeat + 1} of {settings.repeats}")
+            outcomes.append(_stream(lambda w, m=module: _identifier(m, w), [_VALVE], 1000, seconds))
+    busy, idle = (
+        [statistics.median(getattr(one, name) for one in found[which]) for which in (_OURS, _PEER)]
+        for name in ("busy", "idle")
+    )
+    goal = "at most a fifth"
+    yield Row("1 kHz × 2 topics", busy[0], _UNIT, busy[1], _PEER_NAME, goal, busy[0] <= busy[1] / 5)
+    yield Row("no stream", idle[0], _UNIT, idle[1], _PEER_NAME)
+
+
+def _start(settings: Settings) -> Iterator[Row]:
+    walls, costs = [], []
+    for repeat in range(settings.repeats):
+        settings.say(f"start, {repeat + 1} of {settings.repeats}")
+        with observer() as listener, _identifier(_OURS, 60.0) as process:
+            walls.append(listener.wait_for_answer(_VALVE) - process.begin)
+            costs.append(process.cpu())
+    wall = statistics.median(walls)
+    yield Row("start to first answer of a service", wall, "s", None, "", "under 2 s", wall < 2)
+    yield Row("processor time until then", statistics.median(costs), "CPU s")
+
+
+def _share(outcome: Outcome) -> float:
+    return 100 * outcome.arrived / outcome.sent
+
+
+def _ten_kilohertz(settings: Settings) -> Iterator[Row]:
+    settings.say(f"10 kHz × 2 topics for {settings.seconds:g} s")
+    ours = _stream(lambda w: _identifier(_OURS, w), [_VALVE], 10_000, settings.seconds)
+    settings.say("10 kHz × 2 topics, typed")
+    seconds = min(settings.seconds, _LONGEST_REPEAT)
+    peer = _stream(lambda w: _identifier(_PEER, w), [_VALVE], 10_000, seconds)
+    item = f"10 kHz × 2 topics for {settings.seconds:g} s"
+    yield Row(item, ours.busy, _UNIT, peer.busy, f"{_PEER_NAME}, {seconds:g} s")
+    goal, met = "nothing lost", ours.arrived == ours.sent
+    yield Row("of that arrived", _share(ours), "%", _share(peer), _PEER_NAME, goal, met)
+
+
+def _while_identifying(settings: Settings) -> Iterator[Row]:
+    settings.say("identifications during a stream")
+    seconds = min(settings.seconds, _LONGEST_REPEAT)
+    answers: list[bool] = []
+
+    def identify(listener: Observer) -> None:
+        while len(answers) < 3:
+            answers.append(listener.identify(_VALVE)[0])
+
+    ours = _stream(lambda w: _identifier(_OURS, w), [_VALVE], 1000, 2 * seconds, meanwhile=identify)
+    goal, met = "nothing lost", ours.arrived == ours.sent and all(answers)
+    yield Row("arrived during three identifications", _share(ours), "%", None, "", goal, met)
+
+
+def _many_valves(settings: Settings) -> Iterator[Row]:
+    settings.say("10 valves in one process, 1 kHz × 2 topics each")
+    seconds = min(settings.seconds, _LONGEST_REPEAT)
+    topics = _stream(lambda w: _fleet(10, w), _VALVES[:10], 1000, seconds)
+    yield Row("10 valves in one process, 1 kHz × 2 topics", topics.busy, _UNIT)
+    yield Row("of that arrived at the valve with the least", _share(topics), "%")
+    settings.say("100 valves, blocks of 100 samples")
+    blocks = _stream(lambda w: _fleet(100, w), _VALVES, 1000, settings.seconds, ["--blocks"])
+    goal, met = "under one core, nothing lost", blocks.busy < 1 and blocks.arrived == blocks.sent
+    yield Row("100 valves, blocks of 100 at 10 Hz", blocks.busy, _UNIT, None, "", goal, met)
+    yield Row("of that arrived at the valve with the least", _share(blocks), "%")
+    yield Row("memory of their process", blocks.megabytes, "MB")
+    yield Row("its start to the last first diagnostic", blocks.seconds_to_start, "s")
+
+
+def _memory(_: Settings) -> Iterator[Row]:
+    """Fill a window of ten minutes at 1 kHz twice."""
+    buffer, sizes = RecordBuffer(BENCH_VALVE, 600.0), []
+    for begin in range(0, 1_300_000, 100):
+        seconds = (begin + np.arange(100)) / 1000
+        buffer.add_arrivals(rows_arrived(np.column_stack([seconds, seconds + 1e5, seconds])))
+        sizes.append(buffer.nbytes)
+    full = sizes[6010:]
+    plain = 2 * 600_001 * 16 / 1e6
+    goal, met = "under 20 MB, constant", max(full) < 20e6 and max(full) - min(full) < 1e5
+    yield Row("window of 10 min at 1 kHz", max(full) / 1e6, "MB", plain, "16 B a sample", goal, met)
+    yield Row("by which that varies", (max(full) - min(full)) / 1e6, "MB")
+
+
+def measure(settings: Settings) -> Iterable[Row]:
+    """Measure cost, loss, start and memory of the identifier's inputs."""
+    parts = (_memory, _start, _one_valve, _ten_kilohertz, _while_identifying, _many_valves)
+    for part in parts:
+        yield from part(settings)

@@ -1,0 +1,58 @@
+"""The identifier as it is written first: typed subscriptions, and rclpy's default executor."""
+
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import FluidPressure, JointState
+
+from valve_friction_ros.monitoring import RecordBuffer
+from valve_friction_ros.nodes import identifier
+from valve_friction_ros.nodes.inputs import InputWatch
+from valve_friction_ros.nodes.messages import position_of, stamp_of
+from valve_friction_ros.nodes.running import run_nodes
+from valve_friction_ros.nodes.streams import qos_overrides, stream
+
+
+class TypedInputs:
+    """Both topics, each message deserialised by rclpy and taken for itself."""
+
+    def __init__(self, node: Node, joint: str, hand_on: Callable) -> None:
+        self._buffer: RecordBuffer = hand_on.__self__._monitor.buffer  # noqa: SLF001
+        self._joint = joint
+        self._watches = [
+            InputWatch(
+                node,
+                node.create_subscription(
+                    kind, topic, callback, stream(), qos_overriding_options=qos_overrides()
+                ),
+            )
+            for kind, topic, callback in (
+                (FluidPressure, "actuator_pressure", self._on_pressure),
+                (JointState, "stem_state", self._on_stem),
+            )
+        ]
+
+    def _on_pressure(self, message: FluidPressure) -> None:
+        self._watches[0].arrived()
+        self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
+
+    def _on_stem(self, message: JointState) -> None:
+        self._watches[1].arrived()
+        stamp = stamp_of(message.header.stamp)
+        self._buffer.add_position(stamp, position_of(message, self._joint))
+
+    def flush(self) -> None:
+        """Do nothing: every message has been taken."""
+
+    def problems(self, timeout: float) -> list[str]:
+        """Say what is wrong with the inputs."""
+        return [told for watch in self._watches if (told := watch.problem(timeout))]
+
+
+if __name__ == "__main__":
+    identifier.ValveInputs = TypedInputs
+    with ThreadPoolExecutor(max_workers=1) as worker:
+        sys.exit(run_nodes(lambda: [identifier.Identifier(worker)], None, SingleThreadedExecutor))

@@ -1,0 +1,163 @@
+"""Samples by the block on `~/samples`: the same numbers, the same rules, and what is no block."""
+
+import math
+
+import numpy as np
+import pytest
+from live_nodes import NAMESPACE, STREAM, stamps_of, values_of
+from records import quick_record
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from valve_friction_ros.identification import assess
+from valve_friction_ros.model import BENCH_VALVE
+
+OK, WARN = b"\x00", b"\x01"
+TOPIC = f"{NAMESPACE}/identifier/samples"
+COLUMNS = "time,pressure,position"
+RECORD = quick_record()
+ROWS = np.column_stack([stamps_of(RECORD) / 1e9, RECORD.pressure, RECORD.position])
+
+
+def block(rows, labels=("sample", COLUMNS), sizes=None, **layout):
+    rows = np.asarray(rows, float)
+    dimensions = [
+        MultiArrayDimension(label=label, size=size, stride=0)
+        for label, size in zip(labels, sizes or rows.shape, strict=True)
+    ]
+    return Float64MultiArray(
+        layout=MultiArrayLayout(dim=dimensions, **layout), data=rows.ravel().tolist()
+    )
+
+
+@pytest.fixture(scope="module")
+def fed(shared):
+    """Client of an identifier that reports silence soon, and the publisher of its blocks."""
+    shared.start("identifier", {"input_timeout": 2.0})
+    client = shared.client
+    publisher = client.node.create_publisher(Float64MultiArray, TOPIC, STREAM)
+    client.wait_until(publisher.get_subscription_count, "the subscription")
+    return client, publisher
+
+
+def send(publisher, rows, size=50):
+    for begin in range(0, len(rows), size):
+        publisher.publish(block(rows[begin : begin + size]))
+
+
+def is_warned(status):
+    return status.level == WARN
+
+
+def test_the_numbers_are_those_of_the_record(fed):
+    client, publisher = fed
+    client.empty_the_buffer()
+    send(publisher, ROWS)
+    response = client.identify_all(2 * len(RECORD))
+    assert response.success, response.message
+    expected = assess(RECORD, BENCH_VALVE)
+    assert client.friction("coulomb_friction", "rms") == {
+        "coulomb_friction": expected.values["coulomb_friction"],
+        "rms": expected.misfit.rms,
+    }
+
+
+def test_a_valve_fed_by_blocks_needs_no_topics(fed):
+    client, publisher = fed
+    client.empty_the_buffer()
+    sent = 0
+
+    def status_after(message):
+        nonlocal sent
+        publisher.publish(block(ROWS[sent : sent + 1]))
+        sent += 1
+        return client.next_status(lambda status: "no data" not in status.message, message)
+
+    for _ in range(4):  # each a second: longer than the topics may be silent
+        assert status_after("no warning").level == OK
+    status = client.next_status(is_warned, "a warning of silence")
+    assert f"no data on {TOPIC}" in status.message
+    assert "its publisher is silent" in status.message
+    assert f"no data on {NAMESPACE}/actuator_pressure" not in status.message
+    assert values_of(status)["NE 107"] == "C"
+    assert status_after("no warning").level == OK
+
+
+NO_BLOCKS = {
+    "no labels": (
+        Float64MultiArray(data=[0.0, 1.0, 2.0]),
+        "the layout has 0 dimensions, not sample × columns",
+    ),
+    "first label": (
+        block(ROWS[:4], ("row", COLUMNS)),
+        "the first dimension is labelled 'row', not 'sample'",
+    ),
+    "columns": (
+        block(ROWS[:4], ("sample", "time,position,pressure")),
+        f"the columns are 'time,position,pressure', not '{COLUMNS}'",
+    ),
+    "width": (block(ROWS[:4, :2], ("sample", COLUMNS)), "the shape is (4, 2), not (n, 3)"),
+    "length": (
+        block(ROWS[:4], sizes=(5, 3)),
+        "there are 12 numbers from offset 0, not 5 × 3 from 0",
+    ),
+    "offset": (
+        block(ROWS[:4], data_offset=3),
+        "there are 12 numbers from offset 3, not 4 × 3 from 0",
+    ),
+    "time": (block([[math.nan, 1e5, 0.01]]), "a time is not finite"),
+}
+
+
+@pytest.mark.parametrize("name", NO_BLOCKS)
+def test_what_is_no_block_is_told_until_one_comes(fed, name):
+    client, publisher = fed
+    client.empty_the_buffer()
+    message, reason = NO_BLOCKS[name]
+    publisher.publish(message)
+    status = client.next_status(lambda one: reason in one.message, "the reason")
+    assert status.level == WARN
+    assert f"a block on {TOPIC}: {reason}" in status.message
+    assert values_of(status)["buffered_samples"] == "0"
+    publisher.publish(block(ROWS[:4]))
+    status = client.next_status(lambda one: reason not in one.message, "the end of the warning")
+    assert values_of(status)["buffered_samples"] == "8"
+
+
+def test_bad_rows_are_rejected_as_bad_messages_are(fed):
+    client, publisher = fed
+    client.empty_the_buffer()
+    rows = ROWS.copy()
+    rows[100, 1], rows[200, 2], rows[300, 1] = 260e3, math.inf, math.nan
+    send(publisher, rows)
+    send(publisher, rows[-1:])
+    response = client.identify_all(2 * len(RECORD) - 3)
+    assert not response.success
+    for cause in (
+        "actuator_pressure outside the sensor's range 0 to 250000 Pa (1 samples)",
+        "stem_state is not finite (1 samples)",
+        "actuator_pressure is not finite (1 samples)",
+        "actuator_pressure repeats a stamp (1 samples)",
+        "stem_state repeats a stamp (1 samples)",
+    ):
+        assert cause in response.message
+
+
+def test_a_stamp_that_goes_back_clears_the_buffer(fed):
+    client, publisher = fed
+    client.empty_the_buffer()
+    send(publisher, ROWS)
+    send(publisher, ROWS[:1] - [0.25, 0.0, 0.0])
+    reason = client.identify_all(1).message  # the row's position came to an empty buffer
+    assert "the buffer was cleared: stamps of actuator_pressure went back by 5.24 s" in reason
+
+
+def test_the_stamps_are_those_of_the_topics(fed):
+    """Microseconds of seconds since 1970: what a float still tells apart."""
+    client, publisher = fed
+    client.empty_the_buffer()
+    client.connect()
+    send(publisher, ROWS[:100])
+    client.wait_for_buffered(200)
+    client.send_pressure(stamps_of(RECORD)[99], RECORD.pressure[99])
+    client.send_stem(stamps_of(RECORD)[100], RECORD.position[100])
+    assert "actuator_pressure repeats a stamp (1 samples)" in client.identify_all(201).message

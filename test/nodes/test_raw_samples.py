@@ -1,0 +1,162 @@
+"""Decoding by the block against rclpy's own deserialisation, message by message."""
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import FluidPressure, JointState
+from std_msgs.msg import Header
+
+from valve_friction_ros.monitoring import Kind
+from valve_friction_ros.nodes import raw_samples
+from valve_friction_ros.nodes.messages import position_of, stamp_of
+from valve_friction_ros.nodes.raw_samples import RawSamples, positions_in, pressures_in
+
+NUMBERS = st.floats(width=64)
+TIMES = st.builds(Time, sec=st.integers(-(2**31), 2**31 - 1), nanosec=st.integers(0, 999_999_999))
+WORDS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
+NAMES = st.lists(st.one_of(WORDS, st.sampled_from(["stem", "arm"])), max_size=5)
+
+
+def pressure(stamp, value, frame="actuator", variance=0.0):
+    header = Header(stamp=stamp, frame_id=frame)
+    return FluidPressure(header=header, fluid_pressure=value, variance=variance)
+
+
+def serialised(messages):
+    return [bytes(serialize_message(message)) for message in messages]
+
+
+def assert_same(found, expected):
+    """Equal to the last bit, nan included."""
+    found, expected = np.asarray(found, float), np.asarray(expected, float)
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
+
+
+def check_pressures(raw):
+    read = [deserialize_message(one, FluidPressure) for one in raw]
+    stamps, values = pressures_in(raw)
+    assert stamps.tolist() == [stamp_of(one.header.stamp) for one in read]
+    assert_same(values, [one.fluid_pressure for one in read])
+
+
+def check_positions(raw, joint):
+    read = [deserialize_message(one, JointState) for one in raw]
+    expected = [position_of(one, joint) for one in read]
+    kinds, stamps, values = positions_in(raw, joint)
+    assert stamps.tolist() == [stamp_of(one.header.stamp) for one in read]
+    assert (kinds == Kind.POSITION).tolist() == [one is not None for one in expected]
+    assert_same(values, [np.nan if one is None else one for one in expected])
+
+
+@st.composite
+def joint_states(draw, count):
+    """Messages of one publisher: names and counts are the same, numbers differ."""
+    frame, names = draw(WORDS), draw(NAMES)
+    sizes = [draw(st.integers(0, 5)) for _ in range(3)]
+
+    def message():
+        arrays = [draw(st.lists(NUMBERS, min_size=size, max_size=size)) for size in sizes]
+        return JointState(
+            header=Header(stamp=draw(TIMES), frame_id=frame),
+            name=names,
+            **dict(zip(("position", "velocity", "effort"), arrays, strict=True)),
+        )
+
+    return [message() for _ in range(count)]
+
+
+@given(frame=WORDS, samples=st.lists(st.tuples(TIMES, NUMBERS, NUMBERS), max_size=20))
+def test_pressures_of_one_publisher(frame, samples):
+    check_pressures(serialised(pressure(at, value, frame, more) for at, value, more in samples))
+
+
+@given(samples=st.lists(st.tuples(TIMES, NUMBERS, WORDS), max_size=8))
+def test_pressures_of_several_publishers(samples):
+    check_pressures(serialised(pressure(*sample) for sample in samples))
+
+
+@settings(deadline=None)
+@given(data=st.data(), joint=st.sampled_from(["stem", "", "arm"]))
+def test_positions_of_one_publisher(data, joint):
+    check_positions(serialised(data.draw(joint_states(data.draw(st.integers(0, 6))))), joint)
+
+
+@settings(deadline=None)
+@given(data=st.data())
+def test_positions_of_several_publishers(data):
+    parts = [data.draw(joint_states(2)) for _ in range(3)]
+    mixed = [message for several in zip(*parts, strict=True) for message in several]
+    check_positions(serialised(mixed), "stem")
+
+
+@given(garbage=st.lists(st.binary(max_size=12), min_size=2, max_size=8))
+def test_bytes_after_the_message_and_in_its_padding_are_nothing(garbage):
+    """rclpy leaves either of them as it finds it."""
+    raw = serialised(pressure(Time(sec=k), 1e5 + k, "abcdef") for k in range(len(garbage)))
+    assert raw[0][12:23] == b"\x07\0\0\0abcdef\0"  # then five bytes of padding
+    spoilt = [
+        one[:23] + (extra + b"\xff").ljust(5, b"\xaa")[:5] + one[28:] + extra
+        for one, extra in zip(raw, garbage, strict=True)
+    ]
+    check_pressures(spoilt)
+    assert raw_samples._alike(spoilt, raw_samples._pressure_layout) is not None
+
+
+def test_a_stream_is_decoded_as_a_table(monkeypatch):
+    """What a publisher usually sends never comes to be deserialised one by one."""
+
+    def refuse(*_):
+        raise AssertionError("one by one")
+
+    pressures = serialised(pressure(Time(sec=-k, nanosec=k), 1e5 + k) for k in range(300))
+    stems = serialised(
+        JointState(header=Header(stamp=Time(sec=k)), name=["arm", "stem"], position=[0.0, 1e-3 * k])
+        for k in range(300)
+    )
+    monkeypatch.setattr(raw_samples, "deserialize_message", refuse)
+    assert pressures_in(pressures).values.tolist() == [1e5 + k for k in range(300)]
+    assert positions_in(stems, "stem").values.tolist() == [1e-3 * k for k in range(300)]
+
+
+def big_endian(message):
+    """Serialise a pressure without frame the other way round."""
+    fields = [
+        np.array([message.header.stamp.sec, message.header.stamp.nanosec, 1], ">i4").tobytes(),
+        b"\0\0\0\0",  # the frame's end, and padding
+        np.array([message.fluid_pressure, message.variance], ">f8").tobytes(),
+    ]
+    return b"\x00\x00\x00\x00" + b"".join(fields)
+
+
+def test_the_other_byte_order():
+    check_pressures([big_endian(pressure(Time(sec=k, nanosec=7), 1e5 + k, "")) for k in range(3)])
+
+
+@pytest.mark.parametrize("cut", [0, 3, 11, 20, 30])
+def test_what_is_no_message_is_refused_by_the_library(cut):
+    (whole,) = serialised([pressure(Time(sec=1), 1e5)])
+    with pytest.raises(RuntimeError, match="deserialize"):
+        pressures_in([whole[:cut]])
+
+
+def test_arrivals_keep_their_order():
+    raw = RawSamples("stem")
+    order = [0, 1, 1, 0, 0, 1, 0]
+    for k, is_stem in enumerate(order):
+        header = Header(stamp=Time(nanosec=k))
+        if is_stem:
+            names = ["stem"] if k != 5 else ["arm"]
+            raw.add_stem(*serialised([JointState(header=header, name=names, position=[0.5 * k])]))
+        else:
+            raw.add_pressure(*serialised([FluidPressure(header=header, fluid_pressure=1.0 * k)]))
+    assert len(raw) == 7
+    kinds, stamps, values = raw.take()
+    assert kinds.tolist() == [0, 1, 1, 0, 0, Kind.NO_POSITION, 0]
+    assert stamps.tolist() == list(range(7))
+    assert_same(values, [0.0, 0.5, 1.0, 3.0, 4.0, np.nan, 6.0])
+    assert len(raw) == 0
+    assert raw.take().stamps.size == 0

@@ -1,0 +1,60 @@
+"""Identifiers of many valves in one process, each in its valve's namespace."""
+
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from rclpy.node import Node
+from rclpy.validate_namespace import validate_namespace
+
+from valve_friction_ros.nodes.identifier import PAUSE, Identifier, identification_worker
+from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters
+from valve_friction_ros.nodes.running import run_nodes
+
+__all__ = ["identifiers_of_valves", "main"]
+
+_VALVES = ParameterSpec(
+    "valves", [""], "Namespaces of the valves, an identifier each [-]", read_only=True
+)
+
+
+def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
+    """Create the node `identifiers`, and an identifier for each valve of its parameter.
+
+    Raises
+    ------
+    ValueError
+        If no valve is named, or one twice, or ROS arguments remap their namespaces.
+    rclpy.exceptions.InvalidNamespaceException
+        If a name is no namespace.
+    """
+    host = Node("identifiers")
+    yield host
+    declare_parameters(host, (_VALVES,))
+    valves = [valve for valve in host.get_parameter(_VALVES.name).value if valve]
+    if not valves:
+        raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
+    places = [f"/{valve.strip('/')}" for valve in valves]
+    repeated = {place for place in places if places.count(place) > 1}
+    if repeated:
+        raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
+    for place in places:
+        validate_namespace(place)
+    for place in places:
+        identifier = Identifier(worker, place)
+        yield identifier
+        if identifier.get_namespace() != place:
+            raise ValueError(
+                f"the namespace {place} is remapped to {identifier.get_namespace()}: start without "
+                "__ns, the valves have namespaces of their own"
+            )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the nodes."""
+    with identification_worker() as worker:
+        return run_nodes(lambda: identifiers_of_valves(worker), arguments, pause=PAUSE)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
