@@ -10,10 +10,11 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
 from valve_friction_ros.monitoring.csv_recording import (
     CsvColumns,
+    CsvFormat,
     drive_column,
-    read_columns,
     read_recording,
 )
+from valve_friction_ros.monitoring.csv_table import read_columns
 
 HEADER = "time_s,position_m,pressure_pa"
 TIME = np.arange(40) / 1000
@@ -45,10 +46,10 @@ def write(tmp_path):
     return write
 
 
-def refused(path, valve=BENCH_VALVE, columns=None):
+def refused(path, valve=BENCH_VALVE, form=None, stretch=None):
     """Message of the refusal: one line that begins with the file."""
     with pytest.raises((ValueError, RefusalError)) as refusal:
-        read_recording(path, valve, columns)
+        read_recording(path, valve, form, stretch)
     file, _, message = str(refusal.value).partition(": ")
     assert file == str(path)
     assert "\n" not in message
@@ -99,9 +100,9 @@ class TestGoodFiles:
         assert_good(read_recording(write(lines), BENCH_VALVE))
 
     def test_other_headers(self, write):
-        columns = CsvColumns(time="t", position="Weg [m]", pressure="Druck, Pa")
+        form = CsvFormat(CsvColumns(time="t", position="Weg [m]", pressure="Druck, Pa"))
         path = write(['t,Weg [m],"Druck, Pa"', *GOOD])
-        assert_good(read_recording(path, BENCH_VALVE, columns))
+        assert_good(read_recording(path, BENCH_VALVE, form))
 
     def test_force_stands_for_pressure(self, write):
         """(100 N + 2 N·i)/0.5 m² + 8 Pa: exact."""
@@ -112,7 +113,7 @@ class TestGoodFiles:
 
     def test_pressure_goes_before_force(self, write):
         path = write([HEADER + ",force_n", *(row + ",1.0" for row in GOOD)])
-        assert drive_column(path, CsvColumns()) == "pressure_pa"
+        assert drive_column(path, CsvFormat()) == "pressure_pa"
         assert_good(read_recording(path, BENCH_VALVE))
 
     def test_times_of_a_clock(self, write):
@@ -149,7 +150,7 @@ class TestColumns:
         )
 
     def test_missing_under_its_other_name(self, write):
-        message = refused(write([HEADER, *GOOD]), columns=CsvColumns(time="t"))
+        message = refused(write([HEADER, *GOOD]), form=CsvFormat(CsvColumns(time="t")))
         assert message.startswith("no column 't' among time_s, ")
 
     def test_twice(self, write):
@@ -213,8 +214,9 @@ class TestEntries:
             assert read_recording(path, BENCH_VALVE).pressure[10] == pressure
         else:
             assert refused(path) == (
-                f"row 12, column 'pressure_pa': {pressure:g} is outside the sensor's range 0 to "
-                "250000 Pa: use a stretch of the record without it, or mend the range"
+                f"row 12, column 'pressure_pa': {pressure:g} Pa is outside the sensor's range 0 "
+                "to 250000 Pa: use a stretch of the record without it, name its unit, or mend the "
+                "range"
             )
 
 
@@ -251,7 +253,7 @@ class TestTimes:
         stamps = 1_700_000_000_000_000_000 + 1e9 * TIME
         assert refused(write([HEADER, *rows(stamps, POSITION, PRESSURE)])) == (
             "row 41, column 'time_s': 1.7e+18 s is too large for a time: "
-            "convert the column to seconds"
+            "name the unit of the column, or convert it to seconds"
         )
 
     def test_one_sample(self, write):

@@ -9,6 +9,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from valve_friction_ros.identification import Sweep
+from valve_friction_ros.monitoring.joint_position import joint_position
 
 __all__ = ["position_of", "stamp_of", "sweep_message", "time_message"]
 
@@ -29,12 +30,7 @@ def time_message(stamp: int) -> Time:
 
 def position_of(message: JointState, joint: str) -> float | None:
     """Position of `joint` in m, of the first joint for an empty name; None if it is not there."""
-    index = 0
-    if joint and message.name:
-        if joint not in message.name:
-            return None
-        index = message.name.index(joint)
-    return message.position[index] if index < len(message.position) else None
+    return joint_position(message.name, message.position, joint)
 
 
 def sweep_message(sweep: Sweep) -> Float64MultiArray:
