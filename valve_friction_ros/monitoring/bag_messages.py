@@ -58,7 +58,7 @@ def stamp_of(message: Any) -> int:
     return int(stamp.sec) * _NANOSECONDS + int(stamp.nanosec)
 
 
-def header(stamp: int) -> object:
+def header(stamp: int) -> Any:
     """Header with a stamp in ns."""
     seconds, nanoseconds = divmod(stamp, _NANOSECONDS)
     time = TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)

@@ -1,9 +1,10 @@
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future as ThreadFuture
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -20,6 +21,7 @@ from std_srvs.srv import Trigger
 from valve_friction_ros.identification import UNITS, Assessment, RefusalError
 from valve_friction_ros.model import compile_kernels
 from valve_friction_ros.monitoring import FrictionMonitor, dead_band, identify_snapshot
+from valve_friction_ros.monitoring.bag_writing import StreamNames
 from valve_friction_ros.nodes.friction_status import friction_status
 from valve_friction_ros.nodes.identifier_parameters import (
     CHANGEABLE,
@@ -30,6 +32,7 @@ from valve_friction_ros.nodes.inputs import InputWatch
 from valve_friction_ros.nodes.messages import position_of, stamp_of, sweep_message
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
 from valve_friction_ros.nodes.running import run_node
+from valve_friction_ros.nodes.saving import saving
 from valve_friction_ros.nodes.streams import LATCHED, qos_overrides, stream
 from valve_friction_ros.nodes.valve_parameters import JOINT
 
@@ -75,6 +78,7 @@ class Identifier(Node):
         self.create_service(
             Trigger, "~/identify", self._identify, callback_group=ReentrantCallbackGroup()
         )
+        self.create_service(Trigger, "~/save", self._save, callback_group=ReentrantCallbackGroup())
         self.create_service(Trigger, "~/set_baseline", self._set_baseline)
         self.create_service(Trigger, "~/clear", self._clear)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
@@ -150,7 +154,9 @@ class Identifier(Node):
             return response
         self._identifying = True
         try:
-            assessment = await self._in_worker()
+            assessment = await self._in_worker(
+                identify_snapshot, self._monitor.buffer.snapshot(), self._monitor.settings
+            )
         except RefusalError as refusal:
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
@@ -166,22 +172,32 @@ class Identifier(Node):
         self._publish_diagnostics()
         return response
 
-    def _in_worker(self) -> Future:
-        """Identify a copy of the buffer in the worker; the result arrives in the executor."""
+    async def _save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        names = StreamNames(self._pressure_watch.topic, self._stem_watch.topic, self._joint)
+        try:
+            bag = await self._in_worker(saving(self, self._monitor, names))
+        except RefusalError as refusal:
+            self.get_logger().warning(f"the buffer was not saved: {refusal}")
+            response.message = str(refusal)
+        else:
+            response.success = True
+            response.message = str(bag)
+        return response
+
+    def _in_worker(self, job: Callable[..., Any], *arguments: object) -> Future:
+        """Do a job in the worker; its result arrives in the executor."""
         executor = self.executor
         result = Future(executor=executor)
 
-        def deliver(done: "ThreadFuture[Assessment]") -> None:
+        def deliver(done: "ThreadFuture[Any]") -> None:
             error = done.exception()
             if error is not None:
                 result.set_exception(error)
             else:
                 result.set_result(done.result())
 
-        job = self._worker.submit(
-            identify_snapshot, self._monitor.buffer.snapshot(), self._monitor.settings
-        )
-        job.add_done_callback(lambda done: executor.create_task(deliver, done))
+        submitted = self._worker.submit(job, *arguments)
+        submitted.add_done_callback(lambda done: executor.create_task(deliver, done))
         return result
 
     def _set_baseline(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -30,6 +30,11 @@ class InputWatch:
         self._type = message_type
         self._since = node.get_clock().now().nanoseconds
 
+    @property
+    def topic(self) -> str:
+        """The topic, fully resolved."""
+        return self._topic
+
     def arrived(self) -> None:
         """Note that a message came."""
         self._since = self._node.get_clock().now().nanoseconds
