@@ -195,8 +195,7 @@ def read_recording(
     columns, units = form.columns, form.units
     drive = drive_column(path, form)
     whole = read_table(path, (columns.time, columns.position, drive), form.layout)
-    seconds = whole.columns[columns.time] * NANOSECONDS[units.time] / 1e9
-    table = whole.where(stretch.select(seconds))
+    table = whole.where(stretch.select(whole.columns[columns.time] * NANOSECONDS[units.time]))
     if table.samples.size == 0:
         raise RefusalError(f"{path}: there are no rows in the stretch that is asked for")
     table.require_finite()

@@ -11,6 +11,11 @@ from valve_friction_ros.monitoring.samples import nanoseconds
 __all__ = ["Stretch"]
 
 
+def _nanoseconds(seconds: float) -> float:
+    """Convert seconds to whole nanoseconds, as stamps are; infinity stays what it is."""
+    return nanoseconds(seconds) if math.isfinite(seconds) else seconds
+
+
 @dataclass(frozen=True)
 class Stretch:
     """A part of a recording; by default the whole.
@@ -42,10 +47,10 @@ class Stretch:
 
     def contains(self, since_first: int) -> bool:
         """Tell whether a time after the first sample, ns, lies between begin and end."""
-        return self.begin <= since_first / 1e9 <= self.end
+        return _nanoseconds(self.begin) <= since_first <= _nanoseconds(self.end)
 
     def select(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Choose from times in s, shape (n,); one that is not a number stays, to be refused.
+        """Choose from times in ns, shape (n,); one that is not a number stays, to be refused.
 
         Returns
         -------
@@ -53,11 +58,10 @@ class Stretch:
             True within the stretch.
         """
         with np.errstate(invalid="ignore"):
-            since = times - times[0]
-        inside: NDArray[np.bool_] = ~((since < self.begin) | (since > self.end)) | ~np.isfinite(
-            times
-        )
-        if math.isfinite(self.last) and inside.any():
+            since = np.rint(times - times[0])
+        outside = (since < _nanoseconds(self.begin)) | (since > _nanoseconds(self.end))
+        inside: NDArray[np.bool_] = ~outside | ~np.isfinite(times)
+        if inside.any():
             newest = times[inside][-1]
-            inside &= ~(np.rint((newest - times) * 1e9) > nanoseconds(self.last))
+            inside &= ~(np.rint(newest - times) > _nanoseconds(self.last))
         return inside
