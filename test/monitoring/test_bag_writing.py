@@ -14,8 +14,8 @@ from valve_friction_ros.commands.valve_file import read_valve_file
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, GRAPHITE_VALVE, Valve
 from valve_friction_ros.monitoring import RecordBuffer
-from valve_friction_ros.monitoring.bag_topics import TopicChoice
-from valve_friction_ros.monitoring.bag_writing import VALVE_FILE, StreamNames, write_bag
+from valve_friction_ros.monitoring.bag_topics import StreamNames, TopicChoice
+from valve_friction_ros.monitoring.bag_writing import VALVE_FILE, write_bag
 from valve_friction_ros.monitoring.recordings import ReadingOptions, read_recordings
 
 NAMES = StreamNames("/fv_101/actuator_pressure", "/plant/stems", "plug")
@@ -114,7 +114,8 @@ import resource, signal, sys
 from pathlib import Path
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.monitoring import RecordBuffer
-from valve_friction_ros.monitoring.bag_writing import StreamNames, write_bag
+from valve_friction_ros.monitoring.bag_topics import StreamNames
+from valve_friction_ros.monitoring.bag_writing import write_bag
 
 buffer = RecordBuffer(BENCH_VALVE, 60.0)
 for number in range(2000):

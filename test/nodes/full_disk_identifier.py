@@ -9,9 +9,10 @@ FULL = "full"
 """Name of the folder in which no file may grow."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes import identifier, saving
+    from valve_friction_ros.monitoring import bag_writing
+    from valve_friction_ros.nodes import identifier
 
-    write_bag = saving.write_bag
+    write_bag = bag_writing.write_bag
 
     def write_bag_if_there_is_room(folder, *arguments):
         limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -22,5 +23,5 @@ if __name__ == "__main__":
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
-    saving.write_bag = write_bag_if_there_is_room
+    bag_writing.write_bag = write_bag_if_there_is_room
     sys.exit(identifier.main())

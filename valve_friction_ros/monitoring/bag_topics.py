@@ -4,7 +4,15 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-__all__ = ["PRESSURE_TYPE", "STEM_TYPE", "Topic", "TopicChoice", "ValveTopics", "valves_in"]
+__all__ = [
+    "PRESSURE_TYPE",
+    "STEM_TYPE",
+    "StreamNames",
+    "Topic",
+    "TopicChoice",
+    "ValveTopics",
+    "valves_in",
+]
 
 PRESSURE_TYPE = "sensor_msgs/msg/FluidPressure"
 STEM_TYPE = "sensor_msgs/msg/JointState"
@@ -42,6 +50,14 @@ class TopicChoice:
     stem: str | None = None
     joint: str | None = None
     valve: str | None = None
+
+
+class StreamNames(NamedTuple):
+    """Topics that a bag is written with, and the name of the stem's joint."""
+
+    pressure: str
+    stem: str
+    joint: str
 
 
 class ValveTopics(NamedTuple):

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import yaml
@@ -18,11 +18,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.monitoring.bag_messages import TYPES, encode, header
-from valve_friction_ros.monitoring.bag_topics import PRESSURE_TYPE, STEM_TYPE
+from valve_friction_ros.monitoring.bag_topics import PRESSURE_TYPE, STEM_TYPE, StreamNames
 from valve_friction_ros.monitoring.record_buffer import Snapshot
 from valve_friction_ros.monitoring.samples import Samples
 
-__all__ = ["VALVE_FILE", "StreamNames", "write_bag"]
+__all__ = ["VALVE_FILE", "write_bag"]
 
 VALVE_FILE = "valve.yaml"
 """The description of the valve, in the folder of the bag."""
@@ -34,14 +34,6 @@ _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
 """Errors of a rename onto a name that something has."""
 
 _NOTHING = np.zeros(0)
-
-
-class StreamNames(NamedTuple):
-    """Topics that a bag is written with, and the name of the stem's joint."""
-
-    pressure: str
-    stem: str
-    joint: str
 
 
 def _pressures(samples: Samples) -> Iterator[tuple[int, str, bytes]]:

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from valve_friction_ros.identification import UNITS, Assessment, RefusalError
 from valve_friction_ros.model import compile_kernels
 from valve_friction_ros.monitoring import FrictionMonitor, dead_band, identify_snapshot
-from valve_friction_ros.monitoring.bag_writing import StreamNames
+from valve_friction_ros.monitoring.bag_topics import StreamNames
 from valve_friction_ros.nodes.friction_status import friction_status
 from valve_friction_ros.nodes.identifier_parameters import (
     CHANGEABLE,

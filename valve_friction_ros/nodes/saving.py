@@ -8,7 +8,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.monitoring import FrictionMonitor
-from valve_friction_ros.monitoring.bag_writing import StreamNames, write_bag
+from valve_friction_ros.monitoring.bag_topics import StreamNames
 from valve_friction_ros.nodes.data_folder import data_folder
 from valve_friction_ros.nodes.parameters import ParameterSpec
 
@@ -40,6 +40,9 @@ def saving(node: Node, monitor: FrictionMonitor, names: StreamNames) -> Callable
     snapshot, settings = monitor.buffer.snapshot(), monitor.settings
 
     def save() -> Path:
+        # Costs memory and time at the start, and most nodes never save.
+        from valve_friction_ros.monitoring.bag_writing import write_bag  # noqa: PLC0415
+
         try:
             mass = settings.identification.assumed_mass
             return write_bag(folder, name, snapshot, names, settings.valve, mass)
