@@ -147,10 +147,12 @@ class TestWholeBags:
         names = [f"bag_{number}.mcap" for number in range(12)]
         lines = ["rosbag2_bagfile_information:", f"  relative_file_paths: {names}"]
         (folder / "metadata.yaml").write_text("\n".join(lines))
-        shutil.copy(folder / "bag_0.mcap", folder / "bag_0 (copy).mcap")  # of no concern
+        shutil.copy(folder / "bag_0.mcap", folder / "bag_0 (copy).mcap")
         valve = only(folder)
         assert_equal(valve.recording(), record)
-        assert valve.notes == ()
+        assert valve.notes == ("bag_0 (copy).mcap is not in metadata.yaml, and was left out",)
+        (folder / "bag_0 (copy).mcap").unlink()
+        assert only(folder).notes == ()
         (folder / "bag_11.mcap").unlink()
         valve = only(folder)
         assert_equal(valve.recording(), record, 2750)
@@ -411,6 +413,12 @@ class TestNoBags:
 
     def test_missing(self, tmp_path):
         assert problem(tmp_path / "record.mcap") == ": no such file or folder"
+
+    def test_a_folder_under_the_name_of_a_file(self, bag_of):
+        bag = bag_of()
+        storage_file(bag).unlink()
+        (bag / "record.mcap").mkdir()
+        assert problem(bag) == ": cannot be read: Is a directory"
 
     def test_folder_without_a_bag(self, tmp_path):
         (tmp_path / "notes.txt").write_text("none")

@@ -33,6 +33,7 @@ _ROS_1 = b"#ROSBAG V"
 _LARGEST_PAGE = 65536
 """Page size of SQLite that its header of two bytes tells by a 1."""
 
+_STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 _SUFFIXES = (".mcap", ".db3", ".zstd", ".bag")
 _DAMAGE = (
     ReaderError,
@@ -104,16 +105,17 @@ def storage_files(path: Path) -> tuple[list[Path], list[str]]:
     if not path.is_dir():
         return [path], []
     names = _named_files(path)
+    there = sorted((file for file in path.iterdir() if _STORAGE.search(file.name)), key=_in_order)
     if names is None:
-        files = sorted(
-            (file for file in path.iterdir() if re.search(r"\.(mcap|db3)(\.zstd)?$", file.name)),
-            key=_in_order,
-        )
+        files = there
         notes = ["without a metadata.yaml that can be read: took all storage files in the folder"]
     else:
         files = [path / name for name in names if (path / name).exists()]
         absent = [name for name in names if not (path / name).exists()]
+        surplus = [file.name for file in there if file.name not in names]
         notes = [f"{', '.join(absent)} of metadata.yaml is not there"] if absent else []
+        if surplus:
+            notes.append(f"{', '.join(surplus)} is not in metadata.yaml, and was left out")
     if not files:
         raise ValueError(
             f"{path}: no bag: the folder holds no .mcap or .db3 file: name the folder that the "

@@ -112,6 +112,8 @@ def read_bag(
             break
         except DamagedFileError as damage:
             damaged[damage.path] = damage.cause
+        except OSError as error:
+            raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
     notes += [
         f"{file.name} is cut off or damaged ({cause}): it was read as far as it goes"
         for file, cause in damaged.items()

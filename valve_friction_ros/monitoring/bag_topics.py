@@ -114,23 +114,21 @@ def _one(names: list[str], kind: str, option: str) -> str | None:
     return next(iter(own or names), None)
 
 
-def _common_namespace(*topics: str) -> str:
-    parts = zip(*(_namespace(topic).split("/") for topic in topics), strict=False)
+def _common_namespace(*namespaces: str) -> str:
     common = []
-    for level in parts:
-        if len(set(level)) > 1:
+    for parts in zip(*(namespace.split("/") for namespace in namespaces), strict=False):
+        if len(set(parts)) > 1:
             break
-        common.append(level[0])
+        common.append(parts[0])
     return "/".join(common) or "/"
 
 
 def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> list[ValveTopics]:
     """Put topics of one namespace together; one of each belong together wherever they are."""
     if len(pressures) == len(stems) == 1:
-        pressure = _one(next(iter(pressures.values())), PRESSURE_TYPE, "--pressure-topic")
-        stem = _one(next(iter(stems.values())), STEM_TYPE, "--stem-topic")
-        assert pressure is not None and stem is not None  # noqa: S101 PT018 - no list is empty
-        return [ValveTopics(_common_namespace(pressure, stem), pressure, stem)]
+        namespace = _common_namespace(*pressures, *stems)
+        pressures = {namespace: names for names in pressures.values()}
+        stems = {namespace: names for names in stems.values()}
     return [
         ValveTopics(
             namespace,

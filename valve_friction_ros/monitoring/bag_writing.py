@@ -2,7 +2,6 @@
 
 import errno
 import heapq
-import itertools
 import os
 import shutil
 import tempfile
@@ -83,15 +82,15 @@ def _flush(folder: Path) -> None:
 
 def _moved(whole: Path, folder: Path, name: str) -> Path:
     """Give a finished bag its name, or the first free one after it."""
-    for number in itertools.count(2):
-        target = folder / name
+    number, target = 1, folder / name
+    while True:
         try:
             return whole.rename(target)
         except OSError as error:
             if error.errno not in _TAKEN:
                 raise
-        name = f"{whole.name}_{number}"
-    raise AssertionError  # there is always another number
+        number += 1
+        target = folder / f"{name}_{number}"
 
 
 def write_bag(
