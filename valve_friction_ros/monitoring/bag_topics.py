@@ -127,8 +127,7 @@ def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> lis
     """Put topics of one namespace together; one of each belong together wherever they are."""
     if len(pressures) == len(stems) == 1:
         namespace = _common_namespace(*pressures, *stems)
-        pressures = {namespace: names for names in pressures.values()}
-        stems = {namespace: names for names in stems.values()}
+        pressures, stems = ({namespace: next(iter(each.values()))} for each in (pressures, stems))
     return [
         ValveTopics(
             namespace,
