@@ -13,11 +13,12 @@ import bags
 import numpy as np
 import pytest
 import yaml
-from full_disk_identifier import FULL, SCRIPT
+from disk_trouble_identifier import FINISH, FULL, SCRIPT, SLOW
 from live_nodes import NAMESPACE, PROJECT, STREAM, stamps_of
 from records import quick_record
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import FluidPressure, JointState
+from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import UNITS
 from valve_friction_ros.model import BENCH_VALVE
@@ -162,6 +163,20 @@ def test_what_cannot_be_saved_is_told_and_the_node_goes_on(run, name, reason):
     assert run.client.trigger("identify").success
     if folder.exists():
         assert list(folder.iterdir()) == []
+
+
+def test_the_node_goes_on_while_it_saves(run):
+    folder = run.folder / SLOW
+    (result,) = run.client.set_parameters(IDENTIFIER, {"save_folder": str(folder)})
+    assert result.successful
+    saving = run.client.request(Trigger, f"{IDENTIFIER}/save", Trigger.Request())
+    run.client.next_status()
+    assert run.client.trigger("set_baseline").success
+    assert not saving.done()
+    (run.folder / FINISH).touch()
+    response = run.client.wait_until_answered(saving)
+    assert response.success, response.message
+    assert Path(response.message).parent == folder
 
 
 def test_an_empty_buffer_is_not_saved(run):
