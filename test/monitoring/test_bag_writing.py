@@ -103,6 +103,15 @@ def test_an_empty_buffer(tmp_path):
     assert not (tmp_path / "new").exists()
 
 
+def test_stamps_that_no_header_holds(tmp_path):
+    buffer = RecordBuffer(BENCH_VALVE, 5.0)
+    buffer.add_pressure((2**31 - 1) * 1_000_000_000, 1e5)
+    assert write(tmp_path, buffer).is_dir()
+    buffer.add_pressure(2**31 * 1_000_000_000, 1e5)
+    with pytest.raises(RefusalError, match="stamps after the year 2038"):
+        write(tmp_path, buffer)
+
+
 def test_a_folder_that_cannot_be(tmp_path, buffer):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="Not a directory"):

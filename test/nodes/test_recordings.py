@@ -150,11 +150,16 @@ def messages(bag):
 
 
 @pytest.mark.parametrize(
-    ("name", "reason"), [("file/folder", "Not a directory"), (FULL, "File too large")]
+    ("name", "reason"),
+    [
+        ("file/folder", "Not a directory"),
+        (FULL, "File too large"),
+        ("~nobody-of-that-name/bags", "Could not determine home directory."),
+    ],
 )
 def test_what_cannot_be_saved_is_told_and_the_node_goes_on(run, name, reason):
     (run.folder / "file").write_text("")
-    folder = run.folder / name
+    folder = Path(name) if name.startswith("~") else run.folder / name
     (result,) = run.client.set_parameters(IDENTIFIER, {"save_folder": str(folder)})
     assert result.successful
     response = run.client.trigger("save")

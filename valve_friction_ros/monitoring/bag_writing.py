@@ -32,6 +32,8 @@ _VERSION: Final = 9
 _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
 """Errors of a rename onto a name that something has."""
 
+_LARGEST_STAMP = (2**31 - 1) * 1_000_000_000
+
 _NOTHING = np.zeros(0)
 
 
@@ -134,8 +136,11 @@ def write_bag(
     OSError
         If it cannot be written; nothing is left behind.
     """
-    if snapshot.pressure.stamps.size + snapshot.position.stamps.size == 0:
+    stamps = np.concatenate((snapshot.pressure.stamps, snapshot.position.stamps))
+    if stamps.size == 0:
         raise RefusalError("the buffer is empty: there is nothing to save")
+    if np.abs(stamps).max() > _LARGEST_STAMP:
+        raise RefusalError("there are stamps after the year 2038, which no header can hold")
     folder.mkdir(parents=True, exist_ok=True)
     workplace = Path(tempfile.mkdtemp(prefix=".saving_", dir=folder))
     try:

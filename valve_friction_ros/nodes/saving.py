@@ -22,13 +22,15 @@ SAVE_FOLDER = ParameterSpec(
 )
 
 
-def _place(node: Node) -> tuple[Path, str]:
-    """Return the folder, and a name that tells valve and time."""
-    told = node.get_parameter(SAVE_FOLDER.name).value
-    folder = Path(told).expanduser() if told else data_folder() / "saved"
+def _folder(told: str) -> Path:
+    return Path(told).expanduser() if told else data_folder() / "saved"
+
+
+def _name(node: Node) -> str:
+    """Name of a bag: valve and time."""
     now = datetime.fromtimestamp(node.get_clock().now().nanoseconds / 1e9, timezone.utc)
     valve = node.get_namespace().strip("/").replace("/", "_") or node.get_name()
-    return folder, f"{valve}_{now:%Y%m%dT%H%M%SZ}"
+    return f"{valve}_{now:%Y%m%dT%H%M%SZ}"
 
 
 def saving(node: Node, monitor: FrictionMonitor, names: StreamNames) -> Callable[[], Path]:
@@ -36,18 +38,20 @@ def saving(node: Node, monitor: FrictionMonitor, names: StreamNames) -> Callable
 
     What is returned raises RefusalError with the reason if it cannot be written.
     """
-    folder, name = _place(node)
+    told, name = node.get_parameter(SAVE_FOLDER.name).value, _name(node)
     snapshot, settings = monitor.buffer.snapshot(), monitor.settings
 
     def save() -> Path:
         # Costs memory and time at the start, and most nodes never save.
         from valve_friction_ros.monitoring.bag_writing import write_bag  # noqa: PLC0415
 
+        mass = settings.identification.assumed_mass
         try:
-            mass = settings.identification.assumed_mass
-            return write_bag(folder, name, snapshot, names, settings.valve, mass)
+            return write_bag(_folder(told), name, snapshot, names, settings.valve, mass)
         except OSError as error:
             cause = error.strerror or error
-            raise RefusalError(f"cannot write a bag into {folder}: {cause}") from None
+            raise RefusalError(f"cannot write a bag into {_folder(told)}: {cause}") from None
+        except RuntimeError as error:  # a home that cannot be found
+            raise RefusalError(f"cannot write a bag into {told or '~/.ros'}: {error}") from None
 
     return save
