@@ -31,7 +31,10 @@ setup(
     ],
     install_requires=[
         "setuptools",
+        "apsw",
+        "backports.zstd",
         "Jinja2",
+        "lz4",
         "matplotlib",
         "numba",
         "numpy",

@@ -13,7 +13,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.commands.identify_recording import _as_json, _print_table, main
+from valve_friction_ros.commands.assessment_output import as_json, print_table
+from valve_friction_ros.commands.identify_recording import main
 from valve_friction_ros.identification import (
     UNITS,
     AssessedParameter,
@@ -241,10 +242,10 @@ class TestJson:
     def test_without_a_published_estimate(self, assessment):
         """The rest of the answer does not depend on it."""
         alone = dataclasses.replace(assessment, published=None, warnings=("no answer",))
-        answer = _as_json(alone)
+        answer = as_json(alone)
         assert set(answer) == KEYS
         assert set(column(answer, "published").values()) == {None}
-        assert values(answer) == values(_as_json(assessment))
+        assert values(answer) == values(as_json(assessment))
         assert answer["threshold"] == assessment.start.threshold
         assert answer["warnings"] == ["no answer"]
 
@@ -415,7 +416,7 @@ class TestTable:
             published=None,
             parameters={**assessment.parameters, "coulomb_friction": friction},
         )
-        _print_table(doubted, BENCH_VALVE)
+        print_table(doubted, BENCH_VALVE)
         out = capsys.readouterr().out
         assert row_of(out, "coulomb_friction") == "coulomb_friction – N not identifiable"
         words = " ".join(out.split())
@@ -588,7 +589,7 @@ class TestBadRecords:
             ),
             (
                 lambda c: c["pressure_pa"].put(50, 250000.5),
-                "row 52, column 'pressure_pa': 250000 is outside the sensor's range 0 to 250000 Pa",
+                "row 52, column 'pressure_pa': 250000 Pa is outside the sensor's range 0 to 250000",
             ),
             (lambda c: c.pop("time_s"), "no column 'time_s' among position_m, pressure_pa"),
             (lambda c: c.pop("pressure_pa"), "no column 'pressure_pa' (or 'force_n') among time_s"),

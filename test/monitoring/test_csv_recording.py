@@ -2,6 +2,7 @@
 
 import gzip
 import math
+import re
 
 import numpy as np
 import pytest
@@ -10,10 +11,13 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
 from valve_friction_ros.monitoring.csv_recording import (
     CsvColumns,
+    CsvFormat,
+    CsvUnits,
     drive_column,
-    read_columns,
     read_recording,
 )
+from valve_friction_ros.monitoring.csv_table import CsvLayout, read_columns
+from valve_friction_ros.monitoring.stretch import Stretch
 
 HEADER = "time_s,position_m,pressure_pa"
 TIME = np.arange(40) / 1000
@@ -45,10 +49,10 @@ def write(tmp_path):
     return write
 
 
-def refused(path, valve=BENCH_VALVE, columns=None):
+def refused(path, valve=BENCH_VALVE, form=None, stretch=None):
     """Message of the refusal: one line that begins with the file."""
     with pytest.raises((ValueError, RefusalError)) as refusal:
-        read_recording(path, valve, columns)
+        read_recording(path, valve, form, stretch)
     file, _, message = str(refusal.value).partition(": ")
     assert file == str(path)
     assert "\n" not in message
@@ -99,9 +103,9 @@ class TestGoodFiles:
         assert_good(read_recording(write(lines), BENCH_VALVE))
 
     def test_other_headers(self, write):
-        columns = CsvColumns(time="t", position="Weg [m]", pressure="Druck, Pa")
+        form = CsvFormat(CsvColumns(time="t", position="Weg [m]", pressure="Druck, Pa"))
         path = write(['t,Weg [m],"Druck, Pa"', *GOOD])
-        assert_good(read_recording(path, BENCH_VALVE, columns))
+        assert_good(read_recording(path, BENCH_VALVE, form))
 
     def test_force_stands_for_pressure(self, write):
         """(100 N + 2 N·i)/0.5 m² + 8 Pa: exact."""
@@ -112,7 +116,7 @@ class TestGoodFiles:
 
     def test_pressure_goes_before_force(self, write):
         path = write([HEADER + ",force_n", *(row + ",1.0" for row in GOOD)])
-        assert drive_column(path, CsvColumns()) == "pressure_pa"
+        assert drive_column(path, CsvFormat()) == "pressure_pa"
         assert_good(read_recording(path, BENCH_VALVE))
 
     def test_times_of_a_clock(self, write):
@@ -133,6 +137,138 @@ class TestGoodFiles:
         np.testing.assert_array_equal(found["time_s"], TIME)
 
 
+class TestUnitsAndLayout:
+    def record(self, write, time, position, pressure, units=None, **layout):
+        form = CsvFormat(units=units or CsvUnits(), layout=CsvLayout(**layout))
+        delimiter, decimal = form.layout.delimiter, form.layout.decimal
+        lines = [
+            row.replace(".", decimal).replace(";", delimiter)
+            for row in (line.replace(",", ";") for line in rows(time, position, pressure))
+        ]
+        path = write([HEADER.replace(",", delimiter), *lines])
+        return read_recording(path, BENCH_VALVE, form)
+
+    @pytest.mark.parametrize(
+        "layout",
+        [
+            {},
+            {"delimiter": ";"},
+            {"delimiter": "\t"},
+            {"delimiter": "|"},
+            {"delimiter": " "},
+            {"delimiter": ";", "decimal": ","},
+            {"delimiter": "\t", "decimal": ","},
+        ],
+    )
+    def test_layout(self, write, layout):
+        assert_good(self.record(write, TIME, POSITION, PRESSURE, **layout))
+
+    def test_decimal_comma_of_a_bad_entry(self, write):
+        form = CsvFormat(layout=CsvLayout(";", ","))
+        path = write([HEADER.replace(",", ";"), "0,0;0,001;1e5", "0,1;0,00.2;1e5"])
+        assert refused(path, form=form) == (
+            "row 3, column 'position_m': '0,00.2' is not a number: mend it or delete the row"
+        )
+
+    def test_units(self, write):
+        """Whole µm and Pa: to the last bit."""
+        micrometres, pascals = np.rint(1e6 * POSITION), np.rint(PRESSURE)
+        units = CsvUnits(time="ms", position="um", pressure="hPa")
+        record = self.record(write, 1e3 * TIME, micrometres, pascals / 100, units)
+        np.testing.assert_array_equal(record.position, micrometres / 1e6)
+        np.testing.assert_allclose(record.pressure, pascals, rtol=2**-52)
+        assert record.sample_period == 1e-3
+
+    def test_percent_of_the_travel(self, write):
+        units = CsvUnits(position="percent")
+        percent = np.linspace(10, 90, 40)
+        record = self.record(write, TIME, percent, PRESSURE, units)
+        np.testing.assert_array_equal(record.position, percent * BENCH_VALVE.travel / 100)
+        path = write([HEADER, *rows(TIME, percent, PRESSURE)])
+        assert refused(path, Valve(0.0445), CsvFormat(units=units)) == (
+            "a position in percent is a share of the travel: name the travel in the valve file"
+        )
+
+    def test_stamps_in_nanoseconds(self, write):
+        """Doubles of this century are 256 ns apart: so far may a stamp be off."""
+        stamps = 1.7e18 + 1e6 * np.arange(40)
+        record = self.record(write, stamps, POSITION, PRESSURE, CsvUnits(time="ns"))
+        assert record.start_time == 1.7e9
+        assert record.sample_period == pytest.approx(1e-3, abs=2.56e-7)
+
+    def test_force_in_its_unit(self, write):
+        """(100 kN + 2 kN·i)/0.5 m² + 8 Pa: exact."""
+        path = write(
+            ["time_s,position_m,force_n", *rows(TIME, POSITION, 100.0 + 2 * np.arange(40))]
+        )
+        form = CsvFormat(units=CsvUnits(force="kN"))
+        record = read_recording(path, Valve(0.5, pressure_reference=8.0), form)
+        np.testing.assert_array_equal(record.pressure, 200_008.0 + 4000 * np.arange(40))
+
+    def test_range_of_the_sensor_in_another_unit(self, write):
+        path = write([HEADER, *rows(TIME, POSITION, np.linspace(100, 300, 40))])
+        form = CsvFormat(units=CsvUnits(pressure="kPa"))
+        assert refused(path, form=form).startswith(
+            "row 32, column 'pressure_pa': 253.846 kPa is outside the sensor's range 0 to 250000 Pa"
+        )
+
+    @pytest.mark.parametrize(
+        ("build", "message"),
+        [
+            (lambda: CsvUnits(pressure="torr"), "unknown unit of pressure 'torr'; known are Pa, "),
+            (lambda: CsvUnits(time="h"), "unknown unit of time 'h'; known are ns, us, ms, s, min"),
+            (lambda: CsvLayout(";;"), "the delimiter must be one character"),
+            (lambda: CsvLayout(""), "the delimiter must be one character"),
+            (lambda: CsvLayout("."), "the delimiter must be one character"),
+            (lambda: CsvLayout("e"), "the delimiter must be one character"),
+            (lambda: CsvLayout(decimal=";"), "the decimal mark must be '.' or ',', got ';'"),
+            (lambda: CsvLayout(decimal=","), "delimiter and decimal mark are both ','"),
+        ],
+    )
+    def test_impossible(self, build, message):
+        with pytest.raises(ValueError, match=re.escape(message)):
+            build()
+
+
+class TestStretch:
+    @pytest.mark.parametrize(
+        ("stretch", "first", "last"),
+        [
+            (Stretch(begin=0.01), 10, 39),
+            (Stretch(end=0.02), 0, 20),
+            (Stretch(begin=0.005, end=0.0305), 5, 30),
+            (Stretch(last=0.01), 29, 39),
+            (Stretch(end=0.03, last=0.01), 20, 30),
+            (Stretch(last=100.0), 0, 39),
+        ],
+    )
+    def test_both_ends_belong_to_it(self, write, stretch, first, last):
+        path = write([HEADER, *rows(5.0 + TIME, POSITION, PRESSURE)])
+        record = read_recording(path, BENCH_VALVE, stretch=stretch)
+        np.testing.assert_array_equal(record.position, POSITION[first : last + 1])
+
+    @pytest.mark.parametrize("bad", ["0.01,nan,1e5", "0.01,0.003,3e5", "0.0001,0.003,1e5"])
+    def test_what_is_bad_outside_does_not_matter(self, write, bad):
+        path = write(with_row(12, bad))
+        assert refused(path).startswith("row 12, column ")
+        for stretch, size in ((Stretch(begin=0.0105), 29), (Stretch(begin=0.0005, end=0.0095), 9)):
+            assert len(read_recording(path, BENCH_VALVE, stretch=stretch)) == size
+
+    def test_rows_are_counted_from_the_top(self, write):
+        path = write(with_row(22, "0.02,nan,1e5"))
+        message = refused(path, stretch=Stretch(begin=0.01))
+        assert message.startswith("row 22, column 'position_m': nan is not finite")
+
+    def test_nothing_in_it(self, write):
+        message = refused(write([HEADER, *GOOD]), stretch=Stretch(begin=1.0))
+        assert message == "there are no rows in the stretch that is asked for"
+
+    @pytest.mark.parametrize("bad", [{"begin": 2, "end": 2}, {"begin": math.nan}, {"last": 0}])
+    def test_impossible(self, bad):
+        with pytest.raises(ValueError, match=r"cannot begin|must be above zero"):
+            Stretch(**bad)
+
+
 class TestColumns:
     @pytest.mark.parametrize(
         ("header", "wanted"),
@@ -149,7 +285,7 @@ class TestColumns:
         )
 
     def test_missing_under_its_other_name(self, write):
-        message = refused(write([HEADER, *GOOD]), columns=CsvColumns(time="t"))
+        message = refused(write([HEADER, *GOOD]), form=CsvFormat(CsvColumns(time="t")))
         assert message.startswith("no column 't' among time_s, ")
 
     def test_twice(self, write):
@@ -213,8 +349,9 @@ class TestEntries:
             assert read_recording(path, BENCH_VALVE).pressure[10] == pressure
         else:
             assert refused(path) == (
-                f"row 12, column 'pressure_pa': {pressure:g} is outside the sensor's range 0 to "
-                "250000 Pa: use a stretch of the record without it, or mend the range"
+                f"row 12, column 'pressure_pa': {pressure:g} Pa is outside the sensor's range 0 "
+                "to 250000 Pa: use a stretch of the record without it, name its unit, or mend the "
+                "range"
             )
 
 
@@ -251,7 +388,7 @@ class TestTimes:
         stamps = 1_700_000_000_000_000_000 + 1e9 * TIME
         assert refused(write([HEADER, *rows(stamps, POSITION, PRESSURE)])) == (
             "row 41, column 'time_s': 1.7e+18 s is too large for a time: "
-            "convert the column to seconds"
+            "name the unit of the column, or convert it to seconds"
         )
 
     def test_one_sample(self, write):

@@ -44,6 +44,11 @@ class Snapshot(NamedTuple):
     rejections: tuple[Rejection, ...]
     cleared_because: str | None
 
+    def causes(self) -> str:
+        """Tell what was wrong with the rejected samples, and with how many of them."""
+        counts = Counter(rejection.cause for rejection in self.rejections)
+        return "; ".join(f"{cause} ({count} samples)" for cause, count in counts.items())
+
     def recording(self) -> Recording:
         """Bring both signals onto one grid.
 
@@ -53,11 +58,9 @@ class Snapshot(NamedTuple):
             If samples were rejected within the window, or the signals do not make a record.
         """
         if self.rejections:
-            counts = Counter(rejection.cause for rejection in self.rejections)
-            causes = "; ".join(f"{cause} ({count} samples)" for cause, count in counts.items())
             raise RefusalError(
-                f"bad samples in the window: {causes}; mend the source, then clear the buffer "
-                "or wait until they have left it"
+                f"bad samples in the window: {self.causes()}; mend the source, then clear the "
+                "buffer or wait until they have left it"
             )
         return uniform_recording(self.pressure, self.position)
 

@@ -30,15 +30,19 @@ class GapError(RefusalError):
         As above.
     seconds : float
         Length of the gap, s.
+    what : str
+        The refusal without its advice.
     """
 
     def __init__(self, name: str, samples: Samples, sample: int) -> None:
         self.sample = sample
         self.seconds = float(samples.stamps[sample] - samples.stamps[sample - 1]) / 1e9
         since_start = float(samples.stamps[sample - 1] - samples.stamps[0]) / 1e9
+        self.what = (
+            f"gap of {self.seconds:.3g} s in {name}, {since_start:.3f} s after its first sample"
+        )
         super().__init__(
-            f"gap of {self.seconds:.3g} s in {name}, {since_start:.3f} s after its first "
-            "sample: use a record without it, or clear the buffer and gather anew"
+            f"{self.what}: use a record without it, or clear the buffer and gather anew"
         )
 
 

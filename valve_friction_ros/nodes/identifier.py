@@ -2,9 +2,11 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future as ThreadFuture
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import JumpThreshold, TimeJump
@@ -28,6 +30,7 @@ from valve_friction_ros.nodes.late_answers import create_service_with_late_answe
 from valve_friction_ros.nodes.messages import sweep_message
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
 from valve_friction_ros.nodes.running import run_nodes
+from valve_friction_ros.nodes.saving import saving
 from valve_friction_ros.nodes.streams import LATCHED
 from valve_friction_ros.nodes.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.valve_parameters import JOINT
@@ -88,6 +91,7 @@ class Identifier(Node):
         self.add_post_set_parameters_callback(self._take_parameters)
         self._identifying = False
         create_service_with_late_answers(self, Trigger, "~/identify", self._identify)
+        create_service_with_late_answers(self, Trigger, "~/save", self._save)
         self.create_service(Trigger, "~/set_baseline", self._set_baseline)
         self.create_service(Trigger, "~/clear", self._clear)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
@@ -142,14 +146,14 @@ class Identifier(Node):
             return response
         self._inputs.flush()
         self._identifying = True
-        answer, executor = Future(), self.executor
-        job = self._worker.submit(
-            identify_snapshot, self._monitor.buffer.snapshot(), self._monitor.settings
+        return self._in_worker(
+            self._conclude,
+            identify_snapshot,
+            self._monitor.buffer.snapshot(),
+            self._monitor.settings,
         )
-        job.add_done_callback(lambda done: executor.create_task(self._conclude, done, answer))
-        return answer
 
-    def _conclude(self, done: "ThreadFuture[Assessment]", answer: Future) -> None:
+    def _conclude(self, done: "ThreadFuture[Assessment]") -> Trigger.Response:
         """Take over a finished identification, and answer the request for it."""
         self._identifying = False
         response = Trigger.Response()
@@ -165,8 +169,35 @@ class Identifier(Node):
             response.success = True
             told = (*self._input_problems(), self._monitor.diagnosis().message)
             response.message = "; ".join(told)
-        answer.set_result(response)
         self._publish_diagnostics()
+        return response
+
+    def _save(self, _: Trigger.Request, __: Trigger.Response) -> Future:
+        self._inputs.flush()
+        return self._in_worker(self._saved, saving(self, self._monitor, self._inputs.names))
+
+    def _saved(self, done: "ThreadFuture[Path]") -> Trigger.Response:
+        try:
+            return Trigger.Response(success=True, message=str(done.result()))
+        except RefusalError as refusal:
+            self.get_logger().warning(f"the buffer was not saved: {refusal}")
+            return Trigger.Response(message=str(refusal))
+
+    def _in_worker(
+        self,
+        conclude: Callable[["ThreadFuture[Any]"], Trigger.Response],
+        job: Callable[..., Any],
+        *arguments: object,
+    ) -> Future:
+        """Do a job in the worker; `conclude` makes the answer of it, in the executor's thread."""
+        answer, executor = Future(), self.executor
+
+        def deliver(done: "ThreadFuture[Any]") -> None:
+            answer.set_result(conclude(done))
+
+        submitted = self._worker.submit(job, *arguments)
+        submitted.add_done_callback(lambda done: executor.create_task(deliver, done))
+        return answer
 
     def _set_baseline(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:

@@ -7,6 +7,7 @@ from typing import Any
 from valve_friction_ros.identification import FIXABLE, IdentificationSettings
 from valve_friction_ros.monitoring import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.nodes.parameters import ParameterSpec, optional
+from valve_friction_ros.nodes.saving import SAVE_FOLDER
 from valve_friction_ros.nodes.valve_parameters import VALVE_PARAMETERS, valve_from
 
 __all__ = ["CHANGEABLE", "FIXED_AT_START", "monitor_settings"]
@@ -77,6 +78,7 @@ CHANGEABLE = (
         "Friction over baseline at which the packing may leak [-]",
         (0.0, 1.0),
     ),
+    SAVE_FOLDER,
 )
 
 

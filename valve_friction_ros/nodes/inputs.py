@@ -30,6 +30,11 @@ class InputWatch:
         self._since = node.get_clock().now().nanoseconds
         self._has_arrived = False
 
+    @property
+    def topic(self) -> str:
+        """The topic, fully resolved."""
+        return self._topic
+
     def arrived(self, ago: float = 0.0) -> None:
         """Note that a message came, the last one `ago` seconds before now."""
         self._since = self._node.get_clock().now().nanoseconds - round(ago * 1e9)

@@ -1,7 +1,7 @@
 """Between messages and plain numbers."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -10,8 +10,9 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayou
 
 from valve_friction_ros.identification import Sweep
 from valve_friction_ros.monitoring import Arrivals, rows_arrived
+from valve_friction_ros.monitoring.joint_position import joint_position
 
-__all__ = ["joint_index", "position_of", "rows_of", "stamp_of", "sweep_message", "time_message"]
+__all__ = ["position_of", "rows_of", "stamp_of", "sweep_message", "time_message"]
 
 _NANOSECONDS = 1_000_000_000
 
@@ -28,23 +29,9 @@ def time_message(stamp: int) -> Time:
     return Time(sec=seconds, nanosec=nanoseconds)
 
 
-def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
-    """Place of `joint` among `positions` positions; None if it is not there.
-
-    An empty name stands for the first joint, and so does any where the joints have no names.
-    """
-    index = 0
-    if joint and names:
-        if joint not in names:
-            return None
-        index = names.index(joint)
-    return index if index < positions else None
-
-
 def position_of(message: JointState, joint: str) -> float | None:
     """Position of `joint` in m, of the first joint for an empty name; None if it is not there."""
-    index = joint_index(message.name, len(message.position), joint)
-    return None if index is None else message.position[index]
+    return joint_position(message.name, message.position, joint)
 
 
 def rows_of(message: Float64MultiArray) -> Arrivals:

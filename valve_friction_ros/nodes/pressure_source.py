@@ -18,7 +18,7 @@ from valve_friction_ros.model import (
     TriangleWave,
     converter_response,
 )
-from valve_friction_ros.monitoring.csv_recording import read_columns
+from valve_friction_ros.monitoring.csv_table import read_columns
 from valve_friction_ros.nodes.messages import time_message
 from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters, values_of
 from valve_friction_ros.nodes.running import run_node

@@ -16,7 +16,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.monitoring import Arrivals, Kind, Samples
-from valve_friction_ros.nodes.messages import joint_index, position_of, stamp_of
+from valve_friction_ros.monitoring.joint_position import joint_index
+from valve_friction_ros.nodes.messages import position_of, stamp_of
 
 __all__ = ["RawSamples", "positions_in", "pressures_in"]
 

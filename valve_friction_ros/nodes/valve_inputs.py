@@ -9,6 +9,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
 from valve_friction_ros.monitoring import Arrivals
+from valve_friction_ros.monitoring.bag_topics import StreamNames
 from valve_friction_ros.nodes.inputs import InputWatch
 from valve_friction_ros.nodes.messages import rows_of
 from valve_friction_ros.nodes.raw_samples import RawSamples
@@ -39,6 +40,7 @@ class ValveInputs:
     def __init__(self, node: Node, joint: str, hand_on: Callable[[Arrivals], None]) -> None:
         self._node = node
         self._hand_on = hand_on
+        self._joint = joint
         self._raw = RawSamples(joint)
         self._last_pressure = self._last_stem = 0.0
         self._pressure_watch = self._watch(
@@ -84,6 +86,11 @@ class ValveInputs:
         else:
             self._bad_block = None
             self._hand_on(arrivals)
+
+    @property
+    def names(self) -> StreamNames:
+        """The topics, fully resolved, and the joint."""
+        return StreamNames(self._pressure_watch.topic, self._stem_watch.topic, self._joint)
 
     def flush(self) -> None:
         """Hand on what has come so far."""

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, KarnoppParameters, Valve
+from valve_friction_ros.monitoring.joint_position import DEFAULT_JOINT
 from valve_friction_ros.nodes.parameters import ParameterSpec
 
 __all__ = [
@@ -16,7 +17,7 @@ __all__ = [
 
 JOINT = ParameterSpec(
     "joint",
-    "stem",
+    DEFAULT_JOINT,
     "Name of the stem's joint in stem_state [-]; empty: the first joint",
     read_only=True,
 )

@@ -1,0 +1,255 @@
+"""The command on bags: one valve, several, and none; and on CSV as other programs write it."""
+
+import json
+import subprocess
+import sys
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from bags import PRESSURE, messages_of, storage_file, write_bag
+
+from valve_friction_ros.commands.identify_recording import main
+from valve_friction_ros.model import Recording
+
+
+@pytest.fixture
+def call(capsys, bench_yaml):
+    """Function of arguments: exit code, stdout and stderr of the command in this process."""
+
+    def call(*arguments):
+        code = main(["--valve", str(bench_yaml), *map(str, arguments)])
+        return (code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def answer(call):
+    """Function of arguments: the one JSON object of a success."""
+
+    def answer(*arguments):
+        code, out, err = call(*arguments, "--json")
+        assert (code, err) == (0, "")
+        return json.loads(out)
+
+    return answer
+
+
+@pytest.fixture
+def bag(tmp_path, quick_record):
+    return write_bag(tmp_path / "bag", messages_of(quick_record))
+
+
+@pytest.fixture
+def csv_answer(answer, write_csv, columns_of, quick_record):
+    return answer(write_csv(columns_of(quick_record)))
+
+
+@pytest.fixture
+def fleet(tmp_path, quick_record):
+    """A good valve, one whose stem is stuck, and one without a stem."""
+    stuck = Recording(0.01, quick_record.pressure, np.full(len(quick_record), 0.01))
+    streams = [
+        *messages_of(quick_record),
+        *messages_of(stuck, "/fv_102"),
+        *(m for m in messages_of(quick_record, "/fv_103") if m[1] == PRESSURE),
+    ]
+    return write_bag(tmp_path / "fleet", sorted(streams, key=lambda message: message[2]))
+
+
+class TestOneValve:
+    @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+    def test_the_numbers_of_the_csv_file(self, answer, csv_answer, tmp_path, quick_record, storage):
+        bag = write_bag(tmp_path / storage, messages_of(quick_record), storage)
+        assert answer(bag) == csv_answer
+        assert answer(storage_file(bag)) == csv_answer
+
+    def test_a_cut_bag_is_identified_with_a_note(self, answer, call, bag):
+        file = storage_file(bag)
+        file.write_bytes(file.read_bytes()[:-3000])
+        found = answer(bag)
+        assert found["parameters"]["coulomb_friction"]["value"] == pytest.approx(152.7, rel=0.01)
+        assert found["warnings"][0] == (
+            "bag.mcap is cut off or damaged (File end magic is invalid): it was read as far as it "
+            "goes"
+        )
+        _, out, _ = call(bag)
+        assert "note: bag.mcap is cut off or damaged" in out
+
+    def test_without_ros(self, bag, bench_yaml):
+        """As a process of its own, where no package of ROS can be imported."""
+        blocked = "rclpy", "sensor_msgs", "std_msgs", "builtin_interfaces", "rosbag2_py"
+        code = (
+            f"import sys; sys.modules.update(dict.fromkeys({blocked})); "
+            "from valve_friction_ros.commands.identify_recording import main; sys.exit(main())"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(bag), "--valve", str(bench_yaml)],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "coulomb_friction" in done.stdout
+
+    def test_a_stretch(self, answer, bag, write_csv, columns_of, quick_record):
+        path = write_csv(columns_of(quick_record))
+        part = ["--begin", "1.5", "--end", "9.5", "--last", "7.5"]
+        assert answer(bag, *part) == answer(path, *part)
+        rows = slice(200, 951)
+        part = {name: values[rows] for name, values in columns_of(quick_record).items()}
+        assert answer(bag, "--begin", "2", "--end", "9.5") == answer(write_csv(part, "part.csv"))
+
+
+class TestSeveralValves:
+    def test_json(self, call, fleet, csv_answer):
+        code, out, err = call(fleet, "--json")
+        assert code == 1
+        valves = json.loads(out)["valves"]
+        assert list(valves) == ["/fv_101", "/fv_102", "/fv_103"]
+        assert valves["/fv_101"] == csv_answer
+        assert list(valves["/fv_102"]) == list(valves["/fv_103"]) == ["error"]
+        assert err.splitlines() == [
+            f"identify_recording: {valves[name]['error']}" for name in ("/fv_102", "/fv_103")
+        ]
+        assert valves["/fv_102"]["error"].startswith(
+            f"{fleet}, /fv_102: the stem did not move: its position spans 0 µm"
+        )
+
+    def test_table(self, call, fleet):
+        code, out, err = call(fleet)
+        assert code == 1
+        assert out.startswith("/fv_101\n")
+        assert out.count("published: threshold") == 1
+        assert err.count("\n") == 2
+
+    def test_one_of_them(self, answer, call, fleet, csv_answer):
+        assert answer(fleet, "--valve-name", "fv_101") == csv_answer
+        code, out, err = call(fleet, "--valve-name", "fv_103", "--json")
+        assert (code, out) == (2, "")
+        assert err == (
+            f"identify_recording: {fleet}, /fv_103: no sensor_msgs/msg/JointState topic beside "
+            "/fv_103/actuator_pressure\n"
+        )
+
+    def test_two_good_ones(self, call, tmp_path, quick_record):
+        streams = [*messages_of(quick_record, "/a"), *messages_of(quick_record, "/b")]
+        bag = write_bag(tmp_path / "two", sorted(streams, key=lambda message: message[2]))
+        code, out, err = call(bag)
+        assert (code, err) == (0, "")
+        assert [line for line in out.splitlines() if line.startswith("/")] == ["/a", "/b"]
+        one, other = out.split("/b\n")
+        assert one.removeprefix("/a\n").rstrip() == other.rstrip()
+
+    def test_none_is_good(self, call, tmp_path, quick_record):
+        still = Recording(0.01, quick_record.pressure, np.full(len(quick_record), 0.01))
+        streams = [*messages_of(still, "/a"), *messages_of(still, "/b")]
+        bag = write_bag(tmp_path / "two", sorted(streams, key=lambda message: message[2]))
+        code, out, err = call(bag)
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 2
+
+    def test_a_picture_is_of_one(self, call, fleet, tmp_path):
+        code, out, err = call(fleet, "--plot", tmp_path / "fleet.png")
+        assert (code, out) == (2, "")
+        assert err == (
+            "identify_recording: --plot draws one valve: choose one of /fv_101, /fv_102, /fv_103 "
+            "by --valve-name\n"
+        )
+        picture = tmp_path / "one.png"
+        assert call(fleet, "--valve-name", "fv_101", "--plot", picture)[0] == 0
+        assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+class TestNoRecording:
+    """Whatever is wrong, exit code 2 and one line on stderr."""
+
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            (lambda bag: storage_file(bag).write_bytes(b""), "the file is empty"),
+            (lambda bag: storage_file(bag).unlink(), "the folder holds no .mcap or .db3 file"),
+            (
+                lambda bag: storage_file(bag).write_bytes(storage_file(bag).read_bytes()[:70]),
+                "nothing of it can be read (bag.mcap: ",
+            ),
+            (
+                lambda bag: storage_file(bag).write_bytes(b"#ROSBAG V2.0\n"),
+                "a bag of ROS 1: convert it by rosbags-convert",
+            ),
+        ],
+        ids=["empty", "missing", "cut", "ROS 1"],
+    )
+    def test_refused(self, call, bag, change, words):
+        change(bag)
+        code, out, err = call(bag)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"identify_recording: {bag}")
+        assert words in err
+        assert err.count("\n") == 1
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (["--joint", "plug"], "no joint 'plug' among stem"),
+            (["--pressure-topic", "/p"], "no sensor_msgs/msg/FluidPressure topic /p in it; it "),
+            (["--stem-topic", "stem"], "no sensor_msgs/msg/JointState topic stem in it; it holds"),
+            (["--valve-name", "fv_1"], "no valve /fv_1 in it; it holds /fv_101"),
+            (["--begin", "20"], "no samples of /fv_101/actuator_pressure"),
+            (["--begin", "3", "--end", "2"], "a stretch cannot begin at 3 s and end at 2"),
+            (["--last", "0"], "the last seconds must be above zero, got 0"),
+            (["--delimiter", "ab"], "the delimiter must be one character"),
+            (["--decimal", ","], "delimiter and decimal mark are both ','"),
+        ],
+    )
+    def test_options(self, call, bag, options, words):
+        code, out, err = call(bag, *options)
+        assert (code, out) == (2, "")
+        assert words in err
+        assert err.count("\n") == 1
+
+    def test_a_bag_needs_the_valve(self, bag, capsys):
+        assert main([str(bag)]) == 2
+        assert capsys.readouterr().err == (
+            "identify_recording: pressure needs the diaphragm_area: give a valve file by --valve\n"
+        )
+
+
+class TestCsvOfOtherPrograms:
+    def test_units_delimiter_and_decimal_comma(
+        self, answer, csv_answer, tmp_path, columns_of, quick_record
+    ):
+        """A spreadsheet's: kPa, mm, ms, semicolons and decimal commas; the same digits."""
+        columns = columns_of(quick_record)
+        scaled = zip(
+            (f"{1e3 * value:.0f}" for value in columns["time_s"]),
+            (shifted(value, 3) for value in columns["position_m"].tolist()),
+            (shifted(value, -3) for value in columns["pressure_pa"].tolist()),
+            strict=True,
+        )
+        lines = ["t [ms];x [mm];p [kPa]", *(";".join(row).replace(".", ",") for row in scaled)]
+        path = tmp_path / "export.csv"
+        path.write_text("\n".join(lines))
+        found = answer(
+            path,
+            *("--delimiter", ";", "--decimal", ","),
+            *("--time-column", "t [ms]", "--time-unit", "ms"),
+            *("--position-column", "x [mm]", "--position-unit", "mm"),
+            *("--pressure-column", "p [kPa]", "--pressure-unit", "kPa"),
+        )
+        for name, entry in csv_answer["parameters"].items():
+            value = found["parameters"][name]["value"]
+            assert value == pytest.approx(entry["value"], rel=1e-9, nan_ok=True), name
+
+    def test_an_unknown_unit(self, call, bag, capsys):
+        with pytest.raises(SystemExit) as end:
+            call(bag, "--pressure-unit", "torr")
+        assert end.value.code == 2
+        assert "invalid choice: 'torr'" in capsys.readouterr().err
+
+
+def shifted(value, places):
+    """Decimal digits of a number with the point moved, none of them lost."""
+    return format(Decimal(repr(value)).scaleb(places), "f")

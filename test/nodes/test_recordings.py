@@ -1,0 +1,201 @@
+"""Recorded topics and saved buffers: the command reads out of them what the node found."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import NamedTuple
+
+import bags
+import numpy as np
+import pytest
+import yaml
+from disk_trouble_identifier import FINISH, FULL, SCRIPT, SLOW
+from live_nodes import NAMESPACE, PROJECT, STREAM, stamps_of
+from records import quick_record
+from rosbags.rosbag2 import Reader
+from sensor_msgs.msg import FluidPressure, JointState
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.identification import UNITS
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.monitoring import RecordBuffer
+
+WINDOW = 4.0
+IDENTIFIER = f"{NAMESPACE}/identifier"
+
+
+class Run(NamedTuple):
+    """A node that has identified, the numbers that it gave, and a bag of what it heard."""
+
+    client: object
+    numbers: dict
+    recorded: Path
+    folder: Path
+
+
+def identified(*arguments):
+    """The one JSON object of the command, run as a person would."""
+    command = [sys.executable, "-m", "valve_friction_ros.commands.identify_recording", "--json"]
+    done = subprocess.run(
+        [*command, *map(str, arguments)],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return json.loads(done.stdout)
+
+
+def numbers_of(answer):
+    """What the node publishes, comparable to the last bit, out of what the command prints."""
+    parameters = answer["parameters"]
+    figures = {name: answer[name] for name in ("threshold", "sigma", "r_squared", "fit", "rms")}
+    published = {f"published {name}": parameters[name]["published"] for name in UNITS}
+    values = {name: parameters[name]["value"] for name in UNITS}
+    return as_told({**figures, **published, **values})
+
+
+def as_told(numbers):
+    return {
+        name: repr(float("nan") if value is None else float(value))
+        for name, value in numbers.items()
+    }
+
+
+def held(record):
+    """Count what the node's buffer holds of a record, some of it older than the window."""
+    buffer = RecordBuffer(BENCH_VALVE, WINDOW)
+    for stamp, pressure, position in zip(
+        stamps_of(record).tolist(), record.pressure, record.position, strict=True
+    ):
+        buffer.add_pressure(stamp, pressure)
+        buffer.add_position(stamp, position)
+    return len(buffer)
+
+
+@pytest.fixture(scope="module")
+def run(shared, tmp_path_factory):
+    """Record the live topics byte by byte while a node identifies its last four of five seconds."""
+    folder = tmp_path_factory.mktemp("recorded")
+    client, heard = shared.client, []
+    for kind, name in ((FluidPressure, "actuator_pressure"), (JointState, "stem_state")):
+        topic = f"{NAMESPACE}/{name}"
+        full_name = f"sensor_msgs/msg/{kind.__name__}"
+
+        def record(data, topic=topic, full_name=full_name):
+            heard.append((topic, full_name, time.time_ns(), bytes(data)))
+
+        client.node.create_subscription(kind, topic, record, STREAM, raw=True)
+    parameters = {"window": WINDOW, "save_folder": str(folder / "saved"), "input_timeout": 600.0}
+    shared.start("identifier", parameters, script=SCRIPT)
+    client.connect(readers=2)
+    samples = quick_record()
+    client.send_record(samples)
+    client.identified_whole(held(samples))
+    client.wait_until(lambda: len(heard) == 2 * len(samples), "the recorder's messages")
+    numbers = as_told(
+        {
+            **client.friction(*UNITS, "threshold", "sigma", "r_squared", "fit", "rms"),
+            **{f"published {name}": value for name, value in client.published(*UNITS).items()},
+        }
+    )
+    recorded = bags.write_bag(folder / "heard", heard)
+    (folder / "valve.yaml").write_text(yaml.safe_dump(asdict(BENCH_VALVE)))
+    return Run(client, numbers, recorded, folder)
+
+
+def test_a_recorded_run_gives_the_numbers_of_the_node(run):
+    valve = run.folder / "valve.yaml"
+    answer = identified(run.recorded, "--valve", valve, "--last", WINDOW)
+    assert numbers_of(answer) == run.numbers
+    whole = identified(run.recorded, "--valve", valve)
+    assert numbers_of(whole) != run.numbers  # its first second changes the numbers
+
+
+def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
+    response = run.client.trigger("save")
+    assert response.success, response.message
+    saved = Path(response.message)
+    assert saved.parent == run.folder / "saved"
+    assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z", saved.name)
+    assert numbers_of(identified(saved, "--valve", saved / "valve.yaml")) == run.numbers
+
+
+def test_topics_and_stamps_of_a_saved_buffer(run):
+    saved = Path(run.client.trigger("save").message)
+    heard = {data for topic, data in messages(run.recorded)}
+    last = {data for topic, data in messages(saved)}
+    assert {topic for topic, _ in messages(saved)} == {
+        f"{NAMESPACE}/actuator_pressure",
+        f"{NAMESPACE}/stem_state",
+    }
+    assert last < heard
+
+
+def messages(bag):
+    """Topic, and stamp and value of each message; padding between the fields is not compared."""
+    with Reader(bag) as reader:
+        for connection, _, data in reader.messages():
+            message = bags.TYPES.deserialize_cdr(data, connection.msgtype)
+            stamp = message.header.stamp
+            value = getattr(message, "fluid_pressure", None)
+            value = message.position[0] if value is None else value
+            yield connection.topic, (connection.topic, stamp.sec, stamp.nanosec, value)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("file/folder", "Not a directory"),
+        (FULL, "File too large"),
+        ("~nobody-of-that-name/bags", "Could not determine home directory."),
+    ],
+)
+def test_what_cannot_be_saved_is_told_and_the_node_goes_on(run, name, reason):
+    (run.folder / "file").write_text("")
+    folder = Path(name) if name.startswith("~") else run.folder / name
+    (result,) = run.client.set_parameters(IDENTIFIER, {"save_folder": str(folder)})
+    assert result.successful
+    response = run.client.trigger("save")
+    assert not response.success
+    assert response.message == f"cannot write a bag into {folder}: {reason}"
+    assert run.client.trigger("identify").success
+    if folder.exists():
+        assert list(folder.iterdir()) == []
+
+
+def test_the_node_goes_on_while_it_saves(run):
+    folder = run.folder / SLOW
+    (result,) = run.client.set_parameters(IDENTIFIER, {"save_folder": str(folder)})
+    assert result.successful
+    saving = run.client.request(Trigger, f"{IDENTIFIER}/save", Trigger.Request())
+    run.client.next_status()
+    assert run.client.trigger("set_baseline").success
+    assert not saving.done()
+    (run.folder / FINISH).touch()
+    response = run.client.wait_until_answered(saving)
+    assert response.success, response.message
+    assert Path(response.message).parent == folder
+
+
+def test_an_empty_buffer_is_not_saved(run):
+    assert run.client.trigger("clear").success
+    response = run.client.trigger("save")
+    assert not response.success
+    assert response.message == "the buffer is empty: there is nothing to save"
+
+
+def test_without_a_folder_it_goes_under_ros_home(live, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
+    live.start_identifier()
+    live.client.send(pressure=(np.array([1, 2]), np.array([1e5, 1e5])))
+    live.client.wait_for_buffered(2)
+    response = live.client.trigger("save")
+    assert response.success, response.message
+    assert Path(response.message).parent == tmp_path / "home" / "valve_friction_ros" / "saved"

@@ -1,0 +1,129 @@
+"""Arguments of the commands that read a recording: the file, its valve, and what it leaves open."""
+
+import argparse
+from dataclasses import fields
+from pathlib import Path
+from types import MappingProxyType
+
+from valve_friction_ros.commands.valve_file import ValveFile, read_valve_file
+from valve_friction_ros.model import Valve
+from valve_friction_ros.monitoring.bag_topics import TopicChoice
+from valve_friction_ros.monitoring.csv_recording import CsvColumns, CsvFormat, CsvUnits
+from valve_friction_ros.monitoring.csv_table import CsvLayout
+from valve_friction_ros.monitoring.recordings import ReadingOptions, holds_force
+from valve_friction_ros.monitoring.stretch import Stretch
+from valve_friction_ros.monitoring.units import (
+    FORCE_UNITS,
+    NANOSECONDS,
+    PERCENT,
+    POSITION_UNITS,
+    PRESSURE_UNITS,
+)
+
+__all__ = ["DIRECT_DRIVE", "add_recording_arguments", "described_valve", "reading_options"]
+
+DIRECT_DRIVE = ValveFile(Valve(diaphragm_area=1.0), MappingProxyType({}))
+"""A machine without a diaphragm: 1 Pa of "pressure" is 1 N of force."""
+
+_TABS = {"tab": "\t", "\\t": "\t"}
+"""What people type for a tab, which a shell makes hard to type."""
+
+_UNITS = {
+    "time": (*NANOSECONDS,),
+    "position": (*POSITION_UNITS, PERCENT),
+    "pressure": (*PRESSURE_UNITS,),
+    "force": (*FORCE_UNITS,),
+}
+
+
+def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the file, ``--valve``, and the options of reading."""
+    parser.add_argument(
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="recording: CSV, may be gzipped; or a bag of ROS 2, MCAP or SQLite3: its folder or "
+        "one of its files, may be compressed",
+    )
+    parser.add_argument(
+        "--valve",
+        type=Path,
+        metavar="FILE.yaml",
+        help="diaphragm_area, pressure_reference, travel …; needed unless the file holds force_n",
+    )
+    stretch = parser.add_argument_group("part of the recording")
+    for name, help_text in (
+        ("begin", "leave out what is earlier, S seconds after the first sample"),
+        ("end", "leave out what is later, S seconds after the first sample"),
+        ("last", "only the last S seconds, as a node with `window` S takes them"),
+    ):
+        stretch.add_argument(
+            f"--{name}", type=float, default=getattr(Stretch(), name), metavar="S", help=help_text
+        )
+    bag = parser.add_argument_group("bags", "found by their types where nothing is said")
+    bag.add_argument(
+        "--pressure-topic",
+        metavar="TOPIC",
+        help="topic of the pressure; without a leading slash: in the namespace of each valve",
+    )
+    bag.add_argument("--stem-topic", metavar="TOPIC", help="topic of the stem, likewise")
+    bag.add_argument("--joint", help="joint that is the stem (the only one, or 'stem')")
+    bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
+    table = parser.add_argument_group("CSV")
+    for name, units in _UNITS.items():
+        header, unit = getattr(CsvColumns(), name), getattr(CsvUnits(), name)
+        table.add_argument(
+            f"--{name}-column", default=header, metavar="HEADER", help="column header (%(default)s)"
+        )
+        table.add_argument(
+            f"--{name}-unit",
+            default=unit,
+            choices=units,
+            metavar="UNIT",
+            help=f"{', '.join(units)} (%(default)s)",
+        )
+    table.add_argument(
+        "--delimiter", default=",", help="between the entries of a row: , ; tab … (%(default)s)"
+    )
+    table.add_argument(
+        "--decimal", default=".", metavar="MARK", help="decimal mark, . or , (%(default)s)"
+    )
+
+
+def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
+    """Build the options of reading from the parsed arguments.
+
+    Raises
+    ------
+    ValueError
+        If they do not go together.
+    """
+    columns = {
+        field.name: getattr(arguments, f"{field.name}_column") for field in fields(CsvColumns)
+    }
+    units = {field.name: getattr(arguments, f"{field.name}_unit") for field in fields(CsvUnits)}
+    delimiter = _TABS.get(arguments.delimiter, arguments.delimiter)
+    return ReadingOptions(
+        CsvFormat(
+            CsvColumns(**columns), CsvUnits(**units), CsvLayout(delimiter, arguments.decimal)
+        ),
+        TopicChoice(
+            arguments.pressure_topic, arguments.stem_topic, arguments.joint, arguments.valve_name
+        ),
+        Stretch(arguments.begin, arguments.end, arguments.last),
+    )
+
+
+def described_valve(arguments: argparse.Namespace, reading: ReadingOptions) -> ValveFile:
+    """Read the valve file; a recorded force needs none.
+
+    Raises
+    ------
+    ValueError
+        If the valve file cannot be read, or is needed and not given.
+    """
+    if arguments.valve is not None:
+        return read_valve_file(arguments.valve)
+    if not holds_force(arguments.file, reading):
+        raise ValueError("pressure needs the diaphragm_area: give a valve file by --valve")
+    return DIRECT_DRIVE

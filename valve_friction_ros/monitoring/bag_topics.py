@@ -1,0 +1,189 @@
+"""Which topics of a bag belong to which valve."""
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+__all__ = [
+    "PRESSURE_TYPE",
+    "STEM_TYPE",
+    "StreamNames",
+    "Topic",
+    "TopicChoice",
+    "ValveTopics",
+    "valves_in",
+]
+
+PRESSURE_TYPE = "sensor_msgs/msg/FluidPressure"
+STEM_TYPE = "sensor_msgs/msg/JointState"
+
+_OWN_NAMES = {PRESSURE_TYPE: "actuator_pressure", STEM_TYPE: "stem_state"}
+"""What the topics are called where this package's nodes made them."""
+
+_MOST_LISTED = 12
+"""Topics that a message lists."""
+
+
+class Topic(NamedTuple):
+    """A topic in a bag."""
+
+    name: str
+    type: str
+
+
+@dataclass(frozen=True)
+class TopicChoice:
+    """What to read from a bag where it does not say so itself.
+
+    Attributes
+    ----------
+    pressure, stem : str or None
+        Topic of the pressure and of the stem; without a leading slash: its name within the
+        namespace of each valve. None: told by its type.
+    joint : str or None
+        Name of the stem's joint; None: the only one, or the one called `stem`.
+    valve : str or None
+        Namespace of the one valve that is wanted; None: all.
+    """
+
+    pressure: str | None = None
+    stem: str | None = None
+    joint: str | None = None
+    valve: str | None = None
+
+
+class StreamNames(NamedTuple):
+    """Topics that a bag is written with, and the name of the stem's joint."""
+
+    pressure: str
+    stem: str
+    joint: str
+
+
+class ValveTopics(NamedTuple):
+    """A valve in a bag: its namespace, and its topics, of which one may be missing."""
+
+    name: str
+    pressure: str | None
+    stem: str | None
+
+    @property
+    def missing(self) -> str | None:
+        """What has to be said about a missing topic; None if both are there."""
+        if self.pressure is None:
+            return f"no {PRESSURE_TYPE} topic beside {self.stem}"
+        if self.stem is None:
+            return f"no {STEM_TYPE} topic beside {self.pressure}"
+        return None
+
+
+def _namespace(topic: str) -> str:
+    return topic.rpartition("/")[0] or "/"
+
+
+def _listed(topics: Iterable[Topic]) -> str:
+    names = sorted(f"{topic.name} ({topic.type})" for topic in set(topics))
+    more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+    return ", ".join(names[:_MOST_LISTED]) + more
+
+
+def _candidates(topics: Collection[Topic], kind: str, asked: str | None) -> dict[str, list[str]]:
+    """Topics of a type, or those that were asked for, by namespace."""
+    names = sorted({topic.name for topic in topics if topic.type == kind})
+    if asked is None:
+        found = [(_namespace(name), name) for name in names]
+    elif asked.startswith("/"):
+        found = [(_namespace(name), name) for name in names if name == asked]
+    else:
+        ending = f"/{asked}"
+        found = [(name[: -len(ending)] or "/", name) for name in names if name.endswith(ending)]
+    if not found:
+        wanted = f"no {kind} topic" + ("" if asked is None else f" {asked}")
+        raise ValueError(f"{wanted} in it; it holds {_listed(topics)}: record the valve's topics")
+    by_namespace: dict[str, list[str]] = {}
+    for namespace, name in found:
+        by_namespace.setdefault(namespace, []).append(name)
+    return by_namespace
+
+
+def _one(names: list[str], kind: str, option: str) -> str | None:
+    """Choose among topics of one type in one namespace."""
+    own = [name for name in names if name.rpartition("/")[2] == _OWN_NAMES[kind]]
+    if len(names) > 1 and len(own) != 1:
+        raise ValueError(f"several {kind} topics ({', '.join(names)}): choose one by {option}")
+    return next(iter(own or names), None)
+
+
+def _common_namespace(*namespaces: str) -> str:
+    common = []
+    for parts in zip(*(namespace.split("/") for namespace in namespaces), strict=False):
+        if len(set(parts)) > 1:
+            break
+        common.append(parts[0])
+    return "/".join(common) or "/"
+
+
+def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> list[ValveTopics]:
+    """Put topics of one namespace together; one of each belong together wherever they are."""
+    if len(pressures) == len(stems) == 1:
+        namespace = _common_namespace(*pressures, *stems)
+        pressures, stems = ({namespace: next(iter(each.values()))} for each in (pressures, stems))
+    return [
+        ValveTopics(
+            namespace,
+            _one(pressures.get(namespace, []), PRESSURE_TYPE, "--pressure-topic"),
+            _one(stems.get(namespace, []), STEM_TYPE, "--stem-topic"),
+        )
+        for namespace in sorted(pressures.keys() | stems.keys())
+    ]
+
+
+def _is_a_valve(valve: ValveTopics) -> bool:
+    """Tell whether half a pair is a valve's: a barometer is none, nor is a robot's arm."""
+    names = {topic.rpartition("/")[2] for topic in (valve.pressure, valve.stem) if topic}
+    return valve.missing is None or bool(names & set(_OWN_NAMES.values()))
+
+
+def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopics]:
+    """Find the valves of a bag.
+
+    A valve is a namespace with a topic of each type; where there is one of each in all the bag,
+    or one of each is named, they are a valve wherever they are.
+
+    Parameters
+    ----------
+    topics : collection of Topic
+        What the bag holds.
+    choice : TopicChoice
+        What is asked for.
+
+    Returns
+    -------
+    list of ValveTopics
+        By namespace; of a valve with this package's topic names one may be missing.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or it cannot be told which topics are meant; with what there is.
+    """
+    pressures = _candidates(topics, PRESSURE_TYPE, choice.pressure)
+    stems = _candidates(topics, STEM_TYPE, choice.stem)
+    valves = _paired(pressures, stems)
+    if any(name and name.startswith("/") for name in (choice.pressure, choice.stem)):
+        valves = [valve for valve in valves if valve.missing is None]
+    if all(valve.missing for valve in valves):
+        streams = [topic for topic in topics if topic.type in (PRESSURE_TYPE, STEM_TYPE)]
+        raise ValueError(
+            f"no namespace holds both a pressure and a stem, of {_listed(streams)}: "
+            "choose them by --pressure-topic and --stem-topic"
+        )
+    valves = [valve for valve in valves if _is_a_valve(valve)]
+    if choice.valve is None:
+        return valves
+    wanted = f"/{choice.valve.strip('/')}"
+    chosen = [valve for valve in valves if valve.name == wanted]
+    if not chosen:
+        names = ", ".join(valve.name for valve in valves)
+        raise ValueError(f"no valve {wanted} in it; it holds {names}")
+    return chosen

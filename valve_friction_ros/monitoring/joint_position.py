@@ -1,0 +1,52 @@
+"""Which of a message's joints is the stem."""
+
+from collections.abc import Sequence
+
+__all__ = ["DEFAULT_JOINT", "joint_index", "joint_position", "only_joint"]
+
+DEFAULT_JOINT = "stem"
+"""Name of the stem's joint where nobody says otherwise."""
+
+
+def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
+    """Place of `joint` among `positions` positions; None if it is not there.
+
+    An empty name stands for the first joint, and so does any where the joints have no names.
+    """
+    index = 0
+    if joint and names:
+        if joint not in names:
+            return None
+        index = names.index(joint)
+    return index if index < positions else None
+
+
+def joint_position(names: Sequence[str], positions: Sequence[float], joint: str) -> float | None:
+    """Position of `joint`, of the first joint for an empty name; None if it is not there.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the joints; a message may leave them out.
+    positions : sequence of float
+        Their positions, m.
+    joint : str
+        Name of the stem's joint.
+    """
+    index = joint_index(names, len(positions), joint)
+    return None if index is None else positions[index]
+
+
+def only_joint(names: Sequence[str]) -> str:
+    """Name the stem's joint among `names` where nobody has: the only one, or the default name.
+
+    Raises
+    ------
+    ValueError
+        If there are several, and none has the default name.
+    """
+    if len(names) <= 1:
+        return "".join(names)
+    if DEFAULT_JOINT in names:
+        return DEFAULT_JOINT
+    raise ValueError(f"several joints ({', '.join(names)}): name the joint that is the stem")

@@ -1,0 +1,48 @@
+"""What a recorded file says about one valve."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.recording import Recording
+
+__all__ = ["RecordedValve"]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedValve:
+    """The recording of one valve, or why there is none.
+
+    Attributes
+    ----------
+    path : Path
+        The file or folder that it was read from.
+    name : str
+        Namespace of the valve in a bag; empty for a file that does not name its valve.
+    outcome : Recording or RefusalError
+        The recording, or what was wrong with it.
+    notes : tuple of str
+        What a reader of the result should know: what was left out, and why.
+    """
+
+    path: Path
+    name: str
+    outcome: Recording | RefusalError = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """What to call it in a message."""
+        return f"{self.path}, {self.name}" if self.name else f"{self.path}"
+
+    def recording(self) -> Recording:
+        """Return the recording.
+
+        Raises
+        ------
+        RefusalError
+            If there is none: file, valve and cause.
+        """
+        if isinstance(self.outcome, RefusalError):
+            raise RefusalError(f"{self.label}: {self.outcome}")
+        return self.outcome

@@ -1,0 +1,79 @@
+"""Units that people's files are written in, and their sizes in SI units."""
+
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "FORCE_UNITS",
+    "NANOSECONDS",
+    "PERCENT",
+    "POSITION_UNITS",
+    "PRESSURE_UNITS",
+    "Unit",
+]
+
+
+class Unit(NamedTuple):
+    """Size of a unit as a ratio, so that decimals are converted without a rounding of their own.
+
+    3.7 mm is 3.7/1000 m to the last bit, which 3.7·0.001 is not.
+
+    Attributes
+    ----------
+    multiplier, divisor : float
+        One of this unit is multiplier/divisor of the SI unit.
+    """
+
+    multiplier: float
+    divisor: float = 1.0
+
+    def to_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert values in this unit."""
+        return values * self.multiplier / self.divisor
+
+
+_POUND_FORCE = 4.4482216152605
+_KILOGRAM_FORCE = 9.80665
+
+PRESSURE_UNITS = MappingProxyType(
+    {
+        "Pa": Unit(1),
+        "hPa": Unit(100),
+        "kPa": Unit(1e3),
+        "MPa": Unit(1e6),
+        "mbar": Unit(100),
+        "bar": Unit(1e5),
+        "psi": Unit(_POUND_FORCE, 6.4516e-4),
+        "kgf/cm2": Unit(_KILOGRAM_FORCE, 1e-4),
+    }
+)
+
+POSITION_UNITS = MappingProxyType(
+    {
+        "m": Unit(1),
+        "cm": Unit(1, 100),
+        "mm": Unit(1, 1e3),
+        "um": Unit(1, 1e6),
+        "in": Unit(254, 1e4),
+    }
+)
+
+PERCENT = "percent"
+"""Unit of a position that is told as a share of the travel, whose size the valve knows."""
+
+FORCE_UNITS = MappingProxyType(
+    {
+        "N": Unit(1),
+        "kN": Unit(1e3),
+        "lbf": Unit(_POUND_FORCE),
+        "kgf": Unit(_KILOGRAM_FORCE),
+    }
+)
+
+NANOSECONDS = MappingProxyType(
+    {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000, "min": 60_000_000_000}
+)
+"""Units of time in nanoseconds, which all stamps are counted in."""

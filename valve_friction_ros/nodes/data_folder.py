@@ -1,0 +1,12 @@
+"""Where nodes keep files when nobody says otherwise."""
+
+import os
+from pathlib import Path
+
+__all__ = ["data_folder"]
+
+
+def data_folder() -> Path:
+    """Return the package's folder under ROS_HOME, or under ~/.ros without it."""
+    home = os.environ.get("ROS_HOME")
+    return (Path(home) if home else Path.home() / ".ros") / "valve_friction_ros"
