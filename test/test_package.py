@@ -19,7 +19,14 @@ import rclpy
 
 PROJECT = Path(__file__).resolve().parents[1]
 NAME = "valve_friction_ros"
-EXECUTABLES = {"identifier", "simulator", "pressure_source", "demo", "identify_recording"}
+EXECUTABLES = {
+    "identifier",
+    "simulator",
+    "pressure_source",
+    "demo",
+    "identify_recording",
+    "validate_recording",
+}
 LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
 DOMAIN = 91
 PATIENCE = 30.0  # s, for one thing to happen on a loaded machine

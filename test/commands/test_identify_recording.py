@@ -13,7 +13,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.commands.identify_recording import _as_json, _print_table, main
+from valve_friction_ros.commands.assessment_output import as_json, print_table
+from valve_friction_ros.commands.identify_recording import main
 from valve_friction_ros.identification import (
     UNITS,
     AssessedParameter,
@@ -36,6 +37,7 @@ from valve_friction_ros.model import (
 POSITION_BIAS = 1.13e-3
 FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
 KEYS = {
+    "method",
     "parameters",
     "threshold",
     "samples",
@@ -50,6 +52,7 @@ KEYS = {
     "warnings",
 }
 PARAMETER_KEYS = {
+    "method",
     "value",
     "standard_error",
     "interval",
@@ -241,10 +244,10 @@ class TestJson:
     def test_without_a_published_estimate(self, assessment):
         """The rest of the answer does not depend on it."""
         alone = dataclasses.replace(assessment, published=None, warnings=("no answer",))
-        answer = _as_json(alone)
+        answer = as_json(alone)
         assert set(answer) == KEYS
         assert set(column(answer, "published").values()) == {None}
-        assert values(answer) == values(_as_json(assessment))
+        assert values(answer) == values(as_json(assessment))
         assert answer["threshold"] == assessment.start.threshold
         assert answer["warnings"] == ["no answer"]
 
@@ -415,7 +418,7 @@ class TestTable:
             published=None,
             parameters={**assessment.parameters, "coulomb_friction": friction},
         )
-        _print_table(doubted, BENCH_VALVE)
+        print_table(doubted, BENCH_VALVE)
         out = capsys.readouterr().out
         assert row_of(out, "coulomb_friction") == "coulomb_friction – N not identifiable"
         words = " ".join(out.split())

@@ -12,6 +12,7 @@ from valve_friction_ros.identification.identify import identify
 from valve_friction_ros.identification.methods import DEFAULT_METHOD, METHODS, method_named
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
+from valve_friction_ros.identification.signature_strokes import BreakawayPoint, SignatureStroke
 from valve_friction_ros.identification.sweep import Sweep, sweep_thresholds
 from valve_friction_ros.identification.sweep_assessment import SweepAssessment, assess
 from valve_friction_ros.identification.validation import Validation, validate
@@ -26,12 +27,14 @@ __all__ = [
     "UNITS",
     "AssessedParameter",
     "Assessment",
+    "BreakawayPoint",
     "Derivatives",
     "Estimate",
     "ForceBalanceAssessment",
     "IdentificationSettings",
     "IdentifiedModel",
     "RefusalError",
+    "SignatureStroke",
     "Sweep",
     "SweepAssessment",
     "Validation",

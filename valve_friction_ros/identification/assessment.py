@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,9 @@ class Assessment(ABC):
     warnings : tuple of str
         What a reader of the numbers should know, one sentence each.
     """
+
+    method: ClassVar[str]
+    """Name of the method, as in `METHODS`."""
 
     parameters: Mapping[str, AssessedParameter]
     published: Estimate | None

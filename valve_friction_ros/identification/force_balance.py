@@ -1,12 +1,15 @@
 """Method "force_balance": the paper's model 2, from the force balances of a valve signature."""
 
+import math
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.assessment import Assessment
+from valve_friction_ros.identification.estimate import UNITS
 from valve_friction_ros.identification.excitation_check import (
     require_enough_samples,
     require_motion,
@@ -24,9 +27,12 @@ from valve_friction_ros.identification.valve_signature import (
     TRIANGLE_NEEDED,
     ValveSignature,
     Ways,
+    breakaway_points,
+    leaving_speed,
     mean_position_bias,
     mean_spring_constant,
     sliding_friction,
+    sliding_speed,
     valve_signature,
 )
 from valve_friction_ros.identification.verdict import (
@@ -46,6 +52,8 @@ _SURE = 4.0
 _LEAST_SLIP = 0.03
 """A slip jump counts from this share of F_s on, and from four standard errors."""
 
+_HIDDEN = "the stem jumps as it breaks away, too fast or too little for this record to tell how"
+
 _BREAKAWAY_BIAS = 0.01
 _STIFFNESS_BIAS = 2e-3
 """Shares by which F_s at the breakaway points, and k, can be wrong alike in every stroke."""
@@ -64,6 +72,8 @@ class ForceBalanceAssessment(Assessment):
     validation : Validation
         The same record simulated with it.
     """
+
+    method: ClassVar[str] = "force_balance"
 
     signature: ValveSignature
     identified: IdentifiedModel
@@ -143,9 +153,10 @@ def assess_force_balance(
     within 0.2 % and x̄ within 0.05 mm. F_v is a small difference: an error of 1 % in F_c is one of
     26 % (low) or 11 % (high) in F_v.
 
-    With a slip jump F_c is not F_s. Then F_c is taken from the width of the loop, which is
-    F_c + F_v·|ẋ|, and called weak; F_v cannot be told from it. A jump smaller than F_v·|ẋ| is
-    hidden by it.
+    With a slip jump F_c is not F_s, which the paper leaves to future work. The loop's half width
+    is then F_c + F_v·|ẋ|, and as the stem leaves at the speed v_j, the force balance is
+    F_s = F_c + F_v·v_j: their difference gives F_v = (F_s − half width)/(v_j − |ẋ|), and F_c
+    follows. A jump smaller than F_v·|ẋ| does not show.
     """
     settings = settings or IdentificationSettings()
     if settings.fixed.get("spring_constant") == 0:
@@ -205,16 +216,19 @@ def _figures(ways: Ways, settings: IdentificationSettings) -> dict[str, float]:
         for way in ways
     ]
     static_friction = given.get("static_friction", float(np.mean(pulls)))
-    loop = sliding_friction(ways, spring_constant)
     coulomb_friction = given.get("coulomb_friction", static_friction)
+    slip = static_friction - sliding_friction(ways, spring_constant)
+    leaving, speed = leaving_speed(ways), sliding_speed(ways)
+    falling = slip / (leaving - speed) if leaving > speed else math.nan
     return {
         "spring_constant": spring_constant,
         "spring_preload": spring_constant * bias,
         "static_friction": static_friction,
         "coulomb_friction": coulomb_friction,
         "viscous_friction": _viscous_friction(ways, coulomb_friction, spring_constant, bias),
-        "sliding_friction": loop,
-        "slip": static_friction - loop,
+        "slip": slip,
+        "viscous_friction after a jump": falling,
+        "coulomb_friction after a jump": static_friction - falling * leaving,
     }
 
 
@@ -237,11 +251,9 @@ def _judged(
 ) -> dict[str, AssessedParameter]:
     """Judge every parameter by its scatter between strokes and the bias of the method."""
     values, errors = found.values, found.standard_errors
-    strokes = [stroke for way in ways for stroke in way]
-    speed = float(np.mean([np.mean(np.abs(stroke.sliding.velocity)) for stroke in strokes]))
-    place = float(
-        np.mean([abs(stroke.breakaway.position) for stroke in strokes if stroke.breakaway])
-    )
+    speed = sliding_speed(ways)
+    points = [point for way in ways for point in breakaway_points(way)]
+    place = float(np.mean([abs(point.position) for point in points]))
     stiffness = _STIFFNESS_BIAS * values["spring_constant"]
     friction = _BREAKAWAY_BIAS * values["static_friction"]
     biases = {
@@ -250,45 +262,28 @@ def _judged(
         "static_friction": friction,
         "spring_constant": stiffness,
         "spring_preload": stiffness * place,
-        "sliding_friction": stiffness * place,
     }
-
-    def judge(name: str, source: str, doubt: str = "") -> AssessedParameter:
-        width = half_width(errors[source], found.freedom) + biases[source]
-        return judged(name, values[source], errors[source], width, doubt)
-
+    least_slip = max(_SURE * errors["slip"], _LEAST_SLIP * values["static_friction"])
+    jumps = values["slip"] > least_slip and "coulomb_friction" not in settings.fixed
     slow = (
         ""
         if speed >= FALL_SPEED
         else f"holds at {speed * 1e3:.2g} mm/s, the speed here: "
         f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
     )
-    jumps = values["slip"] > max(_SURE * errors["slip"], _LEAST_SLIP * values["static_friction"])
-    jump = "the stem jumps as it breaks away, so F_c is not F_s"
-    coulomb_friction, viscous_friction = (
-        (
-            judge(
-                "coulomb_friction",
-                "sliding_friction",
-                f"{jump}: this is the friction at {speed * 1e3:.2g} mm/s, F_v·ẋ in it",
-            ),
-            not_identifiable("viscous_friction", f"{jump}, and F_v cannot be told from F_c"),
-        )
-        if jumps and "coulomb_friction" not in settings.fixed
-        else (
-            judge("coulomb_friction", "coulomb_friction", slow),
-            judge("viscous_friction", "viscous_friction", slow),
-        )
-    )
-    verdicts = {
+    judgements = {
         "mass": not_identifiable(
             "mass", f"a constant speed takes no inertia; {settings.assumed_mass:g} kg assumed"
-        ),
-        "viscous_friction": viscous_friction,
-        "coulomb_friction": coulomb_friction,
-        "static_friction": judge("static_friction", "static_friction"),
-        "spring_constant": judge("spring_constant", "spring_constant"),
-        "spring_preload": judge("spring_preload", "spring_preload"),
+        )
     }
-    given = {name: fixed(name, settings.fixed[name]) for name in verdicts if name in settings.fixed}
-    return {**verdicts, **given}
+    for name, bias in biases.items():
+        is_sliding = name in ("coulomb_friction", "viscous_friction")
+        source = f"{name} after a jump" if jumps and is_sliding else name
+        if math.isnan(values[source]):
+            judgements[name] = not_identifiable(name, _HIDDEN)
+        else:
+            width = half_width(errors[source], found.freedom) + bias
+            doubt = slow if is_sliding else ""
+            judgements[name] = judged(name, values[source], errors[source], width, doubt)
+    given = {name: fixed(name, value) for name, value in settings.fixed.items() if name in UNITS}
+    return {**judgements, **given}

@@ -5,9 +5,12 @@ from types import MappingProxyType
 from typing import Protocol
 
 from valve_friction_ros.identification.assessment import Assessment
-from valve_friction_ros.identification.force_balance import assess_force_balance
+from valve_friction_ros.identification.force_balance import (
+    ForceBalanceAssessment,
+    assess_force_balance,
+)
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.sweep_assessment import assess
+from valve_friction_ros.identification.sweep_assessment import SweepAssessment, assess
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
@@ -27,12 +30,12 @@ class Method(Protocol):
         """Identify a record; raises RefusalError for one that cannot tell."""
 
 
-DEFAULT_METHOD = "sweep"
-
 METHODS: Mapping[str, Method] = MappingProxyType(
-    {DEFAULT_METHOD: assess, "force_balance": assess_force_balance}
+    {SweepAssessment.method: assess, ForceBalanceAssessment.method: assess_force_balance}
 )
 """``sweep``: the paper's model 1, refined. ``force_balance``: its model 2, from a signature."""
+
+DEFAULT_METHOD = SweepAssessment.method
 
 
 def method_named(name: str) -> Method:

@@ -13,6 +13,9 @@ _JUMP_GAIN = 12.0
 parameter more, chance brings it once in a thousand times."""
 
 _FEWEST = 8
+_LAGS = (0.02, 0.1, 0.4)
+_LATER = (0.0, 0.03)
+"""Lags, and delays of a jump after the onset without it, to start from, as shares of the time."""
 
 
 class Onset(NamedTuple):
@@ -133,13 +136,17 @@ def fit_onset(
     if time.size < _FEWEST:
         raise ValueError(f"{time.size} samples are too few for an onset, at least {_FEWEST}")
     span = float(time[-1] - time[0])
-    starts = [(guess, share * span) for share in (0.02, 0.1)]
-    plain, jumping = (
-        min(
-            (_fit(time, position, start, growth, jumps) for start in starts),
-            key=lambda one: one[-1],
-        )
-        for jumps in (False, True)
+    plain = min(
+        (_fit(time, position, (guess, lag * span), growth, False) for lag in _LAGS),
+        key=lambda one: one[-1],
+    )
+    jumping = min(
+        (
+            _fit(time, position, (plain[0] + later * span, lag * span), growth, True)
+            for later in _LATER
+            for lag in _LAGS
+        ),
+        key=lambda one: one[-1],
     )
     variance = jumping[-1] / (time.size - 5)
     sliding, leaving = jumping[2][1:] * np.sign(plain[2][1])

@@ -48,12 +48,15 @@ class BreakawayPoint(NamedTuple):
         Pressure at that instant, Pa.
     force : float
         Actuator force F_ext at that instant, N.
+    speed : float
+        Speed at which the stem leaves, m/s: above zero after a slip jump that shows.
     """
 
     time: float
     position: float
     pressure: float
     force: float
+    speed: float
 
 
 class Sliding(NamedTuple):
@@ -189,7 +192,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
         strokes.append(
             SignatureStroke(
                 direction,
-                _breakaway(recording, valve, rest[0] + margin, begin + margin, end + margin),
+                _breakaway(recording, valve, (rest[0], begin, end), window),
                 float(np.sum(np.abs(velocity[steady])) / np.sum(np.abs(run))),
                 sliding,
             )
@@ -199,12 +202,16 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
 
 
 def _breakaway(
-    recording: Recording, valve: Valve, rest: int, begin: int, end: int
+    recording: Recording, valve: Valve, places: tuple[int, int, int], window: int
 ) -> BreakawayPoint | None:
-    """Locate the onset of the stroke from sample `begin` to `end`, at rest since `rest`."""
+    """Locate the onset of a stroke from where its velocity rests, begins and ends.
+
+    A derivative window sees a jump half of its length too early, so half more is fitted.
+    """
+    rest, begin, end = (place + window // 2 for place in places)
     position, period = recording.position, recording.sample_period
     moved = np.abs(position[begin:end] - position[begin])
-    length = int(np.argmax(moved > _ONSET_SHARE * moved[-1]))
+    length = int(np.argmax(moved > _ONSET_SHARE * moved[-1])) + window // 2
     first = max(rest, begin - length)
     if begin - first < max(length // 4, _FEWEST) or length < _FEWEST:
         return None
@@ -222,4 +229,5 @@ def _breakaway(
         onset.level,
         pressure,
         valve.diaphragm_area * (pressure - valve.pressure_reference),
+        onset.jump_speed,
     )

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,8 @@ class SweepAssessment(Assessment):
         The refined model and its residual; None without a spring, where the stem cannot be
         simulated.
     """
+
+    method: ClassVar[str] = "sweep"
 
     start: Estimate
     force_fit: float

@@ -22,9 +22,11 @@ __all__ = [
     "ValveSignature",
     "Ways",
     "breakaway_points",
+    "leaving_speed",
     "mean_position_bias",
     "mean_spring_constant",
     "sliding_friction",
+    "sliding_speed",
     "valve_signature",
 ]
 
@@ -125,6 +127,18 @@ def sliding_friction(ways: Ways, spring_constant: float) -> float:
         for way in ways
     )
     return 0.5 * (upward - downward)
+
+
+def sliding_speed(ways: Ways) -> float:
+    """Return the mean speed at which the stem slides, m/s."""
+    strokes = [stroke for way in ways for stroke in way]
+    return float(np.mean([np.mean(np.abs(stroke.sliding.velocity)) for stroke in strokes]))
+
+
+def leaving_speed(ways: Ways) -> float:
+    """Return the mean speed at which the stem breaks away, m/s; 0 where any stroke shows none."""
+    speeds = [point.speed for way in ways for point in breakaway_points(way)]
+    return float(np.mean(speeds)) if min(speeds) > 0 else 0.0
 
 
 def valve_signature(
