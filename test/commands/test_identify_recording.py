@@ -52,7 +52,6 @@ KEYS = {
     "warnings",
 }
 PARAMETER_KEYS = {
-    "method",
     "value",
     "standard_error",
     "interval",

@@ -13,6 +13,13 @@ from valve_friction_ros.identification.methods import DEFAULT_METHOD, METHODS, m
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
 from valve_friction_ros.identification.signature_strokes import BreakawayPoint, SignatureStroke
+from valve_friction_ros.identification.step_detection import find_steps
+from valve_friction_ros.identification.step_response import (
+    Bracket,
+    StepMetrics,
+    StepTest,
+    step_test,
+)
 from valve_friction_ros.identification.sweep import Sweep, sweep_thresholds
 from valve_friction_ros.identification.sweep_assessment import SweepAssessment, assess
 from valve_friction_ros.identification.validation import Validation, validate
@@ -27,6 +34,7 @@ __all__ = [
     "UNITS",
     "AssessedParameter",
     "Assessment",
+    "Bracket",
     "BreakawayPoint",
     "Derivatives",
     "Estimate",
@@ -35,6 +43,8 @@ __all__ = [
     "IdentifiedModel",
     "RefusalError",
     "SignatureStroke",
+    "StepMetrics",
+    "StepTest",
     "Sweep",
     "SweepAssessment",
     "Validation",
@@ -43,9 +53,11 @@ __all__ = [
     "assess",
     "assess_force_balance",
     "differentiate",
+    "find_steps",
     "identified_model",
     "identify",
     "method_named",
+    "step_test",
     "sweep_thresholds",
     "validate",
     "valve_signature",
