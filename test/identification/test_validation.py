@@ -54,8 +54,9 @@ class TestFigures:
 
 @pytest.mark.parametrize("name", ["low", "high", "graphite"])
 def test_the_true_model_leaves_nothing(benches, bench_record, name):
+    """Nothing but what cubics over a few samples take from the sine: less than 0.1 nm."""
     found = validate(bench_record(name, SineWave(), 71.0), *benches[name])
-    assert found.maximum_error < 1e-12
+    assert found.maximum_error < 1e-10
     assert found.fit == pytest.approx(1.0, abs=1e-9)
 
 
