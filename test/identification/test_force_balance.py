@@ -209,6 +209,34 @@ def test_pressure_and_stem_against_each_other(bench_record):
         assess_force_balance(mirrored, BENCH_VALVE)
 
 
+class TestContradictions:
+    """Given values that the record belies."""
+
+    @pytest.fixture(scope="class")
+    def record(self, bench_record):
+        return bench_record("high", TriangleWave(), FIVE_STROKES)
+
+    @pytest.mark.parametrize(
+        ("fixed", "cause"),
+        [
+            ({"spring_constant": 1.0}, "give a friction of -.* N, which cannot be"),
+            ({"spring_preload": 9000.0}, "does not reproduce the record"),
+        ],
+    )
+    def test_refused(self, record, fixed, cause):
+        with pytest.raises(RefusalError, match=cause):
+            assess_force_balance(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+
+    def test_too_large_a_coulomb_friction_leaves_no_viscous_one(self, record):
+        settings = IdentificationSettings(fixed={"coulomb_friction": 700.0})
+        found = assess_force_balance(record, BENCH_VALVE, settings)
+        viscous = found.parameters["viscous_friction"]
+        assert viscous.verdict is Verdict.NOT_IDENTIFIABLE
+        assert viscous.reason.startswith("it came out negative (-")
+        assert found.model().viscous_friction > 0
+        assert any("viscous_friction is not identified" in note for note in found.warnings)
+
+
 def test_slow_sampling_and_a_converter_without_lag(benches):
     """100 Hz, and corners of the pressure that are sharp."""
     time = np.arange(15_000) / 100

@@ -52,6 +52,7 @@ _SURE = 4.0
 _LEAST_SLIP = 0.03
 """A slip jump counts from this share of F_s on, and from four standard errors."""
 
+_LEAST_FIT = 0.9
 _HIDDEN = "the stem jumps as it breaks away, too fast or too little for this record to tell how"
 
 _BREAKAWAY_BIAS = 0.01
@@ -141,7 +142,8 @@ def assess_force_balance(
     Raises
     ------
     RefusalError
-        If the record is no valve signature; the message says which excitation gives one.
+        If the record is no valve signature, and the message says which excitation gives one, or
+        if the model does not reproduce it.
 
     Notes
     -----
@@ -181,7 +183,18 @@ def assess_force_balance(
     parameters = _judged(found, ways, settings)
     values = {name: one.value for name, one in parameters.items()}
     mass = settings.fixed.get("mass", settings.assumed_mass)
-    identified = identified_model({**values, "mass": mass})
+    try:
+        identified = identified_model({**values, "mass": mass})
+    except ValueError as error:
+        raise RefusalError(
+            f"the force balances give an impossible valve: {error}; check both signals"
+        ) from None
+    validation = validate(recording, valve, identified.parameters)
+    if validation.fit < _LEAST_FIT:
+        raise RefusalError(
+            f"the model of the force balances does not reproduce the record (fit "
+            f"{100 * validation.fit:.0f} %): check what is fixed, both signals and their clocks"
+        )
     return ForceBalanceAssessment(
         MappingProxyType(parameters),
         published=None,
@@ -189,7 +202,7 @@ def assess_force_balance(
         warnings=identified.notes,
         signature=signature,
         identified=identified,
-        validation=validate(recording, valve, identified.parameters),
+        validation=validation,
     )
 
 
@@ -281,6 +294,9 @@ def _judged(
         source = f"{name} after a jump" if jumps and is_sliding else name
         if math.isnan(values[source]):
             judgements[name] = not_identifiable(name, _HIDDEN)
+        elif name == "viscous_friction" and values[source] < 0:
+            reason = f"it came out negative ({values[source]:.4g} N·s/m)"
+            judgements[name] = not_identifiable(name, reason)
         else:
             width = half_width(errors[source], found.freedom) + bias
             doubt = slow if is_sliding else ""

@@ -220,6 +220,8 @@ def _breakaway(
     pressure_then = Polynomial.fit(time, recording.pressure[around], 2)
     rate = float(pressure_then.deriv()(begin * period))
     growth = float(pressure_then.deriv(2)(begin * period)) / rate if rate else 0.0
+    most = 1 / float(time[-1] - time[0])
+    growth = min(max(growth, -most), most)
     onset = fit_onset(time, position[around], begin * period, growth)
     middle = round(onset.time / period)
     near = slice(max(middle - length // 2, first), middle + length // 2 + 1)
