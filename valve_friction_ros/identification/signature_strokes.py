@@ -178,8 +178,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
         run = velocity[begin:end]
         if abs(way) < _LEAST_STROKE_SHARE * span or (direction * run < 0).any():
             continue
-        pace = float(np.median(run))
-        steady = begin + np.flatnonzero(np.abs(run - pace) <= _STEADY * abs(pace))
+        steady = begin + _steady_instants(run)
         sliding = Sliding(
             recording.time[steady + margin],
             position[steady + margin],
@@ -199,6 +198,17 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
         )
         last_end = end
     return tuple(strokes)
+
+
+def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Find the samples of a run that are steady, in its longest stretch that is nearly so.
+
+    Elsewhere the velocity of a stem that jumps or stops only passes through the steady one.
+    """
+    pace = float(np.median(run))
+    distance = np.abs(run - pace)
+    begin, end = max(_runs(distance <= 2 * _STEADY * abs(pace)), key=lambda one: one[1] - one[0])
+    return begin + np.flatnonzero(distance[begin:end] <= _STEADY * abs(pace))
 
 
 def _breakaway(
