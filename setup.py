@@ -51,6 +51,7 @@ setup(
             "simulator = valve_friction_ros.nodes.start:simulator",
             "pressure_source = valve_friction_ros.nodes.start:pressure_source",
             "demo = valve_friction_ros.commands.demo:main",
+            "validate_recording = valve_friction_ros.commands.validate_recording:main",
             "identify_recording = valve_friction_ros.commands.identify_recording:main",
         ],
     },

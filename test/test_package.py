@@ -26,6 +26,7 @@ EXECUTABLES = {
     "identify_recording",
     "pressure_source",
     "simulator",
+    "validate_recording",
 }
 LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
 DOMAIN = 91

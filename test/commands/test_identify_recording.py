@@ -21,6 +21,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     Verdict,
     assess,
+    assess_force_balance,
     identify,
 )
 from valve_friction_ros.model import (
@@ -31,12 +32,14 @@ from valve_friction_ros.model import (
     Recording,
     SensorNoise,
     SineWave,
+    TriangleWave,
     simulate,
 )
 
 POSITION_BIAS = 1.13e-3
 FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
 KEYS = {
+    "method",
     "parameters",
     "threshold",
     "samples",
@@ -800,3 +803,54 @@ class TestRealMachine:
         options = ["--time-column", names[0], "--force-column", names[1]]
         options += ["--position-column", names[2], "--fix", "spring_constant=0"]
         assert printed(EMPS, *options) == printed(recorded, "--fix", "spring_constant=0")
+
+
+class TestForceBalance:
+    """A signature by ``--method force_balance``, as the library identifies it."""
+
+    @pytest.fixture(scope="class")
+    def signature(self, benches):
+        pressure = TriangleWave().sample(np.arange(13_000) / 100)
+        position = simulate(*benches["high"], pressure, 0.01).position
+        return Recording(0.01, pressure, position)
+
+    @pytest.fixture
+    def path(self, write_csv, columns_of, signature):
+        return write_csv(columns_of(signature))
+
+    @pytest.fixture(scope="class")
+    def expected(self, signature):
+        return assess_force_balance(signature, BENCH_VALVE, SETTINGS)
+
+    def test_json(self, printed, path, bench_options, expected):
+        answer = printed(path, *bench_options, "--method", "force_balance")
+        assert answer["method"] == "force_balance"
+        assert values(answer) == pytest.approx(
+            {name: none_for_nan(value) for name, value in expected.values.items()}, rel=1e-9
+        )
+        signature = expected.signature
+        assert answer["position_bias"] == pytest.approx(signature.position_bias, rel=1e-6)
+        assert answer["dead_zone"] == pytest.approx(signature.dead_zone, rel=1e-9)
+        points = [(one["direction"], one["time"]) for one in answer["breakaway_points"]]
+        assert [way for way, _ in points] == [1, -1, 1, -1, 1]
+        assert {entry["published"] for entry in answer["parameters"].values()} == {None}
+        assert answer["fit"] == pytest.approx(expected.fit, rel=1e-6)
+
+    def test_table_and_picture(self, call, path, bench_options, tmp_path):
+        picture = tmp_path / "signature.png"
+        code, out, err = call(path, *bench_options, "--method", "force_balance", "--plot", picture)
+        assert (code, err) == (0, "")
+        words = " ".join(out.split())
+        assert "the model's stem is" in words
+        assert "signature: 3 strokes up and 2 down, bias x̄ 1.1" in words
+        assert picture.read_bytes().startswith(PNG)
+
+    def test_a_square_wave_is_refused(
+        self, call, write_csv, columns_of, square_record, bench_options
+    ):
+        path = write_csv(columns_of(square_record))
+        code, out, err = call(path, *bench_options, "--method", "force_balance")
+        assert (code, out) == (2, "")
+        assert err.startswith(f"identify_recording: {path}: the stem does not slide at a constant")
+        assert "slow triangular wave" in err
+        assert err.count("\n") == 1

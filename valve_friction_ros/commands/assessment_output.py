@@ -1,17 +1,20 @@
-"""An assessment as a table for people and as JSON for programs."""
+"""How an assessment is told: as an object of JSON, and as a table."""
 
 import math
 from collections.abc import Sequence
+from functools import singledispatch
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import two_digits
+from valve_friction_ros.commands.formatting import json_number, two_digits
 from valve_friction_ros.identification import (
     ASSESSED_UNITS,
     AssessedParameter,
     Assessment,
+    ForceBalanceAssessment,
+    SweepAssessment,
     Verdict,
 )
 from valve_friction_ros.model import Valve
@@ -20,20 +23,15 @@ from valve_friction_ros.monitoring import percentage
 __all__ = ["as_json", "print_table"]
 
 
-def _json_number(value: float) -> float | None:
-    """JSON has no nan: null stands for it."""
-    return value if math.isfinite(value) else None
-
-
 def _parameter_as_json(parameter: AssessedParameter, published: float) -> dict[str, Any]:
     low, high = parameter.interval
     return {
-        "value": _json_number(parameter.value),
-        "standard_error": _json_number(parameter.standard_error),
-        "interval": [_json_number(low), _json_number(high)],
+        "value": json_number(parameter.value),
+        "standard_error": json_number(parameter.standard_error),
+        "interval": [json_number(low), json_number(high)],
         "verdict": parameter.verdict.value,
         "reason": parameter.reason,
-        "published": _json_number(published),
+        "published": json_number(published),
         "unit": ASSESSED_UNITS[parameter.name],
         "fixed": parameter.verdict is Verdict.FIXED,
     }
@@ -46,24 +44,53 @@ def _published(assessment: Assessment, name: str) -> float:
 
 def as_json(assessment: Assessment, notes: Sequence[str] = ()) -> dict[str, Any]:
     """Build the object that JSON shows of an assessment; `notes` join its warnings."""
-    estimate = assessment.published or assessment.start
     misfit = assessment.misfit
     return {
+        "method": assessment.method,
         "parameters": {
             name: _parameter_as_json(parameter, _published(assessment, name))
             for name, parameter in assessment.parameters.items()
         },
-        "threshold": estimate.threshold,
-        "samples": estimate.samples,
-        "sigma": _json_number(estimate.sigma),
-        "r_squared": _json_number(estimate.r_squared),
-        "window": estimate.settings.window,
-        "chosen_window": assessment.start.settings.window,
-        "fit": _json_number(assessment.force_fit if misfit is None else misfit.fit),
-        "rms": None if misfit is None else misfit.rms,
+        **_evidence(assessment),
+        "chosen_window": assessment.window,
+        "fit": json_number(assessment.fit),
+        "rms": json_number(assessment.rms),
         "systematic_misfit": None if misfit is None else misfit.systematic,
         "model_describes": None if misfit is None else misfit.describes,
         "warnings": [*notes, *_warnings(assessment)],
+    }
+
+
+@singledispatch
+def _evidence(assessment: Assessment) -> dict[str, Any]:
+    """Return what is particular to a method."""
+    raise NotImplementedError(type(assessment))
+
+
+@_evidence.register
+def _(assessment: SweepAssessment) -> dict[str, Any]:
+    estimate = assessment.published or assessment.start
+    return {
+        "threshold": estimate.threshold,
+        "samples": estimate.samples,
+        "sigma": json_number(estimate.sigma),
+        "r_squared": json_number(estimate.r_squared),
+        "window": estimate.settings.window,
+    }
+
+
+@_evidence.register
+def _(assessment: ForceBalanceAssessment) -> dict[str, Any]:
+    signature = assessment.signature
+    return {
+        "position_bias": signature.position_bias,
+        "dead_zone": signature.dead_zone,
+        "dead_zone_share": signature.dead_zone_share,
+        "breakaway_points": [
+            {"direction": stroke.direction, **stroke.breakaway._asdict()}
+            for stroke in signature.strokes
+            if stroke.breakaway is not None
+        ],
     }
 
 
@@ -104,22 +131,49 @@ def print_table(assessment: Assessment, valve: Valve, notes: Sequence[str] = ())
     for parameter in assessment.parameters.values():
         if parameter.reason and parameter.verdict is not Verdict.FIXED:
             console.print(f"{parameter.name} {parameter.verdict.value}: {parameter.reason}")
-    estimate = assessment.published or assessment.start
-    misfit = assessment.misfit
-    if misfit is None:
-        console.print(f"the regression reproduces {100 * assessment.force_fit:.2f} % of the force")
-    else:
-        share = valve.share_of_travel(misfit.rms)
-        of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
-        console.print(
-            f"fit {100 * misfit.fit:.2f} %: the refined model's stem is {misfit.rms * 1e6:.3g} µm "
-            f"rms from the measured one{of_travel}; "
-            f"{misfit.systematic * 1e6:.3g} µm of it are not noise"
-        )
-    console.print(
-        f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
-        f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
-        f"{estimate.settings.window} samples; refined from {assessment.start.settings.window}"
-    )
+    for line in _summary(assessment, valve):
+        console.print(line)
     for warning in (*notes, *_warnings(assessment)):
         console.print(f"note: {warning}")
+
+
+def _distance(rms: float, valve: Valve) -> str:
+    share = valve.share_of_travel(rms)
+    of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
+    return f"{rms * 1e6:.3g} µm rms from the measured one{of_travel}"
+
+
+@singledispatch
+def _summary(assessment: Assessment, _: Valve) -> list[str]:
+    """Tell the fit, and what is particular to a method."""
+    raise NotImplementedError(type(assessment))
+
+
+@_summary.register
+def _(assessment: SweepAssessment, valve: Valve) -> list[str]:
+    estimate, misfit = assessment.published or assessment.start, assessment.misfit
+    if misfit is None:
+        fit = f"the regression reproduces {100 * assessment.fit:.2f} % of the force"
+    else:
+        fit = (
+            f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
+            f"{_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it are not noise"
+        )
+    return [
+        fit,
+        f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
+        f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
+        f"{estimate.settings.window} samples; refined from {assessment.window}",
+    ]
+
+
+@_summary.register
+def _(assessment: ForceBalanceAssessment, valve: Valve) -> list[str]:
+    signature = assessment.signature
+    upward, downward = signature.upward_points, signature.downward_points
+    return [
+        f"fit {100 * assessment.fit:.2f} %: the model's stem is {_distance(assessment.rms, valve)}",
+        f"signature: {len(upward)} strokes up and {len(downward)} down, bias x̄ "
+        f"{signature.position_bias * 1e3:.4g} mm, dead zone {signature.dead_zone * 1e-3:.4g} kPa, "
+        f"{percentage(signature.dead_zone_share)} of the pressure's span",
+    ]

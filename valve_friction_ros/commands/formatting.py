@@ -1,9 +1,10 @@
 """How commands speak: errors on one line, numbers without an exponent."""
 
 import argparse
+import math
 from typing import NoReturn
 
-__all__ = ["OneLineParser", "two_digits"]
+__all__ = ["OneLineParser", "json_number", "two_digits"]
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -12,6 +13,11 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the error and end with exit code 2."""
         self.exit(2, f"{self.prog}: {message}; see --help\n")
+
+
+def json_number(value: float) -> float | None:
+    """Return `value`, or None, JSON's null, where it is not finite: JSON has no nan."""
+    return value if math.isfinite(value) else None
 
 
 def two_digits(value: float) -> str:

@@ -14,13 +14,16 @@ from valve_friction_ros.commands.recording_arguments import (
     add_recording_arguments,
     described_valve,
     reading_options,
+    require_one,
 )
 from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
     FIXABLE,
+    METHODS,
     Assessment,
     IdentificationSettings,
+    Method,
     RefusalError,
-    assess,
 )
 from valve_friction_ros.model import Valve
 from valve_friction_ros.monitoring.recorded_valve import RecordedValve
@@ -49,6 +52,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_recording_arguments(parser)
     parser.add_argument(
+        "--method",
+        choices=[*METHODS],
+        default=DEFAULT_METHOD,
+        help="sweep: several fast strokes; force_balance: a valve signature, two periods or more "
+        "of a slow triangle (%(default)s)",
+    )
+    parser.add_argument(
         "--fix",
         action="append",
         default=[],
@@ -64,8 +74,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--window",
         type=int,
-        help=f"derivative window d, samples, for both estimates; by default {defaults.window} for "
-        "the published one, and chosen from the noise of the record for the refined one",
+        help=f"derivative window d, samples, for both estimates of the sweep; by default "
+        f"{defaults.window} for the published one, and chosen from the noise of the record for the "
+        "refined one and for the force balance",
     )
     parser.add_argument(
         "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
@@ -107,14 +118,12 @@ def _settings(options: argparse.Namespace, known: Mapping[str, float]) -> Identi
     )
 
 
-def _require_one(recorded: Sequence[RecordedValve]) -> None:
-    if len(recorded) > 1:
-        names = ", ".join(each.name for each in recorded)
-        raise ValueError(f"--plot draws one valve: choose one of {names} by --valve-name")
-
-
 def _identified(
-    recorded: RecordedValve, valve: Valve, settings: IdentificationSettings, window: int | None
+    recorded: RecordedValve,
+    valve: Valve,
+    identify: Method,
+    settings: IdentificationSettings,
+    window: int | None,
 ) -> Assessment | RefusalError:
     """Identify one valve, or return why not, with its name."""
     try:
@@ -122,7 +131,7 @@ def _identified(
     except RefusalError as refusal:
         return refusal
     try:
-        return assess(recording, valve, settings, window)
+        return identify(recording, valve, settings, window)
     except RefusalError as refusal:
         return RefusalError(f"{recorded.label}: {refusal}")
 
@@ -131,16 +140,16 @@ def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:
     """Read and identify the valves of the file, and draw the one that is to be drawn."""
     reading = reading_options(options)
     description = described_valve(options, reading)
-    settings = _settings(options, description.known)
+    settings, method = _settings(options, description.known), METHODS[options.method]
     if options.plot is not None:
         from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
 
         plots.require_picture_file(options.plot)
     recorded = read_recordings(options.file, description.valve, reading)
     if options.plot is not None:
-        _require_one(recorded)
+        require_one(recorded, "--plot draws")
     results = [
-        _Result(each, _identified(each, description.valve, settings, options.window))
+        _Result(each, _identified(each, description.valve, method, settings, options.window))
         for each in recorded
     ]
     if options.plot is not None and isinstance(results[0].outcome, Assessment):

@@ -1,6 +1,7 @@
 """Arguments of the commands that read a recording: the file, its valve, and what it leaves open."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
@@ -10,7 +11,8 @@ from valve_friction_ros.model import Valve
 from valve_friction_ros.monitoring.bag_topics import TopicChoice
 from valve_friction_ros.monitoring.csv_recording import CsvColumns, CsvFormat, CsvUnits
 from valve_friction_ros.monitoring.csv_table import CsvLayout
-from valve_friction_ros.monitoring.recordings import ReadingOptions, holds_force
+from valve_friction_ros.monitoring.recorded_valve import RecordedValve
+from valve_friction_ros.monitoring.recordings import ReadingOptions, holds_force, read_recordings
 from valve_friction_ros.monitoring.stretch import Stretch
 from valve_friction_ros.monitoring.units import (
     FORCE_UNITS,
@@ -20,7 +22,14 @@ from valve_friction_ros.monitoring.units import (
     PRESSURE_UNITS,
 )
 
-__all__ = ["DIRECT_DRIVE", "add_recording_arguments", "described_valve", "reading_options"]
+__all__ = [
+    "DIRECT_DRIVE",
+    "add_recording_arguments",
+    "described_valve",
+    "read_one",
+    "reading_options",
+    "require_one",
+]
 
 DIRECT_DRIVE = ValveFile(Valve(diaphragm_area=1.0), MappingProxyType({}))
 """A machine without a diaphragm: 1 Pa of "pressure" is 1 N of force."""
@@ -127,3 +136,29 @@ def described_valve(arguments: argparse.Namespace, reading: ReadingOptions) -> V
     if not holds_force(arguments.file, reading):
         raise ValueError("pressure needs the diaphragm_area: give a valve file by --valve")
     return DIRECT_DRIVE
+
+
+def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
+    """Refuse several valves where `purpose` is for one.
+
+    Raises
+    ------
+    ValueError
+        Names the valves and the option that chooses one.
+    """
+    if len(recorded) > 1:
+        names = ", ".join(each.name for each in recorded)
+        raise ValueError(f"{purpose} one valve: choose one of {names} by --valve-name")
+
+
+def read_one(path: Path, valve: Valve, reading: ReadingOptions) -> RecordedValve:
+    """Read the one valve that a file holds, or that was chosen.
+
+    Raises
+    ------
+    ValueError, RefusalError
+        If it cannot be read: one line that names the file, the cause and what to do.
+    """
+    recorded = read_recordings(path, valve, reading)
+    require_one(recorded, f"{path} holds several, and this command takes")
+    return recorded[0]

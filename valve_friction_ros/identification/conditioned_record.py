@@ -14,7 +14,7 @@ from valve_friction_ros.identification.pressure_smoothing import (
 )
 from valve_friction_ros.model.recording import Recording
 
-__all__ = ["ConditionedRecord", "condition"]
+__all__ = ["ConditionedRecord", "condition", "smoothed_pressure"]
 
 _CORNER_TIME = 0.04
 _CORNER_SAMPLES = 8
@@ -65,11 +65,7 @@ def condition(recording: Recording) -> ConditionedRecord:
     a sample period that loses nothing. A noiseless record passes unchanged.
     """
     pressure, period = recording.pressure, recording.sample_period
-    noise = sensor_noise(pressure)
-    corners = find_corners(pressure, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
-    window = longest_faithful_window(
-        pressure, corners, noise, max(round(_LONGEST_SMOOTHING / period), 1)
-    )
+    corners, window = _smoothing(recording)
     stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / period)), 1)
     if window == 1:
         whole, halves = pressure, (pressure, pressure)
@@ -86,6 +82,23 @@ def condition(recording: Recording) -> ConditionedRecord:
         window,
         stride,
     )
+
+
+def smoothed_pressure(recording: Recording) -> NDArray[np.float64]:
+    """Smooth the pressure between its corners as far as its noise asks for, Pa, shape (n,)."""
+    corners, window = _smoothing(recording)
+    if window == 1:
+        return recording.pressure
+    return smooth_between(recording.pressure, corners, window)
+
+
+def _smoothing(recording: Recording) -> tuple[NDArray[np.intp], int]:
+    """Return the corners of the pressure, and the window to smooth it over between them."""
+    pressure, period = recording.pressure, recording.sample_period
+    noise = sensor_noise(pressure)
+    corners = find_corners(pressure, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
+    longest = max(round(_LONGEST_SMOOTHING / period), 1)
+    return corners, longest_faithful_window(pressure, corners, noise, longest)
 
 
 def _averaged(signal: NDArray[np.float64], stride: int) -> tuple[NDArray[np.float64], float]:

@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass, field, replace
 
 from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
     Assessment,
     IdentificationSettings,
     RefusalError,
-    assess,
+    method_named,
 )
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
@@ -34,6 +35,8 @@ class MonitorSettings:
         Geometry and sensor range.
     identification : IdentificationSettings
         How records are identified.
+    method : str
+        Name of the method of identification, among `METHODS`.
     derivative_window : int or None
         Derivative window of the assessment, samples; None: each record's noise chooses it.
     limits : FrictionLimits
@@ -46,13 +49,15 @@ class MonitorSettings:
 
     valve: Valve
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
+    method: str = DEFAULT_METHOD
     derivative_window: int | None = None
     limits: FrictionLimits = field(default_factory=FrictionLimits)
     baseline: Baseline | None = None
     window: float = 60.0
 
     def __post_init__(self) -> None:
-        """Refuse windows that cannot be."""
+        """Refuse windows that cannot be, and methods that there are not."""
+        method_named(self.method)
         require_positive("window", self.window)
         if self.derivative_window is not None:
             replace(self.identification, window=self.derivative_window)
@@ -67,7 +72,7 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Assessme
         With the cause, and why the buffer was emptied if that is recent.
     """
     try:
-        return assess(
+        return method_named(settings.method)(
             snapshot.recording(),
             settings.valve,
             settings.identification,

@@ -35,11 +35,13 @@ def _assessed_values(assessment: Assessment, monitor: FrictionMonitor) -> dict[s
     share = dead_band(assessment, monitor.settings.valve)
     if math.isfinite(share):
         values["dead_band [%]"] = _number(100 * share)
+    if math.isfinite(assessment.rms):
+        values["fit [%]"] = _number(100 * assessment.fit)
+        values["rms [µm]"] = _number(1e6 * assessment.rms)
     if assessment.misfit is not None:
-        values["fit [%]"] = _number(100 * assessment.misfit.fit)
-        values["rms [µm]"] = _number(1e6 * assessment.misfit.rms)
         values["systematic misfit [µm]"] = _number(1e6 * assessment.misfit.systematic)
-    values["derivative_window [samples]"] = str(assessment.start.settings.window)
+    values["method"] = assessment.method
+    values["derivative_window [samples]"] = str(assessment.window)
     if published is not None:
         values["threshold [m/s]"] = _number(published.threshold)
         values["samples"] = str(published.samples)

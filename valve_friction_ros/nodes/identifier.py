@@ -228,14 +228,14 @@ class Identifier(Node):
 
     def _publish_results(self, assessment: Assessment) -> None:
         ratio = self._monitor.diagnosis().ratio
-        published, misfit = assessment.published, assessment.misfit
+        published = assessment.published
         unknown = float("nan")
         figures = {
             **assessment.values,
             "dead_band": dead_band(assessment, self._monitor.settings.valve),
             "coulomb_friction_ratio": unknown if ratio is None else ratio.value,
-            "fit": assessment.force_fit if misfit is None else misfit.fit,
-            "rms": unknown if misfit is None else misfit.rms,
+            "fit": assessment.fit,
+            "rms": assessment.rms,
             "threshold": unknown if published is None else published.threshold,
             "sigma": unknown if published is None else published.sigma,
             "r_squared": unknown if published is None else published.r_squared,
@@ -247,7 +247,7 @@ class Identifier(Node):
         for name, publisher in self._published_publishers.items():
             value = unknown if published is None else published.values[name]
             publisher.publish(Float64(data=value))
-        self._sweep_publisher.publish(sweep_message((published or assessment.start).sweep))
+        self._sweep_publisher.publish(sweep_message(assessment.sweep))
 
     def _input_problems(self) -> list[str]:
         return self._inputs.problems(self.get_parameter("input_timeout").value)

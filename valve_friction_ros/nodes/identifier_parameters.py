@@ -4,7 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from valve_friction_ros.identification import FIXABLE, IdentificationSettings
+from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
+    FIXABLE,
+    METHODS,
+    IdentificationSettings,
+)
 from valve_friction_ros.monitoring import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.nodes.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.saving import SAVE_FOLDER
@@ -31,6 +36,13 @@ CHANGEABLE = (
     ),
     ParameterSpec(
         "input_timeout", 3.0, "Silence of an input after which it is reported [s]", (0.1, 86400.0)
+    ),
+    ParameterSpec(
+        "method",
+        DEFAULT_METHOD,
+        "Method of identification [-]: sweep, for several fast strokes; force_balance, for a valve "
+        "signature: two periods of a slow triangle within the window",
+        choices=tuple(METHODS),
     ),
     ParameterSpec(
         "derivative_window",
@@ -101,6 +113,7 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
             position_bias=optional(values["position_bias"]),
             assumed_mass=values["assumed_mass"],
         ),
+        method=values["method"],
         derivative_window=values["derivative_window"] or None,
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),
         baseline=None if baseline is None else Baseline(baseline),

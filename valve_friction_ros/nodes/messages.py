@@ -58,8 +58,13 @@ def rows_of(message: Float64MultiArray) -> Arrivals:
     return rows_arrived(table, columns.label.split(","))
 
 
-def sweep_message(sweep: Sweep) -> Float64MultiArray:
-    """Table of a sweep: a row a threshold, the columns named in the label of the second axis."""
+def sweep_message(sweep: Sweep | None) -> Float64MultiArray:
+    """Table of a sweep: a row a threshold, the columns named in the label of the second axis.
+
+    Empty for a method without a sweep, so that a latched one of before does not stay.
+    """
+    if sweep is None:
+        return Float64MultiArray()
     columns: Mapping[str, np.ndarray] = {
         "threshold": sweep.thresholds,
         **sweep.estimates,

@@ -34,6 +34,8 @@ class ParameterSpec:
         ROS counts nan as outside any range; the value types check it all the same.
     read_only : bool
         True where it can only be given at start.
+    choices : tuple of str
+        The values that a text may have; any, if empty.
     """
 
     name: str
@@ -41,10 +43,15 @@ class ParameterSpec:
     description: str
     limits: tuple[float, float] | None = None
     read_only: bool = False
+    choices: tuple[str, ...] = ()
 
     def descriptor(self) -> ParameterDescriptor:
         """Return the ROS description of this parameter."""
-        descriptor = ParameterDescriptor(description=self.description, read_only=self.read_only)
+        descriptor = ParameterDescriptor(
+            description=self.description,
+            additional_constraints=f"one of {', '.join(self.choices)}" if self.choices else "",
+            read_only=self.read_only,
+        )
         if self.limits is not None:
             lowest, highest = self.limits
             if isinstance(self.default, int):

@@ -3,13 +3,18 @@
 from valve_friction_ros.plots.case import FORCE, PRESSURE, Case, DriveScale
 from valve_friction_ros.plots.friction_figure import friction_figure, identification_figure
 from valve_friction_ros.plots.picture import require_picture_file
+from valve_friction_ros.plots.signature_figure import draw_breakaway_points, signature_figure
+from valve_friction_ros.plots.validation_figure import validation_figure
 
 __all__ = [
     "FORCE",
     "PRESSURE",
     "Case",
     "DriveScale",
+    "draw_breakaway_points",
     "friction_figure",
     "identification_figure",
     "require_picture_file",
+    "signature_figure",
+    "validation_figure",
 ]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import AssessedParameter, Assessment
+from valve_friction_ros.identification import AssessedParameter, SweepAssessment
 from valve_friction_ros.model import Recording
 
 __all__ = ["FORCE", "PRESSURE", "Case", "DriveScale"]
@@ -64,11 +64,14 @@ class Case:
 
     @classmethod
     def of(
-        cls, label: str, recording: Recording, assessment: Assessment, drive: DriveScale = PRESSURE
+        cls,
+        label: str,
+        recording: Recording,
+        assessment: SweepAssessment,
+        drive: DriveScale = PRESSURE,
     ) -> "Case":
         """Gather a case from an assessment; the sweep is the published one, if there is one."""
         estimate = assessment.published or assessment.start
-        refinement = assessment.refinement
         return cls(
             label,
             recording,
@@ -78,7 +81,7 @@ class Case:
             estimate.threshold,
             assessment.parameters["coulomb_friction"],
             drive,
-            None if refinement is None else refinement.simulated,
+            assessment.simulated,
         )
 
     @property

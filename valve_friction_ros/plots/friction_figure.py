@@ -1,15 +1,21 @@
 """The figure of an identification: record, sweep, signature and verdict on one page."""
 
 import math
-import textwrap
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Assessment
+from valve_friction_ros.identification import (
+    ASSESSED_UNITS,
+    AssessedParameter,
+    Assessment,
+    ForceBalanceAssessment,
+    SweepAssessment,
+)
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.monitoring import dead_band, percentage
 from valve_friction_ros.plots.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.plots.page import dress, titled_figure
 from valve_friction_ros.plots.panels import (
     COLOURS,
     draw_coulomb_sweep,
@@ -17,10 +23,9 @@ from valve_friction_ros.plots.panels import (
     draw_sigma_sweep,
     draw_signature,
 )
+from valve_friction_ros.plots.signature_figure import signature_figure
 
 __all__ = ["friction_figure", "identification_figure"]
-
-_VERDICT_WIDTH = 95
 
 
 def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
@@ -45,10 +50,7 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
     """
     if not 0 < len(cases) <= len(COLOURS):
         raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
-    figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
-    figure.suptitle(
-        textwrap.fill(verdict, _VERDICT_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
-    )
+    figure = titled_figure(verdict)
     panels = figure.subplot_mosaic(
         [
             ["pressure", "pressure"],
@@ -66,9 +68,7 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
     draw_signature(panels["signature"], cases)
     if len(cases) > 1:
         panels["signature"].legend(loc="upper left", frameon=False)
-    for axes in panels.values():
-        axes.grid(alpha=0.3)
-        axes.spines[["top", "right"]].set_visible(False)
+    dress(panels.values())
     return figure
 
 
@@ -76,6 +76,15 @@ def identification_figure(
     recording: Recording, valve: Valve, assessment: Assessment, drive: DriveScale = PRESSURE
 ) -> Figure:
     """Draw a recording and its identification, each number with its verdict."""
+    verdict = _verdict(assessment, valve)
+    if isinstance(assessment, SweepAssessment):
+        return friction_figure([Case.of("recording", recording, assessment, drive)], verdict)
+    if isinstance(assessment, ForceBalanceAssessment):
+        return signature_figure(recording, valve, assessment, verdict, drive)
+    raise NotImplementedError(type(assessment))
+
+
+def _verdict(assessment: Assessment, valve: Valve) -> str:
     told = [
         _told(symbol, assessment.parameters[name], ASSESSED_UNITS[name])
         for symbol, name in (
@@ -87,10 +96,9 @@ def identification_figure(
     share = dead_band(assessment, valve)
     if math.isfinite(share):
         told.append(f"dead band {percentage(share)} of travel")
-    if assessment.misfit is not None:
-        told.append(f"fit {100 * assessment.misfit.fit:.2f} %")
-    verdict = "; ".join((*told, *assessment.warnings))
-    return friction_figure([Case.of("recording", recording, assessment, drive)], verdict)
+    if math.isfinite(assessment.rms):
+        told.append(f"fit {100 * assessment.fit:.2f} %")
+    return "; ".join((*told, *assessment.warnings))
 
 
 def _told(symbol: str, parameter: AssessedParameter, unit: str) -> str:

@@ -5,11 +5,21 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from valve_friction_ros.identification import AssessedParameter
+from valve_friction_ros.model import Recording
 from valve_friction_ros.plots.case import Case
 
-__all__ = ["COLOURS", "draw_coulomb_sweep", "draw_record", "draw_sigma_sweep", "draw_signature"]
+__all__ = [
+    "COLOURS",
+    "draw_coulomb_sweep",
+    "draw_record",
+    "draw_sigma_sweep",
+    "draw_signature",
+    "draw_stem",
+    "thinned",
+]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Told apart by colour-blind readers too."""
@@ -18,7 +28,8 @@ _MOST_POINTS = 20_000
 """Points drawn of a record; more would not be seen."""
 
 
-def _thinned(size: int) -> slice:
+def thinned(size: int) -> slice:
+    """Return the samples of a long record that are drawn."""
     return slice(None, None, max(1, size // _MOST_POINTS))
 
 
@@ -27,7 +38,7 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
     origin = cases[0].recording.start_time
     for case, colour in zip(cases, COLOURS, strict=False):
         recording = case.recording
-        some = _thinned(len(recording))
+        some = thinned(len(recording))
         time = (recording.time + recording.start_time - origin)[some]
         pressure_axes.plot(
             time, recording.pressure[some] / case.drive.pascals, color=colour, lw=1.2
@@ -35,7 +46,7 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
         stem_axes.plot(time, recording.position[some] * 1e3, color=colour, label=case.label, lw=1.2)
         if case.simulated is not None:
             spread = np.linspace(time[0], recording.time[-1] + time[0], case.simulated.size)
-            few = _thinned(case.simulated.size)
+            few = thinned(case.simulated.size)
             stem_axes.plot(spread[few], case.simulated[few] * 1e3, "k:", lw=1.0)
             stem_axes.set_title("stem (dotted: refined model)", loc="right", fontsize="small")
     pressure_axes.set_ylabel(cases[0].drive.label)
@@ -44,10 +55,20 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
     stem_axes.set_xlabel("time [s]")
 
 
+def draw_stem(axes: Axes, recording: Recording, simulated: NDArray[np.float64]) -> None:
+    """Draw the measured stem over the time, and dotted upon it the simulated one."""
+    some = thinned(len(recording))
+    time = recording.time[some]
+    axes.plot(time, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
+    axes.plot(time, simulated[some] * 1e3, "k:", lw=1.2)
+    axes.set_ylabel("stem [mm]")
+    axes.set_xlabel("time [s]")
+
+
 def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
     """Draw the valve signature: stem position over pressure."""
     for case, colour in zip(cases, COLOURS, strict=False):
-        some = _thinned(len(case.recording))
+        some = thinned(len(case.recording))
         axes.plot(
             case.recording.pressure[some] / case.drive.pascals,
             case.recording.position[some] * 1e3,

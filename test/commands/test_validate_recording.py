@@ -1,0 +1,229 @@
+"""The command `validate_recording`, from the estimate that `identify_recording` wrote."""
+
+import json
+import subprocess
+import sys
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from valve_friction_ros.commands import identify_recording
+from valve_friction_ros.commands.validate_recording import main
+from valve_friction_ros.identification import validate
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    KarnoppParameters,
+    Recording,
+    SensorNoise,
+    SineWave,
+    TriangleWave,
+    simulate,
+)
+
+RATE = 100
+
+
+def simulated(bench, excitation, duration):
+    pressure = excitation.sample(np.arange(round(duration * RATE)) / RATE)
+    position = simulate(*bench, pressure, 1 / RATE).position
+    noise = SensorNoise(10e-6, 100.0, seed=1)
+    return noise.applied_to(Recording(1 / RATE, pressure, position))
+
+
+@pytest.fixture(scope="module")
+def other_record(benches):
+    """The paper's sine, one period."""
+    return simulated(benches["high"], SineWave(), 35.5)
+
+
+@pytest.fixture
+def other_csv(write_csv, columns_of, other_record):
+    return write_csv(columns_of(other_record), "other.csv")
+
+
+@pytest.fixture
+def valve_options(bench_yaml):
+    return ["--valve", str(bench_yaml)]
+
+
+@pytest.fixture
+def estimate(tmp_path):
+    """Function of values by name: a file as `identify_recording --json` writes it."""
+
+    def write(**changes):
+        values = {
+            "mass": None,
+            "viscous_friction": 4.48e4,
+            "coulomb_friction": 606.0,
+            "static_friction": None,
+            "spring_constant": 2.05e5,
+            "spring_preload": 231.65,
+            **changes,
+        }
+        path = tmp_path / "estimate.json"
+        parameters = {name: {"value": value} for name, value in values.items()}
+        path.write_text(json.dumps({"parameters": parameters}))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def call(capsys):
+    """Function of arguments: exit code, stdout and stderr of the command in this process."""
+
+    def call(*arguments):
+        code = main([str(argument) for argument in arguments])
+        return (code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def refused(call):
+    """Function of arguments: the one line with which the command refuses."""
+
+    def refused(*arguments):
+        code, out, err = call(*arguments)
+        assert (code, out) == (2, "")
+        assert err.startswith("validate_recording: ")
+        assert err.count("\n") == 1
+        return err
+
+    return refused
+
+
+@pytest.mark.parametrize(
+    ("method", "excitation", "duration"),
+    [("sweep", SineWave(period=10.0), 40.0), ("force_balance", TriangleWave(), 130.0)],
+)
+def test_a_model_validates_on_a_record_it_has_not_seen(
+    method,
+    excitation,
+    duration,
+    benches,
+    write_csv,
+    columns_of,
+    other_csv,
+    valve_options,
+    tmp_path,
+    capsys,
+    call,
+):
+    """A record that suits the method is identified, and the slow sine simulated with the model."""
+    record = simulated(benches["high"], excitation, duration)
+    path = write_csv(columns_of(record), "identified.csv")
+    arguments = [str(path), *valve_options, "--method", method, "--json"]
+    assert identify_recording.main(arguments) == 0
+    estimate = tmp_path / "estimate.json"
+    estimate.write_text(capsys.readouterr().out)
+    answer = json.loads(estimate.read_text())
+    assert answer["method"] == method
+    assert answer["parameters"]["coulomb_friction"]["value"] == pytest.approx(606.0, rel=0.02)
+    code, out, err = call(other_csv, *valve_options, "--estimate", estimate, "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found["fit"] > 0.995
+    assert found["rms"] == pytest.approx(10e-6, abs=10e-6)
+    assert found["parameters"]["mass"] == 1.6  # of the valve file
+
+
+class TestAnswer:
+    def test_the_numbers_of_the_library(self, call, estimate, other_csv, valve_options):
+        path = estimate(static_friction=606.0, mass=1.75)
+        code, out, _ = call(other_csv, *valve_options, "--estimate", path, "--json")
+        assert code == 0
+        answer = json.loads(out, parse_constant=pytest.fail)
+        record = Recording(1 / RATE, *self.columns(other_csv))
+        model = KarnoppParameters(1.75, 4.48e4, 606.0, 606.0, 2.05e5, 231.65)
+        expected = validate(record, BENCH_VALVE, model)
+        assert answer["fit"] == expected.fit
+        assert answer["rms"] == expected.rms
+        assert answer["rms_share_of_travel"] == expected.rms / BENCH_VALVE.travel
+        assert answer["maximum_error"] == expected.maximum_error
+        assert answer["samples"] == len(record)
+        assert answer["notes"] == []
+        assert KarnoppParameters(**answer["parameters"]) == model
+
+    @staticmethod
+    def columns(path):
+        table = np.loadtxt(path, delimiter=",", skiprows=1)
+        return table[:, 2], table[:, 1]
+
+    def test_for_people(self, call, estimate, other_csv, valve_options):
+        _, out, _ = call(other_csv, *valve_options, "--estimate", estimate())
+        lines = out.splitlines()
+        assert lines[0].startswith("fit 99.")
+        assert lines[0].endswith("1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
+        assert lines[1].startswith("rms error ")
+        assert lines[1].endswith("% of travel")
+        assert lines[2].startswith("largest error ")
+        assert lines[3:] == [
+            "note: mass is not identified: 1.6 kg, of the valve file",
+            "note: static_friction is not identified: 606 N, the coulomb_friction",
+        ]
+
+    def test_a_picture(self, call, estimate, other_csv, valve_options, tmp_path):
+        path = tmp_path / "validation.png"
+        code, *_ = call(other_csv, *valve_options, "--estimate", estimate(), "--plot", path)
+        assert code == 0
+        assert matplotlib.image.imread(path).shape[0] > 500
+
+    def test_as_a_process(self, estimate, other_csv, valve_options):
+        module = "valve_friction_ros.commands.validate_recording"
+        command = [sys.executable, "-m", module, other_csv, *valve_options]
+        done = subprocess.run(
+            [*map(str, command), "--estimate", str(estimate())],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith("fit 99.")
+
+
+class TestRefusals:
+    @pytest.mark.parametrize("name", ["coulomb_friction", "spring_constant", "spring_preload"])
+    def test_no_model_without_these(self, refused, estimate, other_csv, valve_options, name):
+        path = estimate(**{name: None})
+        message = refused(other_csv, *valve_options, "--estimate", path)
+        assert f"{path}: the estimate has no {name}" in message
+
+    @pytest.mark.parametrize(
+        ("content", "cause"),
+        [
+            ("{", "not JSON"),
+            ("[]", "there are no parameters: give what `identify_recording --json` wrote"),
+            ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),
+            ('{"parameters": {"mass": {"value": "1"}}}', "must be a number or null, got '1'"),
+            ('{"parameters": {"weight": {"value": 1}}}', "unknown parameter 'weight'"),
+        ],
+    )
+    def test_what_is_no_estimate(self, refused, tmp_path, other_csv, valve_options, content, cause):
+        path = tmp_path / "bad.json"
+        path.write_text(content)
+        message = refused(other_csv, *valve_options, "--estimate", path)
+        assert f"{path}: " in message
+        assert cause in message
+
+    def test_no_file(self, refused, tmp_path, other_csv, valve_options, estimate):
+        path = tmp_path / "none"
+        assert f"{path}: cannot be read" in refused(other_csv, *valve_options, "--estimate", path)
+        assert str(path) in refused(path, *valve_options, "--estimate", estimate())
+
+    def test_impossible_value(self, refused, estimate, other_csv, valve_options):
+        path = estimate(coulomb_friction=-3.0)
+        assert "coulomb_friction must not be negative" in refused(
+            other_csv, *valve_options, "--estimate", path
+        )
+
+    def test_no_motion(self, refused, write_csv, columns_of, estimate, valve_options):
+        still = Recording(0.01, np.full(500, 1e5), np.full(500, 0.01))
+        path = write_csv(columns_of(still))
+        message = refused(path, *valve_options, "--estimate", estimate())
+        assert f"{path}: the stem did not move" in message
+
+    def test_no_valve(self, refused, estimate, other_csv):
+        assert "give a valve file by --valve" in refused(other_csv, "--estimate", estimate())

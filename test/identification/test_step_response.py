@@ -1,0 +1,189 @@
+"""Step tests of systems whose response is known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from valve_friction_ros.identification import RefusalError, find_steps, step_test
+from valve_friction_ros.model import IsaSteps, Recording, SensorNoise, converter_response, simulate
+from valve_friction_ros.model.bench import PRESSURE_RANGE
+
+PERIOD = 1e-3
+SPAN = PRESSURE_RANGE[1] - PRESSURE_RANGE[0]
+
+
+def held(levels, hold):
+    """Each level for `hold` samples."""
+    return np.repeat(np.asarray(levels, dtype=float), hold)
+
+
+def backlash(signal, dead_band, start=0.0):
+    """Play operator: the output follows once the input has used up the dead band."""
+    output, place = np.empty_like(signal), start
+    for index, value in enumerate(signal):
+        place = min(max(place, value - dead_band / 2), value + dead_band / 2)
+        output[index] = place
+    return output
+
+
+class TestFirstOrderWithDelay:
+    @settings(max_examples=30)
+    @given(
+        delay=st.floats(0.01, 0.5),
+        lag=st.floats(0.05, 0.5),
+        gain=st.floats(-5.0, 5.0).filter(lambda one: abs(one) > 0.1),
+        size=st.sampled_from([-20.0, -0.5, 0.5, 20.0]),
+    )
+    def test_times_and_gain(self, delay, lag, gain, size):
+        time = np.arange(20_000) * PERIOD
+        signal = np.where(time < 3.0, 40.0, 40.0 + size)
+        since = np.maximum(time - 3.0 - delay, 0.0)
+        position = 10.0 + gain * size * (1 - np.exp(-since / lag))
+        (step,) = step_test(signal, position, PERIOD).steps
+        assert step.time == 3.0
+        assert (step.input_change, step.moved) == (size, True)
+        assert step.gain == pytest.approx(gain, rel=1e-9)
+        assert step.t63 == pytest.approx(delay + lag, abs=1e-5)  # a chord between two samples
+        assert step.t86 == pytest.approx(delay + 2 * lag, abs=1e-5)
+        seen = -lag * math.log(1 - 1e-3)  # a thousandth of the range counts as a movement
+        assert step.dead_time == pytest.approx(delay + seen, abs=PERIOD)
+        assert step.overshoot == 0.0
+
+    def test_the_smallest_movement_delays_what_is_detected(self):
+        time = np.arange(20_000) * PERIOD
+        position = np.where(time < 3.0, 0.0, 1 - np.exp(-(time - 3.0) / 0.5))
+        (step,) = step_test(held([0, 1], 10_000), position, PERIOD, [3000], 0.5).steps
+        assert step.dead_time == pytest.approx(0.5 * math.log(2), abs=1e-5)
+
+
+def test_overshoot_of_a_second_order_system():
+    """exp(−π·ζ/√(1 − ζ²)), reached at π/(ω·√(1 − ζ²))."""
+    damping, frequency = 0.3, 8.0
+    damped = frequency * math.sqrt(1 - damping**2)
+    time = np.arange(10_000) * PERIOD
+    ringing = np.exp(-damping * frequency * time) * (
+        np.cos(damped * time) + damping * frequency / damped * np.sin(damped * time)
+    )
+    position = np.concatenate([np.zeros(1000), -2 * (1 - ringing)])
+    (step,) = step_test(held([5, 4], [1000, 10_000]), position, PERIOD).steps
+    expected = math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
+    assert step.overshoot == pytest.approx(expected, rel=1e-4)
+    assert step.gain == pytest.approx(2.0, rel=1e-6)
+
+
+class TestBacklash:
+    """Steps around 50 % that grow, as the standard has them."""
+
+    LEVELS = IsaSteps(centre=50.0, span=100.0, hold=1.0).levels
+
+    @pytest.mark.parametrize(
+        ("dead_band", "ignored", "answered"), [(0.7, 0.5, 1.0), (3.0, 2.0, 4.0), (15.0, 10.0, 20.0)]
+    )
+    def test_dead_band_lies_between_the_steps(self, dead_band, ignored, answered):
+        signal = held(self.LEVELS, 100)
+        found = step_test(signal, backlash(signal, dead_band, 50.0), PERIOD, smallest_movement=1e-3)
+        assert found.dead_band.ignored <= dead_band < found.dead_band.answered
+        assert found.dead_band.ignored == pytest.approx(ignored)
+        assert found.dead_band.answered <= answered + 1e-9
+        assert found.resolution.ignored == 0.0
+
+    @settings(max_examples=30)
+    @given(dead_band=st.floats(0.05, 60.0))
+    def test_bracket_always_holds_it(self, dead_band):
+        signal = held(self.LEVELS, 20)
+        found = step_test(signal, backlash(signal, dead_band, 50.0), PERIOD, smallest_movement=1e-9)
+        low, high = found.dead_band
+        assert low <= dead_band * (1 + 1e-9)
+        assert high >= dead_band * (1 - 1e-9)
+
+    def test_steps_on_in_one_way_are_all_answered(self):
+        signal = held([0, 5, 5.5, 5.7, 9], 100)
+        found = step_test(signal, backlash(signal, 2.0), PERIOD)
+        assert found.resolution == (0.0, pytest.approx(0.2))
+        assert found.dead_band == (0.0, math.inf)  # never tried
+
+
+def test_resolution_of_a_stem_that_jumps():
+    """It moves only once the input is 1 ahead, and then catches up."""
+    levels = [0, 1.5, 2.1, 2.4, 3.0, 3.5]
+    position = held([0, 1.5, 1.5, 1.5, 3.0, 3.0], 100)
+    found = step_test(held(levels, 100), position, PERIOD)
+    assert found.resolution == (pytest.approx(0.9), pytest.approx(1.5))
+
+
+class TestSteps:
+    @pytest.mark.parametrize("noise", [0.0, 0.05])
+    def test_of_a_command(self, noise):
+        signal = held([0, 1, 3, 3.5, -2], 500)
+        signal += noise * np.random.default_rng(0).standard_normal(signal.size)
+        assert find_steps(signal) == [500, 1000, 1500, 2000]
+
+    def test_of_a_pressure_behind_a_lag(self):
+        """Where the slope jumps, noiseless to the sample."""
+        command = held([50, 60, 50, 20, 50, 120], 8000)
+        pressure = converter_response(command, PERIOD, 1.3)
+        assert find_steps(pressure) == [8000, 16_000, 24_000, 32_000, 40_000]
+        noisy = pressure + 0.1 * np.random.default_rng(0).standard_normal(pressure.size)
+        found = find_steps(noisy)
+        np.testing.assert_allclose(found, [8000, 16_000, 24_000, 32_000, 40_000], atol=60)
+
+    def test_none(self):
+        assert find_steps(np.full(100, 3.0)) == []
+        with pytest.raises(RefusalError, match="there is no step in the input"):
+            step_test(np.full(100, 3.0), np.arange(100.0), PERIOD)
+
+
+@pytest.fixture(scope="module")
+def isa_test(benches):
+    """Function of valve name and noise: the ISA test, command in %, stem in % of travel."""
+
+    def run(name, noise):
+        valve, truth = benches[name]
+        command = IsaSteps().sample(np.arange(37_000) * 0.01)
+        pressure = converter_response(command, 0.01)
+        record = Recording(0.01, pressure, simulate(valve, truth, pressure, 0.01).position)
+        record = noise.applied_to(record) if noise else record
+        return step_test(
+            100 * (command - PRESSURE_RANGE[0]) / SPAN, 100 * record.position / valve.travel, 0.01
+        )
+
+    return run
+
+
+@pytest.mark.parametrize("noise", [None, SensorNoise(28.6e-6, 165.0, seed=1)])
+class TestBench:
+    @pytest.mark.parametrize("name", ["low", "high", "graphite"])
+    def test_dead_band_holds_that_of_the_friction(self, benches, isa_test, name, noise):
+        valve, truth = benches[name]
+        found = isa_test(name, noise)
+        assert len(found.steps) == 36
+        force = truth.coulomb_friction + truth.static_friction
+        width = 100 * force / valve.diaphragm_area / SPAN
+        assert found.dead_band.ignored < width < found.dead_band.answered
+
+    @pytest.mark.parametrize("name", ["low", "high"])
+    def test_gain_of_a_step_on_in_the_same_way(self, benches, isa_test, name, noise):
+        """The second of the two steps down by 20 %: friction has turned already."""
+        valve, truth = benches[name]
+        step = isa_test(name, noise).steps[30]
+        assert step.input_change == pytest.approx(-20.0)
+        gain = valve.diaphragm_area * SPAN / truth.spring_constant / valve.travel
+        assert step.gain == pytest.approx(gain, rel=2e-3)
+
+
+class TestBadInput:
+    def test_lengths(self):
+        with pytest.raises(ValueError, match=r"got shapes \(3,\) and \(4,\)"):
+            step_test(np.zeros(3), np.zeros(4), PERIOD)
+
+    def test_not_finite(self):
+        with pytest.raises(ValueError, match="the position is not finite at sample 1"):
+            step_test(np.zeros(3), [0.0, math.nan, 0.0], PERIOD)
+
+    @pytest.mark.parametrize("starts", [[0], [50, 50], [100]])
+    def test_steps_outside(self, starts):
+        with pytest.raises(ValueError, match="increasing samples from 1 to 99"):
+            step_test(held([0, 1], 50), held([0, 1], 50), PERIOD, starts)

@@ -1,0 +1,68 @@
+"""The parameter `method`: force balances of a valve signature, over topics."""
+
+import numpy as np
+import pytest
+from live_nodes import NAMESPACE, values_of
+from records import quick_record, simulated
+from std_msgs.msg import Float64MultiArray
+
+from valve_friction_ros.identification import UNITS, IdentificationSettings, assess_force_balance
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
+
+NODE = f"{NAMESPACE}/identifier"
+
+
+def signature_record():
+    """Five strokes of a quick triangle at 100 Hz."""
+    time = np.arange(5000) / 100
+    return simulated(TriangleWave(period=20.0).sample(time), 0.01, HIGH_FRICTION)
+
+
+@pytest.fixture(scope="module")
+def client(shared):
+    shared.start_identifier({"method": "force_balance", "input_timeout": 600.0})
+    return shared.client
+
+
+def test_the_choice_is_described(client):
+    (descriptor,) = client.describe(NODE, ["method"])
+    assert descriptor.additional_constraints == "one of sweep, force_balance"
+
+
+def test_a_signature_is_identified(client):
+    message = client.identified(signature_record())
+    assert "the stem ignores reversals smaller than 21 % of its travel" in message
+    expected = assess_force_balance(signature_record(), BENCH_VALVE, IdentificationSettings())
+    told = client.friction(*UNITS, "fit", "rms", "dead_band", "threshold")
+    for name in UNITS:
+        assert told[name] == pytest.approx(expected.values[name], rel=1e-9, nan_ok=True)
+    assert told["coulomb_friction"] == pytest.approx(606.0, rel=0.02)
+    assert told["fit"] == pytest.approx(expected.fit, rel=1e-9)
+    assert told["rms"] == pytest.approx(expected.rms, rel=1e-6)
+    width = told["coulomb_friction"] + told["static_friction"]
+    share = width / told["spring_constant"] / BENCH_VALVE.travel
+    assert told["dead_band"] == pytest.approx(share, rel=1e-9)
+    assert np.isnan(told["threshold"])
+    assert np.isnan([*client.published(*UNITS).values()]).all()
+    assert not client.latched(Float64MultiArray, f"{NODE}/sweep").data
+    values = values_of(client.next_status())
+    assert values["method"] == "force_balance"
+    assert values["estimate_valid"] == "true"
+    assert values["coulomb_friction verdict"] == "weak"
+    assert float(values["fit [%]"]) == pytest.approx(100 * expected.fit, rel=1e-8)
+
+
+def test_another_record_is_refused_with_what_it_needs(client):
+    assert client.trigger("clear").success
+    client.send_record(quick_record())
+    response = client.identify_all(2 * len(quick_record()))
+    assert not response.success
+    assert "does not slide at a constant speed" in response.message
+    assert "slow triangular wave of pressure" in response.message
+
+
+def test_the_method_can_be_changed_while_the_node_runs(client):
+    assert client.set_together(NODE, {"method": "sweep"}).successful
+    client.identified(quick_record())
+    assert np.isfinite(client.friction("threshold")["threshold"])
+    assert values_of(client.next_status())["method"] == "sweep"

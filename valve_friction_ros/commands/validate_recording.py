@@ -1,0 +1,129 @@
+"""Command `validate_recording`: simulate a recording with an identified model."""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from valve_friction_ros.commands.estimate_file import read_estimate
+from valve_friction_ros.commands.formatting import OneLineParser, json_number
+from valve_friction_ros.commands.recording_arguments import (
+    DIRECT_DRIVE,
+    add_recording_arguments,
+    described_valve,
+    read_one,
+    reading_options,
+)
+from valve_friction_ros.identification import (
+    IdentifiedModel,
+    RefusalError,
+    Validation,
+    identified_model,
+    validate,
+)
+from valve_friction_ros.model import Valve
+from valve_friction_ros.monitoring import percentage
+
+__all__ = ["main"]
+
+_EXIT_REFUSED = 2
+
+
+class _Result(NamedTuple):
+    """What came of it."""
+
+    validation: Validation
+    model: IdentifiedModel
+    valve: Valve
+    notes: tuple[str, ...]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="validate_recording",
+        description="Simulate a recording with an identified model, and compare the stems. "
+        "Validate on another recording than the one that was identified.",
+        epilog="All values are in SI units. Exit code 2: a file or the record was refused.",
+    )
+    add_recording_arguments(parser)
+    parser.add_argument(
+        "--estimate",
+        type=Path,
+        required=True,
+        metavar="ESTIMATE.json",
+        help="the model, as `identify_recording --json` prints it",
+    )
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both stems")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> _Result:
+    reading = reading_options(options)
+    description = described_valve(options, reading)
+    valve = description.valve
+    try:
+        model = identified_model(read_estimate(options.estimate), description.known)
+    except RefusalError as refusal:
+        raise RefusalError(f"{options.estimate}: {refusal}") from None
+    if options.plot is not None:
+        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
+
+        plots.require_picture_file(options.plot)
+    recorded = read_one(options.file, valve, reading)
+    recording = recorded.recording()
+    try:
+        validation = validate(recording, valve, model.parameters)
+    except RefusalError as refusal:
+        raise RefusalError(f"{recorded.label}: {refusal}") from None
+    if options.plot is not None:
+        drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
+        plots.validation_figure(validation, valve, drive).savefig(options.plot)
+    return _Result(validation, model, valve, (*recorded.notes, *model.notes))
+
+
+def _as_json(result: _Result) -> dict[str, Any]:
+    validation, model, valve, notes = result
+    return {
+        "fit": validation.fit,
+        "rms": validation.rms,
+        "rms_share_of_travel": json_number(valve.share_of_travel(validation.rms)),
+        "maximum_error": validation.maximum_error,
+        "samples": len(validation.recording),
+        "sample_period": validation.recording.sample_period,
+        "parameters": vars(model.parameters),
+        "notes": list(notes),
+    }
+
+
+def _print(result: _Result) -> None:
+    validation, _, valve, notes = result
+    share = valve.share_of_travel(validation.rms)
+    of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
+    print(f"fit {100 * validation.fit:.2f} %  (1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
+    print(f"rms error {validation.rms * 1e6:.3g} µm{of_travel}")
+    print(f"largest error {validation.maximum_error * 1e6:.3g} µm")
+    for note in notes:
+        print(f"note: {note}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        result = _run(options)
+    except (ValueError, RefusalError, OSError) as error:
+        print("validate_recording:", *str(error).splitlines(), file=sys.stderr)
+        return _EXIT_REFUSED
+    if options.json:
+        print(json.dumps(_as_json(result), ensure_ascii=False, allow_nan=False))
+    else:
+        _print(result)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Standard errors from the scatter between strokes, by leaving each out in turn."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
+
+__all__ = ["Jackknife", "jackknife"]
+
+_Member = TypeVar("_Member")
+
+
+class Jackknife(NamedTuple):
+    """Values with their standard errors.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        Of all members together.
+    standard_errors : mapping of str to float
+        nan where a group has a single member.
+    freedom : int
+        Degrees of freedom, members less groups.
+    """
+
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    freedom: int
+
+
+def jackknife(
+    groups: Sequence[Sequence[_Member]],
+    statistic: Callable[[Sequence[Sequence[_Member]]], Mapping[str, float]],
+) -> Jackknife:
+    """Evaluate `statistic`, and its standard error from the scatter within the groups.
+
+    Leaving out each of the n members of a group in turn gives n values θ_i, and the group's share
+    of the variance is (n − 1)/n·Σ(θ_i − mean θ)². For a mean this is the usual s²/n. Whatever a
+    member's error does to several quantities at once is in it.
+
+    Parameters
+    ----------
+    groups : sequence of sequences
+        Independent members of each kind, at least one a group.
+    statistic : callable
+        From groups to named values.
+
+    Returns
+    -------
+    Jackknife
+        Values, standard errors, degrees of freedom.
+
+    References
+    ----------
+    B. Efron and C. Stein, Annals of Statistics 9 (1981) 586–596.
+    """
+    values = dict(statistic(groups))
+    variances = dict.fromkeys(values, 0.0)
+    for index, group in enumerate(groups):
+        size = len(group)
+        if size < 2:
+            variances = dict.fromkeys(values, math.nan)
+            break
+        trials = [
+            statistic([*groups[:index], [*group[:one], *group[one + 1 :]], *groups[index + 1 :]])
+            for one in range(size)
+        ]
+        for name in values:
+            mean = sum(trial[name] for trial in trials) / size
+            scatter = sum((trial[name] - mean) ** 2 for trial in trials)
+            variances[name] += (size - 1) / size * scatter
+    errors = {name: math.sqrt(variance) for name, variance in variances.items()}
+    return Jackknife(values, errors, sum(map(len, groups)) - len(groups))

@@ -1,0 +1,27 @@
+"""The page that figures are drawn on: its size, its title, the dress of its panels."""
+
+import textwrap
+from collections.abc import Iterable
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+__all__ = ["dress", "titled_figure"]
+
+_TITLE_WIDTH = 95
+
+
+def titled_figure(title: str) -> Figure:
+    """Return an empty figure with `title`, wrapped, above it."""
+    figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
+    figure.suptitle(
+        textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
+    )
+    return figure
+
+
+def dress(panels: Iterable[Axes]) -> None:
+    """Give panels a faint grid, and take the frame away where there is no scale."""
+    for axes in panels:
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)

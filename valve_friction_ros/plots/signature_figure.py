@@ -1,0 +1,111 @@
+"""The figure of a valve signature: the record, the loop and its breakaway points."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from valve_friction_ros.identification import (
+    ForceBalanceAssessment,
+    SignatureStroke,
+    ValveSignature,
+)
+from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.plots.case import PRESSURE, DriveScale
+from valve_friction_ros.plots.page import dress, titled_figure
+from valve_friction_ros.plots.panels import COLOURS, draw_stem, thinned
+
+__all__ = ["draw_breakaway_points", "signature_figure"]
+
+
+def draw_breakaway_points(
+    axes: Axes, signature: ValveSignature, drive: DriveScale = PRESSURE, colour: str = "black"
+) -> None:
+    """Mark P1 and P2 of every stroke on axes of stem position over pressure."""
+    ways = (("$P_1$", "^", signature.upward_points), ("$P_2$", "v", signature.downward_points))
+    for label, marker, points in ways:
+        axes.plot(
+            [point.pressure / drive.pascals for point in points],
+            [point.position * 1e3 for point in points],
+            marker,
+            color=colour,
+            mec="white",
+            ms=9,
+            zorder=4,
+            label=label,
+        )
+
+
+def signature_figure(
+    recording: Recording,
+    valve: Valve,
+    assessment: ForceBalanceAssessment,
+    title: str,
+    drive: DriveScale = PRESSURE,
+) -> Figure:
+    """Draw a recording, its valve signature with P1 and P2, and the lines of the sliding stem.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position.
+    valve : Valve
+        Turns forces into pressures.
+    assessment : ForceBalanceAssessment
+        What was identified from it.
+    title : str
+        Printed above the panels.
+    drive : DriveScale
+        How the pressure is shown.
+
+    Returns
+    -------
+    Figure
+        To be saved or shown; no global state of matplotlib is touched.
+    """
+    figure = titled_figure(title)
+    panels = figure.subplot_mosaic(
+        [["pressure"], ["stem"], ["signature"]], height_ratios=[1, 1.2, 2.8]
+    )
+    panels["stem"].sharex(panels["pressure"])
+    some = thinned(len(recording))
+    time, signature = recording.time, assessment.signature
+    pressure = recording.pressure / drive.pascals
+    panels["pressure"].plot(time[some], pressure[some], color=COLOURS[0], lw=1.2)
+    panels["pressure"].set_ylabel(drive.label)
+    panels["pressure"].tick_params(labelbottom=False)
+    draw_stem(panels["stem"], recording, assessment.simulated)
+    points = [stroke.breakaway for stroke in signature.strokes if stroke.breakaway is not None]
+    panels["stem"].plot(
+        [point.time for point in points],
+        [point.position * 1e3 for point in points],
+        "o",
+        color="black",
+        mec="white",
+        zorder=4,
+    )
+    panels["stem"].set_title("stem (dotted: model; ●: breakaway)", loc="right", fontsize="small")
+    loop = panels["signature"]
+    loop.plot(pressure[some], recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
+    for stroke, colour in zip(_first_of_each_way(signature), COLOURS[1:], strict=False):
+        place = stroke.sliding.position[[0, -1]]
+        level = float(
+            np.mean(stroke.sliding.force - signature.spring_constant * stroke.sliding.position)
+        )
+        line = valve.actuator_pressure(level + signature.spring_constant * place) / drive.pascals
+        label = f"slides {'up' if stroke.direction > 0 else 'down'}, slope $S_a$/k"
+        loop.plot(line, place * 1e3, "--", color=colour, lw=1.6, label=label)
+    draw_breakaway_points(loop, signature, drive)
+    loop.set_xlabel(drive.label)
+    loop.set_ylabel("stem [mm]")
+    width = signature.dead_zone / drive.pascals
+    unit = drive.label.partition("[")[2].rstrip("]")
+    loop.set_title(
+        f"valve signature: dead zone {width:.4g} {unit}, x̄ {signature.position_bias * 1e3:.3g} mm"
+    )
+    loop.legend(loc="upper left", frameon=False)
+    dress(panels.values())
+    return figure
+
+
+def _first_of_each_way(signature: ValveSignature) -> list[SignatureStroke]:
+    return [way[0] for way in signature.ways]
