@@ -18,7 +18,7 @@ from valve_friction_ros.model import (
     simulate,
 )
 
-__all__ = ["PERIOD", "PRESSURES", "VALVES", "noisy_record", "pressure"]
+__all__ = ["PERIOD", "PRESSURES", "SAMPLES", "VALVES", "noisy_record", "pressure"]
 
 PERIOD = 1e-3
 """Sample period, s."""

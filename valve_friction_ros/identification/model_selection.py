@@ -24,8 +24,8 @@ __all__ = ["SIGNIFICANCE", "deviation", "one_step", "suspected", "with_demanded"
 _OFFSET_SIGNIFICANCE = 11.0
 """The same for the clock offset, which on a square wave F_c and F_0 nearly make up for."""
 
-_OTHER_FRICTIONS = ((0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
-"""Factors of F_c and F_v to start from again."""
+_FRICTIONS = ((1.0, 1.0), (0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
+"""Factors of F_c and F_v to start from."""
 
 _SUSPICION = 1.8
 """Standard errors of the score test from which on a part of the model is tried."""
@@ -114,9 +114,9 @@ def with_demanded(
 ) -> Refinement:
     """Refine `names`, and beside them what the record demands.
 
-    A slip jump (F_s above F_c) is tried first, then, if the model still does not describe the
-    record, a friction that falls from F_s to F_c over a range of speeds. The `candidates` follow
-    one after the other, each only if its score test asks for it.
+    A slip jump (F_s above F_c) is tried first. If the model still does not describe the record,
+    other starts are, another clock, and a friction that falls from F_s to F_c over a range of
+    speeds. The `candidates` follow one after the other, each only if its score test asks for it.
 
     Parameters
     ----------
@@ -134,11 +134,18 @@ def with_demanded(
     Refinement
         With as many free coordinates as the record demands.
     """
-    refinement = _without_extensions(problem, {**start, SLIP: 0.0}, names)
-    if OFFSET in candidates and not misfit_of(refinement).describes:
-        refinement = _with_offset(refinement, start)
-    if SLIP in candidates and _may_slip(refinement):
-        refinement = _with_slip(refinement, start)
+    refinement = refine(problem, {**start, SLIP: 0.0}, names)
+    may_slip = SLIP in candidates
+    if may_slip and not misfit_of(refinement).describes:
+        refinement = _slipping(refinement, start)
+    if not misfit_of(refinement).describes:
+        refinement = _from_elsewhere(problem, {**start, SLIP: 0.0}, names)
+        if OFFSET in candidates:
+            refinement = _with_offset(refinement, start)
+        if may_slip:
+            refinement = _with_slip(refinement, start)
+    elif may_slip and SLIP not in refinement.names and _is_suspected(refinement, SLIP):
+        refinement = _slipping(refinement, start)
     left = [name for name in candidates if name != SLIP and name not in refinement.names]
     if "stribeck_velocity" in refinement.names and OFFSET in left:
         left.remove(OFFSET)  # presliding looks like a stem that is early
@@ -148,30 +155,24 @@ def with_demanded(
     return refinement
 
 
-def _may_slip(refinement: Refinement) -> bool:
-    """Tell whether a slip jump is worth trying: without one something is left to be explained."""
-    value, error = one_step(refinement, SLIP)
-    return value > error or not misfit_of(refinement).describes
+def _is_suspected(refinement: Refinement, name: str) -> bool:
+    """Tell whether the residual leans towards a part of the model, if only a little."""
+    value, error = one_step(refinement, name)
+    return value > error
 
 
-def _without_extensions(
-    problem: OutputError, start: Coordinates, names: tuple[str, ...]
-) -> Refinement:
-    """Refine the plain model, from other frictions too if the first start leads nowhere."""
-    refinement = refine(problem, start, names)
-    if misfit_of(refinement).describes:
-        return refinement
-    others = [
+def _from_elsewhere(problem: OutputError, start: Coordinates, names: tuple[str, ...]) -> Refinement:
+    """Refine the plain model from several frictions, where the first start led nowhere."""
+    starts = [
         {
             **start,
             "coulomb_friction": coulomb * start["coulomb_friction"],
             "viscous_friction": viscous * start["viscous_friction"],
         }
-        for coulomb, viscous in _OTHER_FRICTIONS
+        for coulomb, viscous in _FRICTIONS
     ]
-    fitted = [least_squares_fit(problem, one, names) for one in others]
-    again = refine(problem, _nearest(problem, fitted)[0], names)
-    return again if again.rms < refinement.rms else refinement
+    fitted = [least_squares_fit(problem, one, names) for one in starts]
+    return refine(problem, _nearest(problem, fitted)[0], names)
 
 
 def _sure_trials(refinement: Refinement, candidates: Sequence[str]) -> list[Refinement]:
@@ -275,7 +276,8 @@ def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
     return trial if improved and _is_sure(trial, OFFSET, 0.0) else plain
 
 
-def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
+def _slipping(plain: Refinement, start: Coordinates) -> Refinement:
+    """Try a slip jump; keep it if it surely is there."""
     problem = plain.problem
     names = (*plain.names, SLIP)
     offset = {OFFSET: plain.coordinates[OFFSET]}
@@ -286,11 +288,17 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
     ]
     fitted = [least_squares_fit(problem, one, names) for one in _nearest(problem, starts)[:2]]
     slip = refine(problem, _nearest(problem, fitted)[0], names)
-    best = slip if _is_nearer(slip, plain) and _is_slip(slip) else plain
+    return slip if _is_nearer(slip, plain) and _is_slip(slip) else plain
+
+
+def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
+    """Try a slip jump, then a friction that falls over a range of speeds; keep what describes."""
+    problem = plain.problem
+    best = _slipping(plain, start)
     before = misfit_of(best)
     if before.describes:
         return best
-    names = (*names, "stribeck_velocity")
+    names = (*plain.names, SLIP, "stribeck_velocity")
     fitted = [
         least_squares_fit(
             problem, _falling_starts(plain.coordinates, plain.top_speed, share)[-1], names
