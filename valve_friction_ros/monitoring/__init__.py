@@ -16,31 +16,52 @@ from valve_friction_ros.monitoring.friction_monitor import (
     MonitorSettings,
     identify_snapshot,
 )
+from valve_friction_ros.monitoring.history_entry import (
+    FrictionPoint,
+    HistoryEntry,
+    KeptBaseline,
+    KeptValve,
+    entry_of,
+)
+from valve_friction_ros.monitoring.history_file import HistoryError, HistoryFile
 from valve_friction_ros.monitoring.record_buffer import Complaints, RecordBuffer, Snapshot
 from valve_friction_ros.monitoring.resampling import uniform_recording
 from valve_friction_ros.monitoring.samples import Samples, nanoseconds
+from valve_friction_ros.monitoring.trend import MONTH, Crossing, Limit, Trend, trend_of
 
 __all__ = [
     "COLUMNS",
+    "MONTH",
     "Arrivals",
     "Baseline",
     "Complaints",
+    "Crossing",
     "Diagnosis",
     "FrictionLimits",
     "FrictionMonitor",
+    "FrictionPoint",
+    "HistoryEntry",
+    "HistoryError",
+    "HistoryFile",
+    "KeptBaseline",
+    "KeptValve",
     "Kind",
     "Level",
+    "Limit",
     "MonitorSettings",
     "Ratio",
     "RecordBuffer",
     "Samples",
     "Snapshot",
     "StatusSignal",
+    "Trend",
     "dead_band",
     "diagnose",
+    "entry_of",
     "identify_snapshot",
     "nanoseconds",
     "percentage",
     "rows_arrived",
+    "trend_of",
     "uniform_recording",
 ]

@@ -1,0 +1,235 @@
+"""The database of the history: its tables, and how a connection to it is opened."""
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+__all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
+
+SCHEMA_VERSION = 1
+"""Kept as the database's user_version."""
+
+_APPLICATION = 0x56465248
+"""Kept as its application_id, so that no other program's database is written to."""
+
+_PATIENCE = 10.0
+"""Time, s, for which another process's writing is waited for."""
+
+_SCHEMA = """
+CREATE TABLE valve (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL UNIQUE,
+    tag TEXT NOT NULL
+);
+CREATE TABLE settings (
+    id INTEGER PRIMARY KEY,
+    content TEXT NOT NULL UNIQUE
+);
+CREATE TABLE identification (
+    id INTEGER PRIMARY KEY,
+    valve_id INTEGER NOT NULL REFERENCES valve,
+    time_ns INTEGER NOT NULL,
+    begin_ns INTEGER,
+    end_ns INTEGER,
+    method TEXT NOT NULL,
+    refusal TEXT,
+    fit REAL,
+    rms REAL,
+    systematic_misfit REAL,
+    warnings TEXT NOT NULL,
+    level INTEGER NOT NULL CHECK (level BETWEEN 0 AND 2),
+    status_signal TEXT NOT NULL,
+    message TEXT NOT NULL,
+    ratio REAL,
+    ratio_low REAL,
+    ratio_high REAL,
+    baseline REAL,
+    baseline_half_width REAL,
+    warn_ratio REAL NOT NULL,
+    error_ratio REAL NOT NULL,
+    low_ratio REAL NOT NULL,
+    settings_id INTEGER NOT NULL REFERENCES settings,
+    software_version TEXT NOT NULL
+);
+CREATE INDEX identification_of_valve ON identification (valve_id, time_ns);
+CREATE TABLE parameter (
+    identification_id INTEGER NOT NULL REFERENCES identification ON DELETE CASCADE,
+    name TEXT NOT NULL,
+    value REAL,
+    standard_error REAL,
+    half_width REAL,
+    verdict TEXT NOT NULL,
+    reason TEXT NOT NULL,
+    PRIMARY KEY (identification_id, name)
+) WITHOUT ROWID;
+CREATE TABLE baseline (
+    id INTEGER PRIMARY KEY,
+    valve_id INTEGER NOT NULL REFERENCES valve,
+    time_ns INTEGER NOT NULL,
+    since_ns INTEGER NOT NULL,
+    coulomb_friction REAL NOT NULL CHECK (coulomb_friction > 0),
+    half_width REAL NOT NULL CHECK (half_width >= 0)
+);
+CREATE INDEX baseline_of_valve ON baseline (valve_id, id);
+CREATE VIEW friction AS
+    SELECT
+        identification.id AS id,
+        strftime('%Y-%m-%dT%H:%M:%SZ', time_ns / 1000000000, 'unixepoch') AS time,
+        valve.name AS valve,
+        valve.tag AS tag,
+        parameter.value AS coulomb_friction,
+        parameter.half_width AS half_width,
+        parameter.verdict AS verdict,
+        ratio,
+        level,
+        message,
+        refusal
+    FROM identification
+    JOIN valve ON valve.id = valve_id
+    LEFT JOIN parameter
+        ON parameter.identification_id = identification.id AND parameter.name = 'coulomb_friction';
+"""
+
+_REMEDIES = (
+    ("disk is full", "make room on its disk"),
+    ("readonly", "make the file and its folder writable, or name another history_file"),
+    (
+        "unable to open",
+        "check that the folder is there and writable, or name another history_file",
+    ),
+    ("disk I/O error", "check the disk, its free space and the process's limits"),
+    ("locked", "find the process that holds it"),
+    ("not a database", "move it away, and a new one is begun"),
+    ("malformed", "move it away, and a new one is begun; `sqlite3 FILE .recover` may save rows"),
+)
+
+
+class HistoryError(Exception):
+    """The history cannot be read or written; the message names the file, the cause and a remedy."""
+
+
+def _explained(path: Path, error: sqlite3.Error) -> HistoryError:
+    cause = str(error)
+    remedy = next((remedy for words, remedy in _REMEDIES if words in cause), "")
+    return HistoryError(f"history {path}: {cause}{remedy and ': ' + remedy}")
+
+
+@contextlib.contextmanager
+def _connection(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
+    """Open a file by a URI's `mode`, and close it at the end; what fails is explained."""
+    try:
+        connection = sqlite3.connect(
+            f"file:{quote(str(path.absolute()))}?{mode}",
+            uri=True,
+            timeout=_PATIENCE,
+            isolation_level=None,
+        )
+        with contextlib.closing(connection):
+            connection.execute("PRAGMA foreign_keys = ON")
+            yield connection
+    except sqlite3.Error as error:
+        raise _explained(path, error) from error
+
+
+def _pragma(connection: sqlite3.Connection, name: str) -> int:
+    (value,) = connection.execute(f"PRAGMA {name}").fetchone()
+    return int(value)
+
+
+def _is_new(path: Path, connection: sqlite3.Connection) -> bool:
+    """Tell whether a database is empty; refuse one that is not a history of this schema."""
+    application, version = (_pragma(connection, n) for n in ("application_id", "user_version"))
+    if application != _APPLICATION:
+        (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if application or version or tables:
+            raise HistoryError(
+                f"history {path}: another program's database: name another history_file"
+            )
+        return True
+    if version > SCHEMA_VERSION:
+        raise HistoryError(
+            f"history {path}: written by a newer version of this package (schema {version}, this "
+            f"one knows {SCHEMA_VERSION}): update the package, or name another history_file"
+        )
+    return False
+
+
+def _set_journal(connection: sqlite3.Connection) -> None:
+    """Write ahead, where the file system can; else by SQLite's older journal, as safe but slower.
+
+    Either way a finished transaction is on the disk before the next statement.
+    """
+    with contextlib.suppress(sqlite3.OperationalError):
+        connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("PRAGMA synchronous = FULL")
+
+
+def _make_tables(connection: sqlite3.Connection) -> None:
+    for statement in filter(str.strip, _SCHEMA.split(";")):
+        connection.execute(statement)
+    connection.execute(f"PRAGMA application_id = {_APPLICATION}")
+    connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[sqlite3.Connection]:
+    """Open a history for one transaction, and make it if it is not there.
+
+    Raises
+    ------
+    HistoryError
+        If it cannot be written; then nothing of the transaction is.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise HistoryError(
+            f"history {path}: {error.strerror}: check the folder, or name another history_file"
+        ) from None
+    with _connection(path, "mode=rwc") as connection:
+        _is_new(path, connection)
+        _set_journal(connection)
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            if _is_new(path, connection):
+                _make_tables(connection)
+            yield connection
+            connection.execute("COMMIT")
+        finally:
+            if connection.in_transaction:
+                connection.execute("ROLLBACK")
+
+
+def _reading_mode(path: Path) -> str:
+    """Return the mode in which a file can be read.
+
+    The write-ahead journal needs files beside it. Where they cannot be made, nobody is writing,
+    and without a journal left behind the file itself is all there is.
+    """
+    try:
+        with _connection(path, "mode=ro") as connection:
+            _pragma(connection, "user_version")
+    except HistoryError:
+        if not path.with_name(path.name + "-wal").exists():
+            return "mode=ro&immutable=1"
+    return "mode=ro"
+
+
+@contextlib.contextmanager
+def reading(path: Path) -> Iterator[sqlite3.Connection]:
+    """Open a history that is there, for reading one state of it.
+
+    Raises
+    ------
+    HistoryError
+        If it is not there, or cannot be read.
+    """
+    if not path.is_file():
+        raise HistoryError(f"history {path}: there is no such file")
+    with _connection(path, _reading_mode(path)) as connection:
+        if _is_new(path, connection):
+            raise HistoryError(f"history {path}: there is nothing in it")
+        connection.execute("BEGIN")
+        yield connection
