@@ -28,6 +28,11 @@ from valve_friction_ros.monitoring.record_buffer import Complaints, RecordBuffer
 from valve_friction_ros.monitoring.resampling import uniform_recording
 from valve_friction_ros.monitoring.samples import Samples, nanoseconds
 from valve_friction_ros.monitoring.trend import MONTH, Crossing, Limit, Trend, trend_of
+from valve_friction_ros.monitoring.valve_history import (
+    ValveHistory,
+    current_trend,
+    valve_histories,
+)
 
 __all__ = [
     "COLUMNS",
@@ -55,6 +60,8 @@ __all__ = [
     "Snapshot",
     "StatusSignal",
     "Trend",
+    "ValveHistory",
+    "current_trend",
     "dead_band",
     "diagnose",
     "entry_of",
@@ -64,4 +71,5 @@ __all__ = [
     "rows_arrived",
     "trend_of",
     "uniform_recording",
+    "valve_histories",
 ]

@@ -24,6 +24,8 @@ from valve_friction_ros.monitoring.history_schema import HistoryError, reading, 
 __all__ = ["HistoryError", "HistoryFile"]
 
 _DAY = 86_400_000_000_000
+_END_OF_TIME = 2**63 - 1
+"""Largest whole number that SQLite keeps."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +64,14 @@ class HistoryFile:
         with writing(self.path) as connection:
             insert_baseline(connection, valve_id(connection, valve), kept)
 
-    def baseline(self, valve: str) -> KeptBaseline | None:
-        """Return the newest baseline of the valve of this name, if it has one."""
+    def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
+        """Return the newest baseline set before `until` (ns) for the valve of this name, if any."""
         with reading(self.path) as connection:
             row = connection.execute(
                 "SELECT coulomb_friction, half_width, time_ns, since_ns FROM baseline "
-                "JOIN valve ON valve.id = valve_id WHERE name = ? ORDER BY baseline.id DESC",
-                (valve,),
+                "JOIN valve ON valve.id = valve_id WHERE name = ? AND time_ns < ? "
+                "ORDER BY baseline.id DESC",
+                (valve, until),
             ).fetchone()
         return None if row is None else KeptBaseline(Baseline(*row[:2]), *row[2:])
 
@@ -94,8 +97,8 @@ class HistoryFile:
     def entries(
         self,
         valves: Sequence[str] | None = None,
-        since: int | None = None,
-        until: int | None = None,
+        since: int = -_END_OF_TIME,
+        until: int = _END_OF_TIME,
     ) -> tuple[HistoryEntry, ...]:
         """Return identifications, oldest first.
 

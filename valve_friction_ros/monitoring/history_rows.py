@@ -3,7 +3,7 @@
 import math
 import sqlite3
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Verdict
 from valve_friction_ros.monitoring.baseline import Baseline, Ratio
@@ -112,6 +112,17 @@ def _place(parameter: AssessedParameter) -> int:
     return names.index(parameter.name) if parameter.name in names else len(names)
 
 
+def _parameter(row: sqlite3.Row) -> AssessedParameter:
+    return AssessedParameter(
+        row["name"],
+        _number(row["value"]),
+        _number(row["standard_error"]),
+        _number(row["half_width"]),
+        Verdict(row["verdict"]),
+        row["reason"],
+    )
+
+
 def _entry(row: sqlite3.Row, parameters: Sequence[AssessedParameter]) -> HistoryEntry:
     ratio = Ratio(*(_number(row[name]) for name in ("ratio", "ratio_low", "ratio_high")))
     baseline = row["baseline"]
@@ -137,53 +148,35 @@ def _entry(row: sqlite3.Row, parameters: Sequence[AssessedParameter]) -> History
     )
 
 
-def _chosen(
-    valves: Sequence[str] | None, since: int | None, until: int | None
-) -> tuple[str, list[object]]:
-    """Return the condition of a choice of identifications, and its values."""
-    conditions, values = ["1"], list[object]()
-    if valves is not None:
-        conditions.append(f"valve.name IN ({', '.join('?' * len(valves))})")
-        values += valves
-    if since is not None:
-        conditions.append("time_ns >= ?")
-        values.append(since)
-    if until is not None:
-        conditions.append("time_ns < ?")
-        values.append(until)
-    return " AND ".join(conditions), values
-
-
 def entries_in(
-    connection: sqlite3.Connection,
-    valves: Sequence[str] | None,
-    since: int | None,
-    until: int | None,
+    connection: sqlite3.Connection, valves: Sequence[str] | None, since: int, until: int
 ) -> tuple[HistoryEntry, ...]:
     """Read identifications, oldest first; see `HistoryFile.entries`."""
-    where, values = _chosen(valves, since, until)
+    names = [name for (name,) in connection.execute("SELECT name FROM valve")]
+    wanted = names if valves is None else valves
     connection.row_factory = sqlite3.Row
+    found = [
+        entry for valve in wanted for entry in _entries_of_valve(connection, (valve, since, until))
+    ]
+    return tuple(sorted(found, key=lambda entry: entry.time))
+
+
+def _entries_of_valve(
+    connection: sqlite3.Connection, choice: tuple[str, int, int]
+) -> Iterator[HistoryEntry]:
     parameters: defaultdict[int, list[AssessedParameter]] = defaultdict(list)
-    chosen = f"identification JOIN valve ON valve.id = valve_id WHERE {where}"
     for row in connection.execute(
-        "SELECT parameter.* FROM parameter WHERE identification_id IN "  # noqa: S608 - only marks
-        f"(SELECT identification.id FROM {chosen})",
-        values,
+        "SELECT parameter.* FROM parameter JOIN identification ON identification.id = "
+        "identification_id JOIN valve ON valve.id = valve_id "
+        "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ?",
+        choice,
     ):
-        parameters[row["identification_id"]].append(
-            AssessedParameter(
-                row["name"],
-                _number(row["value"]),
-                _number(row["standard_error"]),
-                _number(row["half_width"]),
-                Verdict(row["verdict"]),
-                row["reason"],
-            )
-        )
-    rows = connection.execute(
-        "SELECT identification.*, valve.name, valve.tag, settings.content "  # noqa: S608 - only marks
-        "FROM identification JOIN settings ON settings.id = settings_id "
-        f"JOIN valve ON valve.id = valve_id WHERE {where} ORDER BY time_ns, identification.id",
-        values,
-    )
-    return tuple(_entry(row, sorted(parameters[row["id"]], key=_place)) for row in rows)
+        parameters[row["identification_id"]].append(_parameter(row))
+    for row in connection.execute(
+        "SELECT identification.*, valve.name, valve.tag, settings.content FROM identification "
+        "JOIN settings ON settings.id = settings_id JOIN valve ON valve.id = valve_id "
+        "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ? "
+        "ORDER BY time_ns, identification.id",
+        choice,
+    ):
+        yield _entry(row, sorted(parameters[row["id"]], key=_place))

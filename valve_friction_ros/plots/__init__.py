@@ -4,6 +4,7 @@ from valve_friction_ros.plots.case import FORCE, PRESSURE, Case, DriveScale
 from valve_friction_ros.plots.friction_figure import friction_figure, identification_figure
 from valve_friction_ros.plots.picture import require_picture_file
 from valve_friction_ros.plots.signature_figure import draw_breakaway_points, signature_figure
+from valve_friction_ros.plots.trend_figure import trend_figure
 from valve_friction_ros.plots.validation_figure import validation_figure
 
 __all__ = [
@@ -16,5 +17,6 @@ __all__ = [
     "identification_figure",
     "require_picture_file",
     "signature_figure",
+    "trend_figure",
     "validation_figure",
 ]

@@ -1,0 +1,142 @@
+"""Command `history`: list, export and draw what the identifiers have kept."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.history_output import as_json, print_table, write_csv
+from valve_friction_ros.monitoring import (
+    HistoryError,
+    HistoryFile,
+    KeptValve,
+    ValveHistory,
+    nanoseconds,
+    valve_histories,
+)
+from valve_friction_ros.nodes.data_folder import history_file
+
+__all__ = ["main"]
+
+_EXIT_REFUSED = 2
+_FIRST = datetime(1970, 1, 1, tzinfo=timezone.utc)
+_LAST = datetime(2262, 1, 1, tzinfo=timezone.utc)
+"""Whose nanoseconds still are a signed 64-bit number."""
+
+
+def _time(text: str) -> datetime:
+    """Read a date, or a date and a time, in UTC unless it says otherwise."""
+    try:
+        time = datetime.fromisoformat(text.replace("Z", "+00:00"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no time: write it as 2026-11-21 or 2026-11-21T18:30"
+        ) from None
+    time = time if time.tzinfo else time.replace(tzinfo=timezone.utc)
+    if not _FIRST <= time <= _LAST:
+        raise argparse.ArgumentTypeError(f"{text!r} is not between 1970 and 2262")
+    return time
+
+
+def _until(text: str) -> datetime:
+    """Read the end of a stretch; a date stands for the whole day."""
+    is_date = "T" not in text and " " not in text
+    return min(_time(text) + timedelta(days=is_date), _LAST)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="history",
+        description="List what the identifiers have kept: identifications, refusals and trend.",
+        epilog="Times are in UTC. Exit code 2: the file or the choice was refused.",
+    )
+    parser.add_argument(
+        "file",
+        type=Path,
+        nargs="?",
+        default=history_file(),
+        metavar="FILE.sqlite",
+        help="the identifiers' history_file (%(default)s)",
+    )
+    parser.add_argument(
+        "--valve",
+        action="append",
+        metavar="NAME",
+        help="only this valve: its tag, its namespace, or the name of its identifier; "
+        "may be repeated",
+    )
+    parser.add_argument(
+        "--since", type=_time, default=_FIRST, metavar="TIME", help="only from this time on"
+    )
+    parser.add_argument(
+        "--until",
+        type=_until,
+        default=_LAST,
+        metavar="TIME",
+        help="only before this time; a date counts as a whole",
+    )
+    parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write them as a table")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    return parser
+
+
+def _is_called(valve: KeptValve, name: str) -> bool:
+    namespace = valve.name.rpartition("/")[0]
+    return name == valve.tag or f"/{name.strip('/')}" in (valve.name, namespace)
+
+
+def _chosen(valves: Sequence[KeptValve], names: Sequence[str] | None) -> tuple[KeptValve, ...]:
+    if names is None:
+        return tuple(valves)
+    for name in names:
+        if not any(_is_called(valve, name) for valve in valves):
+            known = ", ".join(valve.name for valve in valves) or "none"
+            raise ValueError(f"--valve {name}: there is no such valve; there are {known}")
+    return tuple(valve for valve in valves if any(_is_called(valve, name) for name in names))
+
+
+def _run(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
+    file = HistoryFile(options.file)
+    if options.plot is not None:
+        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
+
+        plots.require_picture_file(options.plot)
+    histories = valve_histories(
+        file,
+        _chosen(file.valves(), options.valve),
+        *(nanoseconds((time - _FIRST).total_seconds()) for time in (options.since, options.until)),
+    )
+    if not histories:
+        raise ValueError(f"{options.file}: no identification of these valves within these times")
+    if options.csv is not None:
+        write_csv(options.csv, histories)
+    if options.plot is not None:
+        try:
+            figure = plots.trend_figure(histories)
+        except ValueError as error:
+            raise ValueError(f"--plot: {error} by --valve") from None
+        figure.savefig(options.plot)
+    return histories
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        histories = _run(options)
+    except (ValueError, HistoryError, OSError) as error:
+        print("history:", *str(error).splitlines(), file=sys.stderr)
+        return _EXIT_REFUSED
+    if options.json:
+        print(json.dumps(as_json(histories), ensure_ascii=False, allow_nan=False))
+    else:
+        print_table(histories)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

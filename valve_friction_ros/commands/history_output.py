@@ -1,0 +1,237 @@
+"""How a history is told: as a table, as an object of JSON, and as CSV."""
+
+import csv
+import json
+import math
+import re
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from valve_friction_ros.commands.formatting import two_digits
+from valve_friction_ros.identification import ASSESSED_UNITS
+from valve_friction_ros.monitoring import HistoryEntry, Trend, ValveHistory
+
+__all__ = ["as_json", "print_table", "write_csv"]
+
+_LEVELS = ("OK", "WARN", "ERROR")
+_COLUMN_UNITS = {
+    "N·s/m": "_n_s_per_m",
+    "N/m": "_n_per_m",
+    "m/s": "_m_per_s",
+    "kg": "_kg",
+    "N": "_n",
+    "s": "_s",
+    "1": "",
+}
+
+
+def time_text(time: float, timespec: str = "milliseconds") -> str:
+    """Write a time in ns since 1970 by ISO 8601, in UTC."""
+    when = datetime.fromtimestamp(time / 1e9, timezone.utc)
+    return when.isoformat(timespec=timespec).replace("+00:00", "Z")
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
+    """Return the trend; the numbers only where the drift is significant."""
+    if trend is None:
+        return None
+    told: dict[str, Any] = {
+        "begin": time_text(trend.begin),
+        "end": time_text(trend.end),
+        "days": trend.days,
+        "outliers": trend.outliers,
+        "significant": trend.is_significant,
+        "drift_n_per_month": None,
+        "half_width_n_per_month": None,
+        "crossing": None,
+    }
+    if trend.is_significant:
+        told |= {
+            "drift_n_per_month": trend.drift,
+            "half_width_n_per_month": trend.half_width,
+        }
+    if trend.crossing is not None:
+        told["crossing"] = {
+            "limit": trend.crossing.limit.value,
+            "level_n": trend.crossing.level,
+            "expected": time_text(trend.crossing.time),
+            "earliest": time_text(trend.crossing.earliest),
+            "latest": time_text(trend.crossing.latest),
+        }
+    return told
+
+
+def _entry_as_json(entry: HistoryEntry) -> dict[str, Any]:
+    ratio, baseline = entry.diagnosis.ratio, entry.baseline
+    return {
+        "time": time_text(entry.time),
+        "begin": None if entry.span is None else time_text(entry.span.begin),
+        "end": None if entry.span is None else time_text(entry.span.end),
+        "method": entry.method,
+        "parameters": {
+            name: {
+                "value": _known(one.value),
+                "standard_error": _known(one.standard_error),
+                "half_width": _known(one.half_width),
+                "unit": ASSESSED_UNITS.get(name, ""),
+                "verdict": one.verdict.value,
+                "reason": one.reason,
+            }
+            for name, one in entry.parameters.items()
+        },
+        "fit": _known(entry.fit.share),
+        "rms": _known(entry.fit.rms),
+        "systematic_misfit": _known(entry.fit.systematic),
+        "warnings": list(entry.warnings),
+        "level": int(entry.diagnosis.level),
+        "status_signal": entry.diagnosis.status_signal.value,
+        "message": entry.diagnosis.message,
+        "ratio": None if ratio is None else [_known(one) for one in ratio],
+        "baseline": None if baseline is None else baseline.coulomb_friction,
+        "baseline_half_width": None if baseline is None else baseline.half_width,
+        "limits": vars(entry.limits),
+        "refusal": entry.refusal,
+        "settings": json.loads(entry.settings),
+        "software_version": entry.version,
+    }
+
+
+def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
+    """Build the object that JSON shows: a list of valves, each with entries and trend; SI units."""
+    return {
+        "valves": [
+            {
+                "name": history.valve.name,
+                "tag": history.valve.tag,
+                "trend": _trend_as_json(history.trend),
+                "entries": [_entry_as_json(entry) for entry in history.entries],
+            }
+            for history in histories
+        ]
+    }
+
+
+def _parameter_cells(entry: HistoryEntry) -> dict[str, object]:
+    cells: dict[str, object] = {}
+    for name, one in entry.parameters.items():
+        unit = _COLUMN_UNITS.get(ASSESSED_UNITS.get(name, "1"), "")
+        cells[f"{name}{unit}"] = _known(one.value)
+        cells[f"{name}_standard_error{unit}"] = _known(one.standard_error)
+        cells[f"{name}_half_width{unit}"] = _known(one.half_width)
+        cells[f"{name}_verdict"] = one.verdict.value
+    return cells
+
+
+def _row(entry: HistoryEntry) -> dict[str, object]:
+    span, ratio, baseline = entry.span, entry.diagnosis.ratio, entry.baseline
+    return {
+        "time": time_text(entry.time),
+        "valve": entry.valve.name,
+        "tag": entry.valve.tag,
+        "begin": None if span is None else time_text(span.begin),
+        "end": None if span is None else time_text(span.end),
+        "method": entry.method,
+        "level": _LEVELS[entry.diagnosis.level],
+        "refusal": entry.refusal,
+        "ratio": None if ratio is None else ratio.value,
+        "ratio_low": None if ratio is None else _known(ratio.low),
+        "ratio_high": None if ratio is None else _known(ratio.high),
+        "baseline_n": None if baseline is None else baseline.coulomb_friction,
+        "fit": _known(entry.fit.share),
+        "rms_m": _known(entry.fit.rms),
+        **_parameter_cells(entry),
+        "message": entry.diagnosis.message,
+        "software_version": entry.version,
+    }
+
+
+def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
+    """Write a row an identification, oldest first; a cell without a value is empty."""
+    entries = sorted(
+        (entry for history in histories for entry in history.entries), key=lambda one: one.time
+    )
+    rows = [_row(entry) for entry in entries]
+    widest = max(rows, key=len)
+    header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, header, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _told(entry: HistoryEntry) -> str:
+    """Return the reason of a refusal, or the verdict without its figures."""
+    return entry.refusal or re.split("[:;]", entry.diagnosis.message)[0]
+
+
+def print_table(histories: Sequence[ValveHistory]) -> None:
+    """Print a table a valve, and the trend below it."""
+    console = Console(highlight=False, markup=False)
+    for history in histories:
+        tag = f"{history.valve.tag} " if history.valve.tag else ""
+        table = Table(
+            "time [UTC]",
+            "F_c [N]",
+            "± 95 %",
+            "verdict",
+            "ratio",
+            "level",
+            "told",
+            box=None,
+            header_style="bold",
+            title=f"{tag}{history.valve.name}",
+            title_justify="left",
+        )
+        for column in (1, 2, 4):
+            table.columns[column].justify = "right"
+        for column in range(6):
+            table.columns[column].no_wrap = True
+        for entry in history.entries:
+            one, ratio = entry.friction, entry.diagnosis.ratio
+            is_known = one is not None and math.isfinite(one.value)
+            table.add_row(
+                time_text(entry.time, "seconds")[:-1].replace("T", " "),
+                f"{one.value:.6g}" if one is not None and is_known else "–",
+                two_digits(one.half_width) if one is not None and one.half_width > 0 else "",
+                "refused" if one is None else one.verdict.value,
+                "" if ratio is None or entry.refusal else f"{ratio.value:.2f}",
+                _LEVELS[entry.diagnosis.level],
+                _told(entry),
+            )
+        console.print(table)
+        for line in _trend_lines(history.trend):
+            console.print(line)
+        console.print()
+
+
+def _trend_lines(trend: Trend | None) -> list[str]:
+    if trend is None:
+        return []
+    days = f"{trend.days} days"
+    if trend.outliers:
+        days += f" ({trend.outliers} left out as outliers)"
+    if not trend.is_significant:
+        return [f"trend: no significant drift of coulomb friction over {days}"]
+    lines = [
+        f"trend: coulomb friction drifts by {trend.drift:+.3g} ± {two_digits(trend.half_width)} N "
+        f"a month, over {days}"
+    ]
+    if trend.crossing is not None:
+        expected, earliest, latest = (
+            time_text(time)[:10]
+            for time in (trend.crossing.time, trend.crossing.earliest, trend.crossing.latest)
+        )
+        lines.append(
+            f"trend: {trend.crossing.limit.value} ({trend.crossing.level:.4g} N) expected on "
+            f"{expected} (95 %: {earliest} to {latest})"
+        )
+    return lines
