@@ -113,7 +113,7 @@ class HistoryFile:
             try:
                 return entries_in(connection, valves, since, until)
             except ValueError as error:
-                raise HistoryError(f"history {self.path}: a row holds no result: {error}") from None
+                raise HistoryError(f"{self.path}: a row holds no result: {error}") from None
 
 
 def _forget(connection: sqlite3.Connection, valve: int, before: int) -> None:

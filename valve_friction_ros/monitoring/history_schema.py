@@ -113,7 +113,7 @@ class HistoryError(Exception):
 def _explained(path: Path, error: sqlite3.Error) -> HistoryError:
     cause = str(error)
     remedy = next((remedy for words, remedy in _REMEDIES if words in cause), "")
-    return HistoryError(f"history {path}: {cause}{remedy and ': ' + remedy}")
+    return HistoryError(f"{path}: {cause}{remedy and ': ' + remedy}")
 
 
 @contextlib.contextmanager
@@ -144,13 +144,11 @@ def _is_new(path: Path, connection: sqlite3.Connection) -> bool:
     if application != _APPLICATION:
         (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if application or version or tables:
-            raise HistoryError(
-                f"history {path}: another program's database: name another history_file"
-            )
+            raise HistoryError(f"{path}: another program's database: name another history_file")
         return True
     if version > SCHEMA_VERSION:
         raise HistoryError(
-            f"history {path}: written by a newer version of this package (schema {version}, this "
+            f"{path}: written by a newer version of this package (schema {version}, this "
             f"one knows {SCHEMA_VERSION}): update the package, or name another history_file"
         )
     return False
@@ -185,8 +183,9 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
+        cause = "its folder is a file" if isinstance(error, FileExistsError) else error.strerror
         raise HistoryError(
-            f"history {path}: {error.strerror}: check the folder, or name another history_file"
+            f"{path}: {cause}: check the folder, or name another history_file"
         ) from None
     with _connection(path, "mode=rwc") as connection:
         _is_new(path, connection)
@@ -226,10 +225,14 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     HistoryError
         If it is not there, or cannot be read.
     """
-    if not path.is_file():
-        raise HistoryError(f"history {path}: there is no such file")
+    try:
+        is_there = path.is_file()
+    except OSError as error:
+        raise HistoryError(f"{path}: {error.strerror}: check the folder") from None
+    if not is_there:
+        raise HistoryError(f"{path}: there is no such file")
     with _connection(path, _reading_mode(path)) as connection:
         if _is_new(path, connection):
-            raise HistoryError(f"history {path}: there is nothing in it")
+            raise HistoryError(f"{path}: there is nothing in it")
         connection.execute("BEGIN")
         yield connection

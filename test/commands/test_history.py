@@ -1,0 +1,253 @@
+"""Command `history`, as a person runs it."""
+
+import csv
+import json
+import math
+import sqlite3
+
+import matplotlib.image
+import pytest
+from histories import DAY, OTHER, START, VALVE, refused, success
+
+from valve_friction_ros.commands import history as command
+from valve_friction_ros.identification import Verdict
+from valve_friction_ros.monitoring import (
+    MONTH,
+    Baseline,
+    FrictionLimits,
+    HistoryFile,
+    KeptBaseline,
+)
+
+BASELINE = Baseline(141.0, 1.0)
+DRIFT = 3.0
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Twenty weeks of one valve, with a refusal, and two identifications of another."""
+    history = HistoryFile(tmp_path_factory.mktemp("history") / "history.sqlite")
+    history.add(success(START - 30 * DAY, 300.0))  # before the packing was replaced
+    history.set_baseline(VALVE, KeptBaseline(BASELINE, START + 1, START))
+    for week in range(20):
+        friction = 150.0 + DRIFT * week * 7 * DAY / MONTH
+        history.add(success(START + week * 7 * DAY, friction, 1.0, baseline=BASELINE))
+    history.add(refused(START + DAY, "too little travel: move the valve"))
+    history.add(success(START, 80.0, valve=OTHER, verdict=Verdict.WEAK))
+    history.add(success(START + DAY, valve=OTHER))
+    return history.path
+
+
+@pytest.fixture
+def run(file, capsys):
+    """Run the command on the file; return exit code, output and errors."""
+
+    def call(*arguments, path=file):
+        try:
+            code = command.main([str(path), *map(str, arguments)])
+        except SystemExit as end:
+            code = end.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def told(run, *arguments):
+    code, output, errors = run("--json", *arguments)
+    assert (code, errors) == (0, "")
+    return json.loads(output)["valves"]
+
+
+class TestTable:
+    def test_entries_with_trend(self, run, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "160")
+        code, output, errors = run()
+        assert (code, errors) == (0, "")
+        lines = [" ".join(line.split()) for line in output.splitlines()]
+        assert "FV-101 /fv_101/identifier" in lines
+        assert "LV-7 /area_2/lv_7/identifier" in lines
+        assert "2026-09-21 14:13:20 150 1 identified 1.06 OK friction normal" in lines
+        assert "2026-09-22 14:13:20 – refused OK too little travel: move the valve" in lines
+        assert "2026-09-21 14:13:20 80 3 weak OK friction normal" in lines
+        (drift,) = (line for line in lines if "drifts" in line)
+        assert drift.startswith("trend: coulomb friction drifts by +3 ± 0.")
+        assert drift.endswith("N a month, over 20 days")
+        (limit,) = (line for line in lines if "expected on" in line)
+        assert limit.startswith("trend: warn_ratio (176.2 N) expected on 2027-06-1")
+
+    def test_an_insignificant_drift_has_no_number(self, tmp_path, run):
+        history = HistoryFile(tmp_path / "history.sqlite")
+        for day, friction in enumerate((150.0, 154.0, 151.0, 156.0, 153.0)):
+            history.add(success(START + day * DAY, friction))
+        _, output, _ = run(path=history.path)
+        assert "trend: no significant drift of coulomb friction over 5 days" in output
+        assert "month" not in output
+        (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
+        assert valve["trend"]["significant"] is False
+        assert valve["trend"]["drift_n_per_month"] is None
+        assert valve["trend"]["crossing"] is None
+
+    def test_too_few_days_have_no_trend(self, run):
+        _, output, _ = run("--valve", "LV-7")
+        assert "trend" not in output
+        (valve,) = told(run, "--valve", "LV-7")
+        assert valve["trend"] is None
+
+
+class TestJson:
+    def test_an_entry(self, run):
+        valve = told(run, "--valve", "FV-101")[0]
+        assert (valve["name"], valve["tag"]) == VALVE
+        entry = valve["entries"][1]
+        assert entry["time"] == "2026-09-21T14:13:20.000Z"
+        assert (entry["begin"], entry["end"]) == ("2026-09-21T14:12:20.000Z", entry["time"])
+        friction = entry["parameters"]["coulomb_friction"]
+        assert friction == {
+            "value": 150.0,
+            "standard_error": 0.5,
+            "half_width": 1.0,
+            "unit": "N",
+            "verdict": "identified",
+            "reason": "",
+        }
+        assert entry["parameters"]["static_friction"]["value"] is None
+        assert entry["ratio"][0] == pytest.approx(150 / 141)
+        assert (entry["baseline"], entry["baseline_half_width"]) == (141.0, 1.0)
+        assert entry["limits"] == vars(FrictionLimits())
+        assert entry["settings"]["valve"]["diaphragm_area"] == 0.0445
+        assert entry["refusal"] == ""
+
+    def test_the_trend_begins_with_the_last_baseline(self, run):
+        trend = told(run, "--valve", "FV-101")[0]["trend"]
+        assert trend["begin"] == "2026-09-21T14:13:20.000Z"
+        assert trend["drift_n_per_month"] == pytest.approx(DRIFT)
+        assert 0 < trend["half_width_n_per_month"] < DRIFT
+        crossing = trend["crossing"]
+        assert (crossing["limit"], crossing["level_n"]) == ("warn_ratio", 176.25)
+        assert crossing["earliest"] < crossing["expected"] < crossing["latest"]
+
+
+class TestChoice:
+    @pytest.mark.parametrize("name", ["FV-101", "fv_101", "/fv_101", "/fv_101/identifier"])
+    def test_by_any_name(self, run, name):
+        assert [one["name"] for one in told(run, "--valve", name)] == [VALVE.name]
+
+    def test_several(self, run):
+        found = told(run, "--valve", "area_2/lv_7", "--valve", "FV-101")
+        assert {one["name"] for one in found} == {VALVE.name, OTHER.name}
+
+    @pytest.mark.parametrize(
+        ("arguments", "times"),
+        [
+            (["--since", "2026-09-22"], ["2026-09-22T14:13:20.000Z"]),
+            (["--until", "2026-09-21"], ["2026-09-21T14:13:20.000Z"]),
+            (
+                ["--since", "2026-09-21T14:13:20Z", "--until", "2026-09-22T14:13:20+00:00"],
+                ["2026-09-21T14:13:20.000Z"],
+            ),
+            (["--since", "2026-09-22T16:13:20+02:00"], ["2026-09-22T14:13:20.000Z"]),
+        ],
+    )
+    def test_by_time(self, run, arguments, times):
+        (valve,) = told(run, "--valve", "LV-7", *arguments)
+        assert [entry["time"] for entry in valve["entries"]] == times
+
+    def test_a_trend_of_the_time_before_the_baseline(self, tmp_path, run):
+        history = HistoryFile(tmp_path / "history.sqlite")
+        for day in range(9):
+            history.add(success(START + day * DAY, 150.0 + day, 0.1))
+        history.set_baseline(VALVE, KeptBaseline(BASELINE, START + 6 * DAY, START + 6 * DAY))
+        _, output, _ = run("--json", "--until", "2026-09-26", path=history.path)
+        assert json.loads(output)["valves"][0]["trend"]["days"] == 6
+        assert json.loads(run("--json", path=history.path)[1])["valves"][0]["trend"] is None
+
+
+def test_csv(run, tmp_path, file):
+    path = tmp_path / "history.csv"
+    assert run("--csv", path)[0] == 0
+    with path.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    entries = HistoryFile(file).entries()
+    assert len(rows) == len(entries) == 24
+    for row, entry in zip(rows, entries, strict=True):
+        friction = row["coulomb_friction_n"]
+        assert (float(friction) if friction else None) == (entry.friction and entry.friction.value)
+        assert (row["valve"], row["tag"], row["refusal"]) == (*entry.valve, entry.refusal)
+        assert row["static_friction_n"] == ""
+    first = next(row for row in rows[1:] if row["tag"] == "FV-101")
+    assert first["time"] == "2026-09-21T14:13:20.000Z"
+    assert (first["coulomb_friction_half_width_n"], first["mass_kg"]) == ("1.0", "1.0")
+    assert first["coulomb_friction_verdict"] == "identified"
+    assert math.isclose(float(first["ratio"]), 150 / 141)
+    assert (first["level"], first["baseline_n"]) == ("OK", "141.0")
+
+
+def test_plot(run, tmp_path):
+    path = tmp_path / "history.png"
+    assert run("--plot", path)[0] == 0
+    assert matplotlib.image.imread(path).std() > 0.05
+
+
+class TestErrors:
+    """One line, and exit code 2."""
+
+    def refused(self, result, *words):
+        code, output, errors = result
+        assert (code, output) == (2, "")
+        assert errors.startswith("history: ")
+        assert errors.count("\n") == 1
+        for word in words:
+            assert word in errors
+
+    def test_no_file(self, run, tmp_path):
+        path = tmp_path / "none.sqlite"
+        self.refused(run(path=path), str(path), "there is no such file")
+        assert not path.exists()
+
+    def test_no_history(self, run, tmp_path):
+        path = tmp_path / "text.sqlite"
+        path.write_text("text" * 1000)
+        self.refused(run(path=path), str(path), "not a database")
+
+    def test_newer(self, run, tmp_path):
+        history = HistoryFile(tmp_path / "newer.sqlite")
+        history.prepare()
+        connection = sqlite3.connect(history.path)
+        connection.execute("PRAGMA user_version = 99")
+        connection.close()
+        self.refused(run(path=history.path), "newer version", "update the package")
+
+    def test_empty(self, run, tmp_path):
+        history = HistoryFile(tmp_path / "empty.sqlite")
+        history.prepare()
+        self.refused(run(path=history.path), "no identification")
+
+    def test_unknown_valve(self, run):
+        self.refused(run("--valve", "FV-999"), "FV-999", VALVE.name, OTHER.name)
+
+    def test_nothing_then(self, run):
+        self.refused(run("--until", "1999-12-31"), "no identification of these valves")
+
+    @pytest.mark.parametrize("time", ["yesterday", "2026-13-01", "1969-12-31", "3000-01-01"])
+    def test_no_time(self, run, time):
+        self.refused(run("--since", time), "--since", time)
+
+    def test_no_picture(self, run, tmp_path):
+        self.refused(run("--plot", tmp_path / "history.txt"), "not a picture format")
+
+    def test_no_folder_for_the_table(self, run, tmp_path):
+        self.refused(run("--csv", tmp_path / "none" / "history.csv"), "history.csv")
+
+    def test_too_many_panels(self, run, tmp_path):
+        history = HistoryFile(tmp_path / "many.sqlite")
+        for number in range(13):
+            history.add(success(valve=VALVE._replace(name=f"/fv_{number}/identifier")))
+        result = run("--plot", tmp_path / "many.png", path=history.path)
+        self.refused(result, "one to 12 valves can be drawn, got 13: choose some by --valve")
+
+
+def test_the_default_file():
+    """That of the nodes."""
+    options = command._parser().parse_args([])
+    assert options.file.parts[-2:] == ("valve_friction_ros", "history.sqlite")
