@@ -39,7 +39,7 @@ def test_a_success(monitor):
     assessment = identify_snapshot(snapshot, monitor.settings)
     monitor.accept(assessment, START)
     baseline = monitor.set_baseline()
-    entry = entry_of(monitor, VALVE, snapshot, START)
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
     assert entry.parameters == dict(assessment.parameters)
     assert entry.span == (0, 499 * PERIOD)
     assert entry.fit == (
@@ -60,7 +60,7 @@ def test_a_refusal(monitor):
     snapshot = monitor.buffer.snapshot()
     monitor.accept(identify_snapshot(snapshot, monitor.settings), START)
     monitor.refuse(RefusalError("too little travel"))
-    entry = entry_of(monitor, VALVE, snapshot, START)
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
     assert entry.refusal == "too little travel"
     assert not entry.parameters
     assert entry.friction is None
@@ -71,7 +71,7 @@ def test_a_refusal(monitor):
 def test_a_refusal_of_nothing(monitor):
     monitor.buffer.clear("on request")
     monitor.refuse(RefusalError("no samples"))
-    assert entry_of(monitor, VALVE, monitor.buffer.snapshot(), START).span is None
+    assert entry_of(monitor, VALVE, monitor.buffer.snapshot(), monitor.settings, START).span is None
 
 
 def test_neither_a_success_nor_a_refusal_or_both():

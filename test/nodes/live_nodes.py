@@ -87,6 +87,7 @@ class NodeProcess:
             command += ["-p", f"{key}:={value}"]
         path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
         environment = os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path}
+        environment["ROS_HOME"] = str(folder)  # a history of the test's own
         with self._output.open("w") as output, self._errors.open("w") as errors:
             self._process = subprocess.Popen(
                 command, cwd=folder, env=environment, stdout=output, stderr=errors

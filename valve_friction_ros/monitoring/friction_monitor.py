@@ -166,6 +166,10 @@ class FrictionMonitor:
         self._baseline = Baseline(friction.value, friction.half_width)
         return self._baseline
 
+    def take_baseline(self, baseline: Baseline) -> None:
+        """Compare with this baseline from now on."""
+        self._baseline = baseline
+
     def diagnosis(self) -> Diagnosis:
         """Judge the latest estimate, also after a refusal; OK while there is none."""
         if self._assessment is None:

@@ -201,7 +201,11 @@ def _fit_of(assessment: Assessment) -> Fit:
 
 
 def entry_of(
-    monitor: FrictionMonitor, valve: KeptValve, snapshot: Snapshot, time: int
+    monitor: FrictionMonitor,
+    valve: KeptValve,
+    snapshot: Snapshot,
+    settings: MonitorSettings,
+    time: int,
 ) -> HistoryEntry:
     """Describe the identification that a monitor has just accepted or refused.
 
@@ -213,10 +217,12 @@ def entry_of(
         The valve.
     snapshot : Snapshot
         What was identified.
+    settings : MonitorSettings
+        How it was; those in force may have changed since.
     time : int
         Now, ns.
     """
-    settings, assessment = monitor.settings, monitor.assessment
+    assessment = monitor.assessment
     outcome: dict[str, Any] = {"refusal": monitor.refusal}
     if monitor.refusal is None and assessment is not None:
         outcome = {
@@ -230,7 +236,7 @@ def entry_of(
         span=span_of(snapshot),
         method="sweep",
         diagnosis=monitor.diagnosis(),
-        limits=settings.limits,
+        limits=monitor.settings.limits,
         baseline=monitor.baseline,
         settings=settings_text(settings),
         **outcome,

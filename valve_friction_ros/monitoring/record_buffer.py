@@ -106,6 +106,12 @@ class RecordBuffer:
         """Memory that the samples of both signals take, bytes."""
         return self._pressure.nbytes + self._position.nbytes
 
+    @property
+    def newest_stamp(self) -> int | None:
+        """Stamp of the newest sample of either signal, ns, or None."""
+        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
+        return max((stamp for stamp in last_stamps if stamp is not None), default=None)
+
     def add_pressure(self, stamp: int, pressure: float) -> str | None:
         """Take a pressure (Pa) stamped `stamp` (ns); return what was wrong with it, if anything."""
         lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
@@ -191,8 +197,7 @@ class RecordBuffer:
     def snapshot(self) -> Snapshot:
         """Copy the samples and the rejections of the last window."""
         pressure, position = self._pressure.samples(), self._position.samples()
-        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
-        newest = max((stamp for stamp in last_stamps if stamp is not None), default=0)
+        newest = self.newest_stamp or 0
         rejections = tuple(
             rejection for rejection in self._rejections if rejection.stamp >= newest - self._window
         )

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -10,10 +11,11 @@ from valve_friction_ros.monitoring import (
     FrictionMonitor,
     Level,
     StatusSignal,
+    Trend,
     dead_band,
 )
 
-__all__ = ["friction_status"]
+__all__ = ["friction_status", "trend_values"]
 
 
 def _number(value: float) -> str:
@@ -52,12 +54,34 @@ def _assessed_values(assessment: Assessment, monitor: FrictionMonitor) -> dict[s
     return values
 
 
+def _date(time: int) -> str:
+    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d}"
+
+
+def trend_values(trend: Trend | None) -> dict[str, str]:
+    """Return the values that tell of a drift, if it is significant."""
+    if trend is None or not trend.is_significant:
+        return {}
+    values = {
+        "coulomb_friction_drift [N/month]": _number(trend.drift),
+        "coulomb_friction_drift half width [N/month]": _number(trend.half_width),
+    }
+    if trend.crossing is not None:
+        values["limit_expected"] = trend.crossing.limit.value
+        values["limit_expected [date]"] = _date(trend.crossing.time)
+        values["limit_expected earliest [date]"] = _date(trend.crossing.earliest)
+        values["limit_expected latest [date]"] = _date(trend.crossing.latest)
+    return values
+
+
 def friction_status(
     monitor: FrictionMonitor,
     name: str,
     hardware_id: str,
     now: int,
     input_problems: Sequence[str],
+    upkeep_problems: Sequence[str],
+    more: Mapping[str, str],
 ) -> DiagnosticStatus:
     """Compose the status of a valve.
 
@@ -73,6 +97,10 @@ def friction_status(
         Time, ns, for the age of the estimate.
     input_problems : sequence of str
         What is wrong with the inputs; any raises the level to WARN at least.
+    upkeep_problems : sequence of str
+        What else needs somebody's hand, while the verdict holds; likewise.
+    more : mapping of str to str
+        Further values.
 
     Returns
     -------
@@ -83,6 +111,8 @@ def friction_status(
     level, signal = diagnosis.level, diagnosis.status_signal
     if input_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
+    elif upkeep_problems and level < Level.WARN:
+        level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
     assessment = monitor.assessment
     friction = None if assessment is None else assessment.parameters["coulomb_friction"]
     valid = friction is not None and math.isfinite(friction.value) and monitor.refusal is None
@@ -102,9 +132,14 @@ def friction_status(
         values["coulomb_friction_ratio"] = _number(diagnosis.ratio.value)
         values["coulomb_friction_ratio low"] = _number(diagnosis.ratio.low)
         values["coulomb_friction_ratio high"] = _number(diagnosis.ratio.high)
+    values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
     return _status(
-        level, name, hardware_id, "; ".join([*input_problems, diagnosis.message]), values
+        level,
+        name,
+        hardware_id,
+        "; ".join([*input_problems, *upkeep_problems, diagnosis.message]),
+        values,
     )
 
 

@@ -12,26 +12,25 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.task import Future
-from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.identification import UNITS, Assessment, RefusalError
+from valve_friction_ros.identification import Assessment, RefusalError
 from valve_friction_ros.model import compile_kernels
-from valve_friction_ros.monitoring import Arrivals, FrictionMonitor, dead_band, identify_snapshot
-from valve_friction_ros.nodes.friction_status import friction_status
+from valve_friction_ros.monitoring import Arrivals, FrictionMonitor, identify_snapshot
+from valve_friction_ros.nodes.friction_status import friction_status, trend_values
 from valve_friction_ros.nodes.identifier_parameters import (
     CHANGEABLE,
     FIXED_AT_START,
     monitor_settings,
 )
+from valve_friction_ros.nodes.keeping import Job, Keeping
 from valve_friction_ros.nodes.late_answers import create_service_with_late_answers
-from valve_friction_ros.nodes.messages import sweep_message
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
+from valve_friction_ros.nodes.results import ResultTopics
 from valve_friction_ros.nodes.running import run_nodes
 from valve_friction_ros.nodes.saving import saving
-from valve_friction_ros.nodes.streams import LATCHED
+from valve_friction_ros.nodes.schedule import Schedule
 from valve_friction_ros.nodes.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.valve_parameters import JOINT
 
@@ -41,16 +40,6 @@ _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
 PAUSE = 0.05
 """Time, s, for which messages gather before they are taken."""
-
-_FIGURES = (
-    "dead_band",
-    "coulomb_friction_ratio",
-    "fit",
-    "rms",
-    "threshold",
-    "sigma",
-    "r_squared",
-)
 
 
 @contextlib.contextmanager
@@ -85,14 +74,20 @@ class Identifier(Node):
         self._monitor = FrictionMonitor(monitor_settings(values_of(self, CHANGEABLE)))
         reject_invalid(self, CHANGEABLE, monitor_settings)
         self._worker = worker
-        self._create_outputs()
+        self._results = ResultTopics(self)
+        self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
         self._inputs = ValveInputs(self, joint, self._take_samples)
         self.add_post_set_parameters_callback(self._take_parameters)
         self._identifying = False
+        self._identified_until: int | None = None
+        self._schedule = Schedule(self, self._identify_as_scheduled)
+        tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
+        self._keeping = Keeping(self, self._monitor, tag)
+        self._keeping.begin()
         create_service_with_late_answers(self, Trigger, "~/identify", self._identify)
         create_service_with_late_answers(self, Trigger, "~/save", self._save)
-        self.create_service(Trigger, "~/set_baseline", self._set_baseline)
+        create_service_with_late_answers(self, Trigger, "~/set_baseline", self._set_baseline)
         self.create_service(Trigger, "~/clear", self._clear)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
         self._jump_handle = self.get_clock().create_jump_callback(
@@ -102,18 +97,6 @@ class Identifier(Node):
             post_callback=self._on_time_jump,
         )
 
-    def _create_outputs(self) -> None:
-        self._friction_publishers = {
-            name: self.create_publisher(Float64, f"~/friction/{name}", LATCHED)
-            for name in (*UNITS, *_FIGURES)
-        }
-        self._half_width_publishers, self._published_publishers = (
-            {name: self.create_publisher(Float64, f"~/{kind}/{name}", LATCHED) for name in UNITS}
-            for kind in ("half_width", "published")
-        )
-        self._sweep_publisher = self.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
-        self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-
     def destroy_node(self) -> None:
         """Stop the clock's callback, then the node."""
         self._jump_handle.unregister()
@@ -122,6 +105,7 @@ class Identifier(Node):
     def _take_parameters(self, _: object) -> None:
         self._inputs.flush()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
+        self._schedule.follow()
 
     def _on_time_jump(self, jump: TimeJump) -> None:
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
@@ -144,37 +128,83 @@ class Identifier(Node):
         if self._identifying:
             response.message = "an identification is already running: wait for it"
             return response
+        answer = Future()
+        self._begin(lambda done, job: self._conclude(done, job, answer))
+        return answer
+
+    def _identify_as_scheduled(self) -> None:
+        self._inputs.flush()
+        newest = self._monitor.buffer.newest_stamp
+        if self._identifying:
+            self._schedule.skip("an identification was already running")
+        elif newest is not None and newest == self._identified_until:
+            self._schedule.skip("no new samples since the last identification")
+        else:
+            self._begin(self._conclude_scheduled)
+
+    def _begin(self, conclude: "Callable[[ThreadFuture[Assessment], Job], None]") -> None:
+        """Identify a copy of the buffer in the worker, then conclude in the executor's thread."""
         self._inputs.flush()
         self._identifying = True
-        return self._in_worker(
-            self._conclude,
-            identify_snapshot,
-            self._monitor.buffer.snapshot(),
-            self._monitor.settings,
-        )
+        self._identified_until = self._monitor.buffer.newest_stamp
+        job = Job(self._monitor.buffer.snapshot(), self._monitor.settings)
+        self._in_worker(lambda done: conclude(done, job), identify_snapshot, *job)
 
-    def _conclude(self, done: "ThreadFuture[Assessment]") -> Trigger.Response:
-        """Take over a finished identification, and answer the request for it."""
+    def _in_worker(
+        self,
+        conclude: Callable[["ThreadFuture[Any]"], None],
+        work: Callable[..., Any],
+        *arguments: object,
+    ) -> None:
+        """Do some work in the worker; `conclude` takes over in the executor's thread."""
+        executor = self.executor
+        submitted = self._worker.submit(work, *arguments)
+        submitted.add_done_callback(lambda done: executor.create_task(conclude, done))
+
+    def _conclude(self, done: "ThreadFuture[Assessment]", job: Job, answer: Future) -> None:
+        """Take over what was asked for, and answer when it has been kept."""
         self._identifying = False
         response = Trigger.Response()
         try:
-            assessment = done.result()
+            self._accept(done.result())
         except RefusalError as refusal:
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
             response.message = str(refusal)
         else:
-            self._monitor.accept(assessment, self.get_clock().now().nanoseconds)
-            self._publish_results(assessment)
             response.success = True
             told = (*self._input_problems(), self._monitor.diagnosis().message)
             response.message = "; ".join(told)
-        self._publish_diagnostics()
-        return response
+
+        def respond() -> None:
+            answer.set_result(response)
+            self._publish_diagnostics()
+
+        self._keeping.keep(job, respond)
+
+    def _conclude_scheduled(self, done: "ThreadFuture[Assessment]", job: Job) -> None:
+        """Take over a success; a record that cannot be identified leaves everything as it is."""
+        self._identifying = False
+        try:
+            self._accept(done.result())
+        except RefusalError as refusal:
+            self._schedule.skip(str(refusal))
+        else:
+            self._schedule.succeed()
+            self._keeping.keep(job, self._publish_diagnostics)
+
+    def _accept(self, assessment: Assessment) -> None:
+        self._monitor.accept(assessment, self.get_clock().now().nanoseconds)
+        self._results.publish(assessment, self._monitor)
 
     def _save(self, _: Trigger.Request, __: Trigger.Response) -> Future:
+        answer = Future()
         self._inputs.flush()
-        return self._in_worker(self._saved, saving(self, self._monitor, self._inputs.names))
+        self._in_worker(
+            lambda done: answer.set_result(self._saved(done)),
+            saving(self, self._monitor, self._inputs.names),
+        )
+        return answer
 
     def _saved(self, done: "ThreadFuture[Path]") -> Trigger.Response:
         try:
@@ -183,41 +213,28 @@ class Identifier(Node):
             self.get_logger().warning(f"the buffer was not saved: {refusal}")
             return Trigger.Response(message=str(refusal))
 
-    def _in_worker(
-        self,
-        conclude: Callable[["ThreadFuture[Any]"], Trigger.Response],
-        job: Callable[..., Any],
-        *arguments: object,
-    ) -> Future:
-        """Do a job in the worker; `conclude` makes the answer of it, in the executor's thread."""
-        answer, executor = Future(), self.executor
-
-        def deliver(done: "ThreadFuture[Any]") -> None:
-            answer.set_result(conclude(done))
-
-        submitted = self._worker.submit(job, *arguments)
-        submitted.add_done_callback(lambda done: executor.create_task(deliver, done))
-        return answer
-
-    def _set_baseline(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _set_baseline(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> "Trigger.Response | Future":
         try:
             baseline = self._monitor.set_baseline()
         except RefusalError as refusal:
             response.message = str(refusal)
             return response
-        # The parameter shows the baseline in force; its new value stands for an exact baseline,
-        # so the one with its interval is taken again.
-        self.set_parameters(
-            [Parameter("baseline_coulomb_friction", value=baseline.coulomb_friction)]
-        )
-        baseline = self._monitor.set_baseline()
-        response.success = True
-        response.message = (
-            f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
-            f"± {baseline.half_width:.2g} N"
-        )
-        self._publish_diagnostics()
-        return response
+        self._keeping.put_in_force(baseline)
+        answer = Future()
+
+        def respond() -> None:
+            response.success = True
+            response.message = (
+                f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
+                f"± {baseline.half_width:.2g} N{self._keeping.reservation}"
+            )
+            answer.set_result(response)
+            self._publish_diagnostics()
+
+        self._keeping.keep_baseline(baseline, respond)
+        return answer
 
     def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._inputs.flush()
@@ -225,29 +242,6 @@ class Identifier(Node):
         response.success = True
         response.message = "the buffer is empty; estimate and baseline are kept"
         return response
-
-    def _publish_results(self, assessment: Assessment) -> None:
-        ratio = self._monitor.diagnosis().ratio
-        published = assessment.published
-        unknown = float("nan")
-        figures = {
-            **assessment.values,
-            "dead_band": dead_band(assessment, self._monitor.settings.valve),
-            "coulomb_friction_ratio": unknown if ratio is None else ratio.value,
-            "fit": assessment.fit,
-            "rms": assessment.rms,
-            "threshold": unknown if published is None else published.threshold,
-            "sigma": unknown if published is None else published.sigma,
-            "r_squared": unknown if published is None else published.r_squared,
-        }
-        for name, publisher in self._friction_publishers.items():
-            publisher.publish(Float64(data=figures[name]))
-        for name, publisher in self._half_width_publishers.items():
-            publisher.publish(Float64(data=assessment.parameters[name].half_width))
-        for name, publisher in self._published_publishers.items():
-            value = unknown if published is None else published.values[name]
-            publisher.publish(Float64(data=value))
-        self._sweep_publisher.publish(sweep_message(assessment.sweep))
 
     def _input_problems(self) -> list[str]:
         return self._inputs.problems(self.get_parameter("input_timeout").value)
@@ -258,9 +252,11 @@ class Identifier(Node):
         status = friction_status(
             self._monitor,
             f"{self.get_fully_qualified_name()}: friction",
-            self.get_parameter("valve_tag").value or self.get_namespace().strip("/"),
+            self._keeping.valve.tag,
             now.nanoseconds,
             self._input_problems(),
+            self._keeping.problems,
+            {**trend_values(self._keeping.trend), **self._schedule.values()},
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()

@@ -11,8 +11,10 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
 )
 from valve_friction_ros.monitoring import Baseline, FrictionLimits, MonitorSettings
+from valve_friction_ros.nodes.keeping import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.saving import SAVE_FOLDER
+from valve_friction_ros.nodes.schedule import PERIOD
 from valve_friction_ros.nodes.valve_parameters import VALVE_PARAMETERS, valve_from
 
 __all__ = ["CHANGEABLE", "FIXED_AT_START", "monitor_settings"]
@@ -27,6 +29,7 @@ FIXED_AT_START = (
         "Tag of the valve, hardware_id of its diagnostics [-]; empty: the namespace",
         read_only=True,
     ),
+    HISTORY_FILE,
 )
 
 CHANGEABLE = (
@@ -91,6 +94,8 @@ CHANGEABLE = (
         (0.0, 1.0),
     ),
     SAVE_FOLDER,
+    HISTORY_DAYS,
+    PERIOD,
 )
 
 

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -15,18 +16,20 @@ from rclpy.parameter import Parameter
 from valve_friction_ros.monitoring import (
     Baseline,
     FrictionMonitor,
-    HistoryEntry,
     HistoryError,
     HistoryFile,
     KeptBaseline,
     KeptValve,
+    MonitorSettings,
+    Snapshot,
     Trend,
     current_trend,
+    entry_of,
 )
 from valve_friction_ros.nodes.data_folder import history_file
 from valve_friction_ros.nodes.parameters import ParameterSpec
 
-__all__ = ["HISTORY_DAYS", "HISTORY_FILE", "Keeping"]
+__all__ = ["HISTORY_DAYS", "HISTORY_FILE", "Job", "Keeping"]
 
 HISTORY_FILE = ParameterSpec(
     "history_file",
@@ -48,6 +51,13 @@ def _date(time: int) -> str:
 
 def _told(baseline: Baseline) -> str:
     return f"baseline {baseline.coulomb_friction:.6g} ± {baseline.half_width:.2g} N"
+
+
+class Job(NamedTuple):
+    """What is identified, and how."""
+
+    snapshot: Snapshot
+    settings: MonitorSettings
 
 
 class Keeping:
@@ -82,9 +92,14 @@ class Keeping:
         return self._valve
 
     @property
-    def problem(self) -> str | None:
-        """Why the latest writing failed; None if it did not."""
-        return self._problem
+    def problems(self) -> list[str]:
+        """Why the latest writing failed; empty if it did not."""
+        return [] if self._problem is None else [self._problem]
+
+    @property
+    def reservation(self) -> str:
+        """What to add to the news that something was kept."""
+        return "" if self._problem is None else f", but it is lost with this node: {self._problem}"
 
     @property
     def trend(self) -> Trend | None:
@@ -112,7 +127,7 @@ class Keeping:
             kept = self._file.baseline(self._valve.name)
             self._trend = self._current_trend(self._file)
         except HistoryError as error:
-            self._complain(str(error))
+            self._complain(error)
             return None
         return kept
 
@@ -134,14 +149,27 @@ class Keeping:
         )
         self._monitor.take_baseline(baseline)
 
-    def keep(self, entry: HistoryEntry, then: Callable[[], None]) -> None:
-        """Keep an identification; call `then` in the executor's thread when that was tried."""
+    def keep(self, job: Job, then: Callable[[], None]) -> None:
+        """Keep the identification that the monitor has just accepted or refused.
+
+        Parameters
+        ----------
+        job : Job
+            What was identified.
+        then : callable
+            Called in the executor's thread when keeping was tried.
+        """
+        now = self._node.get_clock().now().nanoseconds
+        entry = entry_of(self._monitor, self._valve, *job, time=now)
         days = self._node.get_parameter(HISTORY_DAYS.name).value
         self._submit(lambda file: file.add(entry, days), then)
 
-    def keep_baseline(self, baseline: KeptBaseline, then: Callable[[], None]) -> None:
-        """Keep a baseline; call `then` in the executor's thread when that was tried."""
-        self._submit(lambda file: file.set_baseline(self._valve, baseline), then)
+    def keep_baseline(self, baseline: Baseline, then: Callable[[], None]) -> None:
+        """Keep the baseline that was taken from the latest estimate; `then` as in `keep`."""
+        now = self._node.get_clock().now().nanoseconds
+        since = now if self._monitor.stamp is None else self._monitor.stamp
+        kept = KeptBaseline(baseline, now, since)
+        self._submit(lambda file: file.set_baseline(self._valve, kept), then)
 
     def _submit(self, change: Callable[[HistoryFile], None], then: Callable[[], None]) -> None:
         if self._file is None:
@@ -177,10 +205,11 @@ class Keeping:
         try:
             self._trend, self._problem = result.result(), None
         except HistoryError as error:
-            self._complain(str(error))
+            self._complain(error)
         then()
 
-    def _complain(self, problem: str) -> None:
+    def _complain(self, error: HistoryError) -> None:
+        problem = f"the history is not written: {error}"
         if problem != self._problem:
-            self._node.get_logger().warning(f"nothing is kept in the history {problem}")
+            self._node.get_logger().warning(problem)
         self._problem = problem
