@@ -138,7 +138,7 @@ class Identifier(Node):
         if self._identifying:
             self._schedule.skip("an identification was already running")
         elif newest is not None and newest == self._identified_until:
-            self._schedule.skip("no new samples since the last identification")
+            self._schedule.stall()
         else:
             self._begin(self._conclude_scheduled)
 

@@ -54,6 +54,11 @@ class Schedule:
         """Remember that nothing was identified, and why."""
         self._skip = reason, self._node.get_clock().now().nanoseconds
 
+    def stall(self) -> None:
+        """Remember that nothing new has come; an older reason for a skip still holds."""
+        if self._skip is None:
+            self.skip("no new samples since the last identification")
+
     def succeed(self) -> None:
         """Forget the last skip."""
         self._skip = None

@@ -1,0 +1,201 @@
+"""What an identifier keeps, and what it takes over when it starts again."""
+
+import math
+
+import pytest
+from histories import DAY, START, VALVE, success
+from live_nodes import NAMESPACE, values_of
+from records import quick_record
+
+from valve_friction_ros.identification import assess
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+from valve_friction_ros.monitoring import MONTH, Baseline, HistoryFile, KeptBaseline
+
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN = b"\x00", b"\x01"
+PATIENT = {"input_timeout": 600.0}
+RECORD = quick_record()
+EXPECTED = assess(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
+
+
+@pytest.fixture
+def history(tmp_path):
+    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
+    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+
+
+def logged(live, process, words):
+    """Wait for lines of a node's log that hold these words."""
+    lines = lambda: [line for line in process.errors.splitlines() if words in line]  # noqa: E731
+    return live.client.wait_until(lines, f"{words!r} in the log")
+
+
+def first_values(live):
+    return live.client.status_values(what="the first diagnostic")
+
+
+def test_success_and_refusal_are_kept(live, history):
+    live.start_identifier({**PATIENT, "valve_tag": "FV-101", "window": 70.0})
+    client = live.client
+    refusal = client.trigger("identify").message
+    client.identified(RECORD)
+    entries = history.entries()
+    assert {entry.valve for entry in entries} == {VALVE}
+    assert refusal in (entries[0].refusal, entries[1].refusal)
+    last = entries[-1]
+    assert last.friction == EXPECTED
+    assert (last.span.end - last.span.begin) / 1e9 == pytest.approx(4.99)
+    assert last.diagnosis.message == client.statuses[-1][1].message
+    assert '"window": 70.0' in last.settings
+    times = [entry.time for entry in entries]
+    assert times == sorted(times)
+    stamp, _ = client.statuses[-1]
+    assert abs(stamp.sec - last.time / 1e9) < 60
+
+
+class TestBaseline:
+    def test_it_survives_a_restart(self, live, history):
+        first = live.start_identifier(PATIENT)
+        assert logged(live, first, "no baseline yet")
+        live.client.identified(RECORD)
+        answer = live.client.trigger("set_baseline")
+        assert answer.success
+        assert "lost" not in answer.message
+        first.stop()
+        live.client.watched.clear()
+        second = live.start_identifier(PATIENT)
+        values = first_values(live)
+        assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(EXPECTED.value)
+        assert float(values["baseline half width [N]"]) == pytest.approx(EXPECTED.half_width)
+        shown = live.client.parameters(NODE, "baseline_coulomb_friction")
+        assert shown == [EXPECTED.value]
+        (line,) = logged(live, second, "baseline 152.7")
+        assert "from the history" in line
+        assert str(history.path) in line
+        live.client.identified(quick_record(HIGH_FRICTION))
+        assert live.client.last_values()["NE 107"] == "F"
+
+    def test_a_parameter_comes_first(self, live, history):
+        history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
+        node = live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
+        assert float(first_values(live)["baseline_coulomb_friction [N]"]) == 140.0
+        (line,) = logged(live, node, "baseline 140")
+        assert "from the parameter baseline_coulomb_friction" in line
+        assert "not used: baseline 152.7 ± 1 N, set 2026-09-21 14:13 UTC" in line
+
+    def test_another_valves_is_not_taken(self, live, history):
+        other = VALVE._replace(name="/fv_102/identifier")
+        history.set_baseline(other, KeptBaseline(Baseline(152.7), START, START))
+        live.start_identifier(PATIENT)
+        assert "baseline_coulomb_friction [N]" not in first_values(live)
+
+
+def test_what_was_answered_survives_a_kill(live, history):
+    node = live.start_identifier(PATIENT)
+    live.client.identified(RECORD)
+    assert live.client.trigger("set_baseline").success
+    node.kill()
+    live.nodes.remove(node)
+    assert history.entries()[-1].friction == EXPECTED
+    assert history.baseline(VALVE.name).baseline == Baseline(EXPECTED.value, EXPECTED.half_width)
+
+
+def test_retention(live, history):
+    for day in (1, 4000):
+        history.add(success(START - day * DAY))
+    live.start_identifier({**PATIENT, "history_days": 3000.0})
+    live.client.trigger("identify")
+    kept = [entry.time for entry in history.entries()]
+    assert START - DAY in kept
+    assert START - 4000 * DAY not in kept
+
+
+def test_nothing_is_kept_without_a_file(live, history, tmp_path):
+    before = {path.name for path in tmp_path.iterdir()}
+    live.start_identifier({**PATIENT, "history_file": "''"})
+    live.client.identified(RECORD)
+    assert live.client.trigger("set_baseline").success
+    assert live.client.last_values()["coulomb_friction_ratio"] == "1"
+    after = {path.name for path in tmp_path.iterdir()} - before
+    assert all(name.startswith("identifier-") for name in after)
+    assert not history.path.exists()
+
+
+def test_a_history_that_cannot_be_written(live, tmp_path):
+    """The node warns and goes on; once it can be written, nothing is missing."""
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    history = HistoryFile(blocked / "history.sqlite")
+    node = live.start_identifier({**PATIENT, "history_file": history.path})
+    client = live.client
+    cause = f"the history is not written: {history.path}: its folder is a file: check the folder"
+    status = client.next_status()
+    assert status.level == WARN
+    assert status.message.startswith(cause)
+    assert values_of(status)["NE 107"] == "M"
+    client.identified(RECORD)
+    assert client.last_values()["estimate_valid"] == "true"
+    answer = client.trigger("set_baseline")
+    assert answer.success
+    assert f"lost with this node: {cause}" in answer.message
+    assert len(logged(live, node, cause)) == 1
+
+    blocked.unlink()
+    assert client.trigger("identify").success
+    status = client.next_status(lambda one: cause not in one.message, "the end of the warning")
+    assert status.level == OK
+    entries = history.entries()
+    assert len(entries) >= 2
+    assert entries[-2].friction == entries[-1].friction == EXPECTED
+    assert history.baseline(VALVE.name).baseline.coulomb_friction == EXPECTED.value
+
+
+def test_a_file_of_a_newer_version(live, history):
+    import sqlite3
+
+    history.prepare()
+    connection = sqlite3.connect(history.path)
+    connection.execute("PRAGMA user_version = 99")
+    connection.close()
+    live.start_identifier(PATIENT)
+    status = live.client.next_status()
+    assert status.level == WARN
+    assert "written by a newer version of this package (schema 99" in status.message
+
+
+class TestTrend:
+    def fill(self, history, drift):
+        """Twenty weeks up to the start, with the estimates of a year before that differ."""
+        baseline = Baseline(141.0, 1.0)
+        history.add(success(START - 365 * DAY, 900.0))
+        begin = START - 20 * 7 * DAY
+        history.set_baseline(VALVE, KeptBaseline(baseline, begin + 1, begin))
+        for week in range(20):
+            day = 7 * week
+            friction = 150.0 + drift * day * DAY / MONTH
+            history.add(success(begin + day * DAY, friction, 1.0, baseline=baseline))
+
+    def test_a_drift_is_told(self, live, history):
+        self.fill(history, 3.0)
+        live.start_identifier(PATIENT)
+        values = first_values(live)
+        assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
+        assert 0 < float(values["coulomb_friction_drift half width [N/month]"]) < 1
+        assert values["limit_expected"] == "warn_ratio"
+        dates = [values[f"limit_expected {which}[date]"] for which in ("earliest ", "", "latest ")]
+        assert dates == sorted(dates)
+        assert dates[1].startswith("2027-01-2")  # 8.75 months after 2026-05-04
+
+    def test_no_drift_has_no_key(self, live, history):
+        self.fill(history, 0.0)
+        live.start_identifier(PATIENT)
+        assert not [key for key in first_values(live) if "drift" in key or "expected" in key]
+
+    def test_it_begins_anew_with_the_baseline(self, live, history):
+        self.fill(history, 3.0)
+        live.start_identifier(PATIENT)
+        live.client.identified(RECORD)
+        assert live.client.trigger("set_baseline").success
+        values = live.client.status_values()
+        assert not [key for key in values if "drift" in key]
+        assert math.isclose(float(values["coulomb_friction_ratio"]), 1.0)
