@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -43,6 +43,9 @@ HISTORY_DAYS = ParameterSpec(
 
 _MOST_WAITING = 1000
 """Changes that wait for a file that cannot be written; then the oldest are given up."""
+
+
+_T = TypeVar("_T")
 
 
 def _date(time: int) -> str:
@@ -108,8 +111,9 @@ class Keeping:
 
     def begin(self) -> None:
         """Take over the baseline of the history, unless a parameter gives one, and say which."""
-        kept, log = self._last_baseline(), self._node.get_logger()
-        given = self._monitor.baseline
+        self._tried(HistoryFile.prepare)
+        kept = self._tried(lambda file: file.baseline(self._valve.name))
+        given, log = self._monitor.baseline, self._node.get_logger()
         if given is not None:
             besides = f"; the history's is not used: {self._set_at(kept)}" if kept else ""
             log.info(f"{_told(given)}, from the parameter baseline_coulomb_friction{besides}")
@@ -118,18 +122,18 @@ class Keeping:
             log.info(f"{self._set_at(kept)}, from the history {self._path}")
         else:
             log.info("no baseline yet: identify the healthy valve and call ~/set_baseline")
+        self._trend = self._tried(self._trend_job())
 
-    def _last_baseline(self) -> KeptBaseline | None:
+    def _tried(self, job: Callable[[HistoryFile], _T]) -> _T | None:
+        """Do a job on the file, if there is one; of several problems the first is told."""
         if self._file is None:
             return None
         try:
-            self._file.prepare()
-            kept = self._file.baseline(self._valve.name)
-            self._trend = self._current_trend(self._file)
+            return job(self._file)
         except HistoryError as error:
-            self._complain(error)
+            if self._problem is None:
+                self._complain(error)
             return None
-        return kept
 
     @property
     def _path(self) -> str:
@@ -186,9 +190,6 @@ class Keeping:
         return partial(
             current_trend, valve=name, baseline=monitor.baseline, limits=monitor.settings.limits
         )
-
-    def _current_trend(self, file: HistoryFile) -> Trend | None:
-        return self._trend_job()(file)
 
     def _write(
         self, file: HistoryFile, trend: Callable[[HistoryFile], Trend | None]
