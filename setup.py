@@ -52,6 +52,7 @@ setup(
             "pressure_source = valve_friction_ros.nodes.start:pressure_source",
             "demo = valve_friction_ros.commands.demo:main",
             "validate_recording = valve_friction_ros.commands.validate_recording:main",
+            "history = valve_friction_ros.commands.history:main",
             "identify_recording = valve_friction_ros.commands.identify_recording:main",
         ],
     },

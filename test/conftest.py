@@ -34,6 +34,14 @@ class Bench(NamedTuple):
     parameters: KarnoppParameters
 
 
+@pytest.fixture(scope="session", autouse=True)
+def ros_home(tmp_path_factory):
+    """Nodes that keep files where nobody told them keep them here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_HOME", str(tmp_path_factory.mktemp("ros_home")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def benches():
     """The simulated valves that every check uses, by name."""

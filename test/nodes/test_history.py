@@ -9,7 +9,15 @@ from records import quick_record
 
 from valve_friction_ros.identification import assess
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
-from valve_friction_ros.monitoring import MONTH, Baseline, HistoryFile, KeptBaseline
+from valve_friction_ros.monitoring import (
+    MONTH,
+    Baseline,
+    FrictionPoint,
+    HistoryFile,
+    KeptBaseline,
+    trend_of,
+)
+from valve_friction_ros.nodes.friction_status import trend_values
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
@@ -83,12 +91,6 @@ class TestBaseline:
         assert "from the parameter baseline_coulomb_friction" in line
         assert "not used: baseline 152.7 ± 1 N, set 2026-09-21 14:13 UTC" in line
 
-    def test_another_valves_is_not_taken(self, live, history):
-        other = VALVE._replace(name="/fv_102/identifier")
-        history.set_baseline(other, KeptBaseline(Baseline(152.7), START, START))
-        live.start_identifier(PATIENT)
-        assert "baseline_coulomb_friction [N]" not in first_values(live)
-
 
 def test_what_was_answered_survives_a_kill(live, history):
     node = live.start_identifier(PATIENT)
@@ -150,52 +152,40 @@ def test_a_history_that_cannot_be_written(live, tmp_path):
     assert history.baseline(VALVE.name).baseline.coulomb_friction == EXPECTED.value
 
 
-def test_a_file_of_a_newer_version(live, history):
-    import sqlite3
+def fill(history, drift):
+    """Twenty weeks up to the start, and before them an estimate that differs."""
+    baseline = Baseline(141.0, 1.0)
+    history.add(success(START - 365 * DAY, 900.0))
+    begin = START - 20 * 7 * DAY
+    history.set_baseline(VALVE, KeptBaseline(baseline, begin + 1, begin))
+    for week in range(20):
+        day = 7 * week
+        friction = 150.0 + drift * day * DAY / MONTH
+        history.add(success(begin + day * DAY, friction, 1.0, baseline=baseline))
 
-    history.prepare()
-    connection = sqlite3.connect(history.path)
-    connection.execute("PRAGMA user_version = 99")
-    connection.close()
+
+def test_a_drift_is_told_until_a_baseline_is_set(live, history):
+    fill(history, 3.0)
     live.start_identifier(PATIENT)
-    status = live.client.next_status()
-    assert status.level == WARN
-    assert "written by a newer version of this package (schema 99" in status.message
+    values = live.client.status_values()
+    assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
+    assert 0 < float(values["coulomb_friction_drift half width [N/month]"]) < 1
+    assert values["limit_expected"] == "warn_ratio"
+    dates = [values[f"limit_expected {which}[date]"] for which in ("earliest ", "", "latest ")]
+    assert dates == sorted(dates)
+    assert dates[1].startswith("2027-01-2")  # 8.75 months after 2026-05-04
+    live.client.identified(RECORD)
+    assert live.client.trigger("set_baseline").success
+    values = live.client.status_values()
+    assert not [key for key in values if "drift" in key]
+    assert math.isclose(float(values["coulomb_friction_ratio"]), 1.0)
 
 
-class TestTrend:
-    def fill(self, history, drift):
-        """Twenty weeks up to the start, with the estimates of a year before that differ."""
-        baseline = Baseline(141.0, 1.0)
-        history.add(success(START - 365 * DAY, 900.0))
-        begin = START - 20 * 7 * DAY
-        history.set_baseline(VALVE, KeptBaseline(baseline, begin + 1, begin))
-        for week in range(20):
-            day = 7 * week
-            friction = 150.0 + drift * day * DAY / MONTH
-            history.add(success(begin + day * DAY, friction, 1.0, baseline=baseline))
-
-    def test_a_drift_is_told(self, live, history):
-        self.fill(history, 3.0)
-        live.start_identifier(PATIENT)
-        values = first_values(live)
-        assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
-        assert 0 < float(values["coulomb_friction_drift half width [N/month]"]) < 1
-        assert values["limit_expected"] == "warn_ratio"
-        dates = [values[f"limit_expected {which}[date]"] for which in ("earliest ", "", "latest ")]
-        assert dates == sorted(dates)
-        assert dates[1].startswith("2027-01-2")  # 8.75 months after 2026-05-04
-
-    def test_no_drift_has_no_key(self, live, history):
-        self.fill(history, 0.0)
-        live.start_identifier(PATIENT)
-        assert not [key for key in first_values(live) if "drift" in key or "expected" in key]
-
-    def test_it_begins_anew_with_the_baseline(self, live, history):
-        self.fill(history, 3.0)
-        live.start_identifier(PATIENT)
-        live.client.identified(RECORD)
-        assert live.client.trigger("set_baseline").success
-        values = live.client.status_values()
-        assert not [key for key in values if "drift" in key]
-        assert math.isclose(float(values["coulomb_friction_ratio"]), 1.0)
+def test_only_a_significant_drift_has_keys():
+    scattered = [150.0, 154.0, 151.0, 156.0, 153.0]
+    points = [FrictionPoint(START + k * DAY, one, 0.1) for k, one in enumerate(scattered)]
+    assert trend_values(trend_of(points, Baseline(141.0))) == {}
+    assert trend_values(None) == {}
+    rising = [one._replace(value=150.0 + k) for k, one in enumerate(points)]
+    keys = {"coulomb_friction_drift [N/month]", "coulomb_friction_drift half width [N/month]"}
+    assert set(trend_values(trend_of(rising))) == keys

@@ -196,6 +196,7 @@ def _nodes() -> list[NodeProcess]:
         "position_bias": _POSITION_BIAS,
         "assumed_mass": 1.6,
         "valve_tag": _NAMESPACE.upper().replace("_", "-"),
+        "history_file": "''",  # empty, as ROS arguments write it: a demo is no plant's history
     }
     return [
         NodeProcess("identifier", monitored),

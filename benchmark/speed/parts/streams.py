@@ -22,6 +22,7 @@ _OURS = "valve_friction_ros.nodes.identifier"
 _PEER = "benchmark.speed.typed_identifier"
 _PEER_NAME = "typed, default executor"
 _VALVE = "fv_1"
+_NO_HISTORY = ("-p", "history_file:=''")
 _VALVES = [f"fv_{number}" for number in range(100)]
 _SETTLING = 3.0
 _LONGEST_REPEAT = 20.0
@@ -40,13 +41,27 @@ class Outcome(NamedTuple):
 
 
 def _identifier(module: str, window: float) -> Process:
-    arguments = ["--ros-args", "-r", f"__ns:=/{_VALVE}", "-p", f"window:={window:.1f}"]
+    arguments = [
+        "--ros-args",
+        *_NO_HISTORY,
+        "-r",
+        f"__ns:=/{_VALVE}",
+        "-p",
+        f"window:={window:.1f}",
+    ]
     return Process(module, arguments)
 
 
 def _fleet(count: int, window: float) -> Process:
     valves = ",".join(_VALVES[:count])
-    arguments = ["--ros-args", "-p", f"valves:=[{valves}]", "-p", f"window:={window:.1f}"]
+    arguments = [
+        "--ros-args",
+        *_NO_HISTORY,
+        "-p",
+        f"valves:=[{valves}]",
+        "-p",
+        f"window:={window:.1f}",
+    ]
     return Process("valve_friction_ros.nodes.identifiers", arguments)
 
 
