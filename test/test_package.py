@@ -21,6 +21,7 @@ PROJECT = Path(__file__).resolve().parents[1]
 NAME = "valve_friction_ros"
 EXECUTABLES = {
     "demo",
+    "history",
     "identifier",
     "identifiers",
     "identify_recording",

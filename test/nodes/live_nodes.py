@@ -72,7 +72,7 @@ class Domain:
 
 
 class NodeProcess:
-    """A node, started as a person would start it."""
+    """A node, started as a person would start it; what it keeps goes into the test's folder."""
 
     def __init__(
         self, name, domain, folder, parameters=None, arguments=(), script=None, namespace=NAMESPACE
@@ -87,7 +87,7 @@ class NodeProcess:
             command += ["-p", f"{key}:={value}"]
         path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
         environment = os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path}
-        environment["ROS_HOME"] = str(folder)  # a history of the test's own
+        environment["ROS_HOME"] = str(folder)
         with self._output.open("w") as output, self._errors.open("w") as errors:
             self._process = subprocess.Popen(
                 command, cwd=folder, env=environment, stdout=output, stderr=errors

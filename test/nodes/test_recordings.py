@@ -191,11 +191,11 @@ def test_an_empty_buffer_is_not_saved(run):
     assert response.message == "the buffer is empty: there is nothing to save"
 
 
-def test_without_a_folder_it_goes_under_ros_home(live, tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
+def test_without_a_folder_it_goes_under_ros_home(live, tmp_path):
+    """The ROS_HOME of a test's nodes is its folder."""
     live.start_identifier()
     live.client.send(pressure=(np.array([1, 2]), np.array([1e5, 1e5])))
     live.client.wait_for_buffered(2)
     response = live.client.trigger("save")
     assert response.success, response.message
-    assert Path(response.message).parent == tmp_path / "home" / "valve_friction_ros" / "saved"
+    assert Path(response.message).parent == tmp_path / "valve_friction_ros" / "saved"

@@ -120,8 +120,6 @@ class Keeping:
         elif kept is not None:
             self.put_in_force(kept.baseline)
             log.info(f"{self._set_at(kept)}, from the history {self._path}")
-        else:
-            log.info("no baseline yet: identify the healthy valve and call ~/set_baseline")
         self._trend = self._tried(self._trend_job())
 
     def _tried(self, job: Callable[[HistoryFile], _T]) -> _T | None:
