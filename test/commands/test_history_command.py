@@ -88,6 +88,15 @@ class TestTable:
         assert valve["trend"]["drift_n_per_month"] is None
         assert valve["trend"]["crossing"] is None
 
+    def test_two_methods_make_no_common_trend(self, tmp_path, run):
+        """The last one's alone: here five days that lie 100 N above those before."""
+        history = HistoryFile(tmp_path / "history.sqlite")
+        for day in range(10):
+            method, friction = ("sweep", 150.0) if day < 5 else ("force_balance", 250.0)
+            history.add(success(START + day * DAY, friction, method=method))
+        (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
+        assert (valve["trend"]["days"], valve["trend"]["significant"]) == (5, False)
+
     def test_too_few_days_have_no_trend(self, run):
         _, output, _ = run("--valve", "LV-7")
         assert "trend" not in output

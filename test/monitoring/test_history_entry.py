@@ -43,8 +43,8 @@ def test_a_success(monitor):
     assert entry.parameters == dict(assessment.parameters)
     assert entry.span == (0, 499 * PERIOD)
     assert entry.fit == (
-        assessment.misfit.fit,
-        assessment.misfit.rms,
+        assessment.fit,
+        assessment.rms,
         assessment.misfit.systematic,
     )
     assert entry.diagnosis == monitor.diagnosis()

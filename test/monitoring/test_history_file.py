@@ -91,14 +91,21 @@ def test_points_are_those_of_the_entries(history):
     entries = [
         success(START + k, 150.0 + k, 1.0 + k, verdict=verdict) for k, verdict in enumerate(Verdict)
     ]
-    for entry in (*entries, refused(START + 9), success(START, valve=OTHER)):
+    others = (
+        refused(START + 9),
+        success(START, valve=OTHER),
+        success(START, method="force_balance"),
+    )
+    for entry in (*entries, *others):
         history.add(entry)
     expected = [point for one in entries if (point := one.point()) is not None]
     assert expected
-    assert history.points(VALVE.name) == tuple(expected)
+    assert history.points(VALVE.name, "sweep") == tuple(expected)
     later = expected[0].time + 1
-    assert history.points(VALVE.name, later) == tuple(p for p in expected if p.time >= later)
-    assert history.points(OTHER.name) == (FrictionPoint(START, 150.0, 3.0),)
+    assert history.points(VALVE.name, "sweep", later) == tuple(
+        p for p in expected if p.time >= later
+    )
+    assert history.points(OTHER.name, "sweep") == (FrictionPoint(START, 150.0, 3.0),)
 
 
 class TestBaseline:

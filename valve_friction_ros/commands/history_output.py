@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import two_digits
+from valve_friction_ros.commands.formatting import json_number, two_digits
 from valve_friction_ros.identification import ASSESSED_UNITS
 from valve_friction_ros.monitoring import HistoryEntry, Trend, ValveHistory
 
@@ -34,10 +34,6 @@ def time_text(time: float, timespec: str = "milliseconds") -> str:
     """Write a time in ns since 1970 by ISO 8601, in UTC."""
     when = datetime.fromtimestamp(time / 1e9, timezone.utc)
     return when.isoformat(timespec=timespec).replace("+00:00", "Z")
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
@@ -79,23 +75,23 @@ def _entry_as_json(entry: HistoryEntry) -> dict[str, Any]:
         "method": entry.method,
         "parameters": {
             name: {
-                "value": _known(one.value),
-                "standard_error": _known(one.standard_error),
-                "half_width": _known(one.half_width),
+                "value": json_number(one.value),
+                "standard_error": json_number(one.standard_error),
+                "half_width": json_number(one.half_width),
                 "unit": ASSESSED_UNITS.get(name, ""),
                 "verdict": one.verdict.value,
                 "reason": one.reason,
             }
             for name, one in entry.parameters.items()
         },
-        "fit": _known(entry.fit.share),
-        "rms": _known(entry.fit.rms),
-        "systematic_misfit": _known(entry.fit.systematic),
+        "fit": json_number(entry.fit.share),
+        "rms": json_number(entry.fit.rms),
+        "systematic_misfit": json_number(entry.fit.systematic),
         "warnings": list(entry.warnings),
         "level": int(entry.diagnosis.level),
         "status_signal": entry.diagnosis.status_signal.value,
         "message": entry.diagnosis.message,
-        "ratio": None if ratio is None else [_known(one) for one in ratio],
+        "ratio": None if ratio is None else [json_number(one) for one in ratio],
         "baseline": None if baseline is None else baseline.coulomb_friction,
         "baseline_half_width": None if baseline is None else baseline.half_width,
         "limits": vars(entry.limits),
@@ -124,9 +120,9 @@ def _parameter_cells(entry: HistoryEntry) -> dict[str, object]:
     cells: dict[str, object] = {}
     for name, one in entry.parameters.items():
         unit = _COLUMN_UNITS.get(ASSESSED_UNITS.get(name, "1"), "")
-        cells[f"{name}{unit}"] = _known(one.value)
-        cells[f"{name}_standard_error{unit}"] = _known(one.standard_error)
-        cells[f"{name}_half_width{unit}"] = _known(one.half_width)
+        cells[f"{name}{unit}"] = json_number(one.value)
+        cells[f"{name}_standard_error{unit}"] = json_number(one.standard_error)
+        cells[f"{name}_half_width{unit}"] = json_number(one.half_width)
         cells[f"{name}_verdict"] = one.verdict.value
     return cells
 
@@ -143,11 +139,11 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
         "level": _LEVELS[entry.diagnosis.level],
         "refusal": entry.refusal,
         "ratio": None if ratio is None else ratio.value,
-        "ratio_low": None if ratio is None else _known(ratio.low),
-        "ratio_high": None if ratio is None else _known(ratio.high),
+        "ratio_low": None if ratio is None else json_number(ratio.low),
+        "ratio_high": None if ratio is None else json_number(ratio.high),
         "baseline_n": None if baseline is None else baseline.coulomb_friction,
-        "fit": _known(entry.fit.share),
-        "rms_m": _known(entry.fit.rms),
+        "fit": json_number(entry.fit.share),
+        "rms_m": json_number(entry.fit.rms),
         **_parameter_cells(entry),
         "message": entry.diagnosis.message,
         "software_version": entry.version,

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from valve_friction_ros import __version__
-from valve_friction_ros.identification import AssessedParameter, Assessment, Verdict
+from valve_friction_ros.identification import AssessedParameter, Verdict
 from valve_friction_ros.monitoring.baseline import Baseline
 from valve_friction_ros.monitoring.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.monitoring.friction_monitor import FrictionMonitor, MonitorSettings
@@ -193,13 +193,6 @@ def settings_text(settings: MonitorSettings) -> str:
     return json.dumps(_plain(content), sort_keys=True, allow_nan=False)
 
 
-def _fit_of(assessment: Assessment) -> Fit:
-    misfit = assessment.misfit
-    if misfit is None:
-        return Fit(assessment.force_fit)
-    return Fit(misfit.fit, misfit.rms, misfit.systematic)
-
-
 def entry_of(
     monitor: FrictionMonitor,
     valve: KeptValve,
@@ -227,14 +220,18 @@ def entry_of(
     if monitor.refusal is None and assessment is not None:
         outcome = {
             "parameters": assessment.parameters,
-            "fit": _fit_of(assessment),
+            "fit": Fit(
+                assessment.fit,
+                assessment.rms,
+                math.nan if assessment.misfit is None else assessment.misfit.systematic,
+            ),
             "warnings": assessment.warnings,
         }
     return HistoryEntry(
         time=time,
         valve=valve,
         span=span_of(snapshot),
-        method="sweep",
+        method=settings.method,
         diagnosis=monitor.diagnosis(),
         limits=monitor.settings.limits,
         baseline=monitor.baseline,

@@ -75,16 +75,17 @@ class HistoryFile:
             ).fetchone()
         return None if row is None else KeptBaseline(Baseline(*row[:2]), *row[2:])
 
-    def points(self, valve: str, since: int = 0) -> tuple[FrictionPoint, ...]:
-        """Return the identified and weak Coulomb frictions of a valve from `since` (ns) on."""
+    def points(self, valve: str, method: str, since: int = 0) -> tuple[FrictionPoint, ...]:
+        """Return a valve's identified and weak Coulomb frictions of one method, from `since` on."""
         with reading(self.path) as connection:
             rows = connection.execute(
                 "SELECT time_ns, value, half_width FROM identification "
                 "JOIN valve ON valve.id = valve_id "
                 "JOIN parameter ON identification_id = identification.id "
-                "WHERE valve.name = ? AND time_ns >= ? AND parameter.name = 'coulomb_friction' "
-                "AND verdict IN (?, ?) ORDER BY time_ns, identification.id",
-                (valve, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
+                "WHERE valve.name = ? AND method = ? AND time_ns >= ? "
+                "AND parameter.name = 'coulomb_friction' AND verdict IN (?, ?) "
+                "ORDER BY time_ns, identification.id",
+                (valve, method, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
             ).fetchall()
         return tuple(FrictionPoint(*row) for row in rows)
 

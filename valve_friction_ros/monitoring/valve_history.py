@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from valve_friction_ros.monitoring.baseline import Baseline
-from valve_friction_ros.monitoring.diagnosis import FrictionLimits
+from valve_friction_ros.monitoring.friction_monitor import MonitorSettings
 from valve_friction_ros.monitoring.history_entry import HistoryEntry, KeptBaseline, KeptValve
 from valve_friction_ros.monitoring.history_file import HistoryFile
 from valve_friction_ros.monitoring.trend import Trend, trend_of
@@ -24,7 +24,8 @@ class ValveHistory:
     set_baseline : KeptBaseline or None
         The last baseline that was set; the trend begins with it.
     trend : Trend or None
-        Drift against the baseline and the limits that were in force last.
+        Drift by the method, and against the baseline and the limits, that were in force last.
+        Estimates of two methods may differ by themselves, so they make no common trend.
     """
 
     valve: KeptValve
@@ -50,20 +51,18 @@ def valve_histories(
             continue
         kept = history.baseline(valve.name, until)
         begin = since if kept is None else max(since, kept.since)
-        points = [entry.point() for entry in entries if entry.time >= begin]
-        trend = trend_of(
-            [point for point in points if point is not None],
-            entries[-1].baseline,
-            entries[-1].limits,
-        )
+        last = entries[-1]
+        same = (one for one in entries if one.time >= begin and one.method == last.method)
+        points = [point for one in same if (point := one.point()) is not None]
+        trend = trend_of(points, last.baseline, last.limits)
         found.append(ValveHistory(valve, entries, kept, trend))
     return tuple(found)
 
 
 def current_trend(
-    history: HistoryFile, valve: str, baseline: Baseline | None, limits: FrictionLimits
+    history: HistoryFile, valve: str, baseline: Baseline | None, settings: MonitorSettings
 ) -> Trend | None:
-    """Return the trend of a valve since its baseline was last set.
+    """Return the trend of a valve since its baseline was last set, by the method in force.
 
     Raises
     ------
@@ -71,5 +70,5 @@ def current_trend(
         If the file cannot be read.
     """
     kept = history.baseline(valve)
-    points = history.points(valve, kept.since) if kept else history.points(valve)
-    return trend_of(points, baseline, limits)
+    points = history.points(valve, settings.method, kept.since if kept else 0)
+    return trend_of(points, baseline, settings.limits)

@@ -183,10 +183,10 @@ class Keeping:
         done.add_done_callback(lambda result: executor.create_task(self._take, result, then))
 
     def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
-        """Return what computes the trend with the baseline and limits of now, in any thread."""
+        """Return what computes the trend with the baseline and settings of now, in any thread."""
         monitor, name = self._monitor, self._valve.name
         return partial(
-            current_trend, valve=name, baseline=monitor.baseline, limits=monitor.settings.limits
+            current_trend, valve=name, baseline=monitor.baseline, settings=monitor.settings
         )
 
     def _write(
