@@ -84,6 +84,7 @@ class HistoryFile:
                 "JOIN parameter ON identification_id = identification.id "
                 "WHERE valve.name = ? AND method = ? AND time_ns >= ? "
                 "AND parameter.name = 'coulomb_friction' AND verdict IN (?, ?) "
+                "AND value IS NOT NULL AND half_width BETWEEN 0 AND 1e300 "
                 "ORDER BY time_ns, identification.id",
                 (valve, method, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
             ).fetchall()
