@@ -54,6 +54,7 @@ setup(
             "validate_recording = valve_friction_ros.commands.validate_recording:main",
             "history = valve_friction_ros.commands.history:main",
             "identify_recording = valve_friction_ros.commands.identify_recording:main",
+            "identify_recordings = valve_friction_ros.commands.identify_recordings:main",
         ],
     },
 )

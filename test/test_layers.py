@@ -18,10 +18,11 @@ MAY_IMPORT = {
     "identification": {"model"},
     "monitoring": {"identification", "model"},
     "plots": {"monitoring", "identification", "model"},
+    "fleet": {"monitoring", "identification", "model"},
     "nodes": {"monitoring", "identification", "model"},
 }
 ROS_ROOMS = {"nodes", "commands"}
-CORE = ["model", "identification", "monitoring"]
+CORE = ["model", "identification", "monitoring", "fleet"]
 
 
 def rooms():

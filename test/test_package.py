@@ -25,6 +25,7 @@ EXECUTABLES = {
     "identifier",
     "identifiers",
     "identify_recording",
+    "identify_recordings",
     "pressure_source",
     "simulator",
     "validate_recording",

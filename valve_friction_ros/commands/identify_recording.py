@@ -3,12 +3,16 @@
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from valve_friction_ros.commands.assessment_output import as_json, print_table
 from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.identification_arguments import (
+    add_identification_arguments,
+    identification_settings,
+)
 from valve_friction_ros.commands.recording_arguments import (
     DIRECT_DRIVE,
     add_recording_arguments,
@@ -17,8 +21,6 @@ from valve_friction_ros.commands.recording_arguments import (
     require_one,
 )
 from valve_friction_ros.identification import (
-    DEFAULT_METHOD,
-    FIXABLE,
     METHODS,
     Assessment,
     IdentificationSettings,
@@ -43,7 +45,6 @@ class _Result(NamedTuple):
 
 
 def _parser() -> argparse.ArgumentParser:
-    defaults = IdentificationSettings()
     parser = OneLineParser(
         prog="identify_recording",
         description="Identify the Karnopp friction model from a recorded CSV file or bag.",
@@ -51,71 +52,10 @@ def _parser() -> argparse.ArgumentParser:
         "several valves in a bag all were; 1: some of them were.",
     )
     add_recording_arguments(parser)
-    parser.add_argument(
-        "--method",
-        choices=[*METHODS],
-        default=DEFAULT_METHOD,
-        help="sweep: several fast strokes; force_balance: a valve signature, two periods or more "
-        "of a slow triangle (%(default)s)",
-    )
-    parser.add_argument(
-        "--fix",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help=f"take a parameter as known ({', '.join(FIXABLE)}); NAME alone: from the valve file",
-    )
-    parser.add_argument(
-        "--position-bias",
-        type=float,
-        metavar="M",
-        help="x̄ of (10) in m: the paper's form of four columns, F_0 = k·x̄",
-    )
-    parser.add_argument(
-        "--window",
-        type=int,
-        help=f"derivative window d, samples, for both estimates of the sweep; by default "
-        f"{defaults.window} for the published one, and chosen from the noise of the record for the "
-        "refined one and for the force balance",
-    )
-    parser.add_argument(
-        "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
-    )
+    add_identification_arguments(parser)
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the identification")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser
-
-
-def _fixed(entries: Sequence[str], known: Mapping[str, float]) -> dict[str, float]:
-    fixed = {}
-    for entry in entries:
-        name, separator, text = entry.partition("=")
-        name = name.strip()
-        if name in fixed:
-            raise ValueError(f"--fix {name} is given twice")
-        if separator:
-            try:
-                fixed[name] = float(text)
-            except ValueError:
-                raise ValueError(f"--fix {entry}: {text!r} is not a number") from None
-        elif name in known:
-            fixed[name] = known[name]
-        else:
-            raise ValueError(
-                f"--fix {name}: give a value, as {name}=VALUE, or a valve file with it"
-            )
-    return fixed
-
-
-def _settings(options: argparse.Namespace, known: Mapping[str, float]) -> IdentificationSettings:
-    defaults = IdentificationSettings()
-    return IdentificationSettings(
-        window=defaults.window if options.window is None else options.window,
-        order=options.order,
-        fixed=_fixed(options.fix, known),
-        position_bias=options.position_bias,
-        assumed_mass=known.get("mass", defaults.assumed_mass),
-    )
 
 
 def _identified(
@@ -140,7 +80,8 @@ def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:
     """Read and identify the valves of the file, and draw the one that is to be drawn."""
     reading = reading_options(options)
     description = described_valve(options, reading)
-    settings, method = _settings(options, description.known), METHODS[options.method]
+    settings = identification_settings(options, description.known)
+    method = METHODS[options.method]
     if options.plot is not None:
         from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
 

@@ -24,11 +24,13 @@ from valve_friction_ros.monitoring.units import (
 
 __all__ = [
     "DIRECT_DRIVE",
+    "add_reading_arguments",
     "add_recording_arguments",
     "described_valve",
     "read_one",
     "reading_options",
     "require_one",
+    "valve_of",
 ]
 
 DIRECT_DRIVE = ValveFile(Valve(diaphragm_area=1.0), MappingProxyType({}))
@@ -60,6 +62,11 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.yaml",
         help="diaphragm_area, pressure_reference, travel …; needed unless the file holds force_n",
     )
+    add_reading_arguments(parser)
+
+
+def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what a file does not say itself."""
     stretch = parser.add_argument_group("part of the recording")
     for name, help_text in (
         ("begin", "leave out what is earlier, S seconds after the first sample"),
@@ -131,9 +138,20 @@ def described_valve(arguments: argparse.Namespace, reading: ReadingOptions) -> V
     ValueError
         If the valve file cannot be read, or is needed and not given.
     """
-    if arguments.valve is not None:
-        return read_valve_file(arguments.valve)
-    if not holds_force(arguments.file, reading):
+    return valve_of(arguments.file, arguments.valve, reading)
+
+
+def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) -> ValveFile:
+    """Read the valve file of a recording; a recorded force needs none.
+
+    Raises
+    ------
+    ValueError
+        If the valve file cannot be read, or is needed and not given.
+    """
+    if valve_file is not None:
+        return read_valve_file(valve_file)
+    if not holds_force(recording, reading):
         raise ValueError("pressure needs the diaphragm_area: give a valve file by --valve")
     return DIRECT_DRIVE
 

@@ -1,8 +1,9 @@
 """Settings of the published identification."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
+from typing import Any
 
 from valve_friction_ros.model.checks import (
     require_finite,
@@ -83,6 +84,11 @@ class IdentificationSettings:
             require_finite("position_bias", self.position_bias)
             if "spring_preload" in self.fixed:
                 raise ValueError("position_bias and a fixed spring_preload exclude each other")
+
+    def __reduce__(self) -> tuple[type["IdentificationSettings"], tuple[Any, ...]]:
+        """Tell pickle how to build it again in another process; it cannot copy `fixed`."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return type(self), (*(values | {"fixed": dict(self.fixed)}).values(),)
 
     def _checked_fixed(self) -> dict[str, float]:
         checked = {}

@@ -1,0 +1,326 @@
+"""The command `identify_recordings`: many recordings, interrupted and resumed."""
+
+import csv
+import gzip
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bags import messages_of, write_bag
+
+from valve_friction_ros.commands.identify_recordings import main
+from valve_friction_ros.commands.valve_file import read_valve_file
+from valve_friction_ros.identification import IdentificationSettings, assess
+from valve_friction_ros.model import (
+    Recording,
+    SensorNoise,
+    SquareWave,
+    converter_response,
+    simulate,
+)
+from valve_friction_ros.monitoring.recordings import read_recordings
+
+PERIOD = 0.01
+PATIENCE = 60.0  # s, for one thing to happen on a loaded machine
+FAULTY = Path(__file__).with_name("faulty_fleet.py")
+
+
+@pytest.fixture(scope="module")
+def short_record(benches):
+    """Twenty seconds of a square wave at 100 Hz: enough to be identified."""
+    pressure = converter_response(SquareWave().sample(np.arange(0, 20, PERIOD)), PERIOD)
+    position = simulate(*benches["high"], pressure, PERIOD).position
+    return Recording(PERIOD, pressure, position)
+
+
+@pytest.fixture(scope="module")
+def noisy(short_record):
+    """Function of a seed: the record as noisy sensors see it."""
+    return lambda seed: SensorNoise(10e-6, 100.0, seed).applied_to(short_record)
+
+
+def csv_text(record):
+    rows = zip(np.round(record.time, 9), record.position, record.pressure, strict=True)
+    lines = [f"{time!r},{x!r},{p!r}\n" for time, x, p in (map(float, row) for row in rows)]
+    return "time_s,position_m,pressure_pa\n" + "".join(lines)
+
+
+@pytest.fixture(scope="module")
+def texts(noisy):
+    return [csv_text(noisy(seed)) for seed in range(8)]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "plant").mkdir()
+    return tmp_path / "plant"
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "friction.csv"
+
+
+@pytest.fixture
+def arguments(folder, output, bench_yaml):
+    return [str(folder), "--output", str(output), "--valve", str(bench_yaml)]
+
+
+def start(arguments, script=None):
+    """Start the command in a process group of its own, as a shell does."""
+    how = [str(script)] if script else ["-m", "valve_friction_ros.commands.identify_recordings"]
+    return subprocess.Popen(
+        [sys.executable, *how, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run(arguments, script=None):
+    process = start(arguments, script)
+    out, err = process.communicate(timeout=PATIENCE)
+    return process.returncode, out, err
+
+
+def rows_of(path):
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def done(path):
+    return Counter((row["recording"], row["valve"]) for row in rows_of(path))
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def children(process):
+    return Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+
+
+def is_alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def number_of_lines(path):
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+@pytest.fixture
+def fleet(folder, texts):
+    """Six good recordings; with one process, the fourth is met after three."""
+    for number, name in enumerate(("a", "b", "c", "endless", "e", "f")):
+        (folder / f"{name}.csv").write_text(texts[number])
+    return [("endless.csv", ""), *((f"{name}.csv", "") for name in "abcef")]
+
+
+def interrupted(arguments, output, kill):
+    """Run until the third row is there and the fourth is being worked on; then `kill`."""
+    process = start([*arguments, "--jobs", "1"], FAULTY)
+    wait_until(lambda: number_of_lines(output) == 4)
+    workers = children(process)
+    kill(process)
+    out, err = process.communicate(timeout=PATIENCE)
+    wait_until(lambda: not any(is_alive(pid) for pid in workers))
+    return process.returncode, out, err
+
+
+def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_yaml):
+    (folder / "unit_1").mkdir()
+    (folder / "unit_1" / "one.csv").write_text(texts[0])
+    with gzip.open(folder / "packed.csv.gz", "wt") as stream:
+        stream.write(texts[1])
+    streams = [*messages_of(noisy(2)), *messages_of(noisy(3), "/fv_102")]
+    write_bag(folder / "bag", sorted(streams, key=lambda message: message[2]))
+    (folder / "broken.csv").write_text("time_s,position_m,pressure_pa\n0,abc,1\n")
+    (folder / "notes.txt").write_text("about the plant")
+    (folder / ".hidden.csv").write_text(texts[0])
+    code, out, err = run(arguments)
+    assert code == 1, err
+    assert done(output) == Counter(
+        [
+            ("bag", "/fv_101"),
+            ("bag", "/fv_102"),
+            ("broken.csv", ""),
+            ("packed.csv.gz", ""),
+            ("unit_1/one.csv", ""),
+        ]
+    )
+    assert "skipped, no recordings: .hidden.csv, notes.txt" in err
+    assert "broken.csv: row 2, column 'position_m': 'abc' is not a number" in err
+    assert [line.split() for line in out.splitlines()[1:3]] == [["identified", "4"], ["refused", "1"]]
+    assert "row …, column 'position_m'" in out
+
+    description = read_valve_file(bench_yaml)
+    for row in rows_of(output):
+        if row["error"]:
+            assert row["recording"] == "broken.csv"
+            assert row["coulomb_friction_n"] == ""
+            continue
+        (recorded,) = (
+            each
+            for each in read_recordings(folder / row["recording"], description.valve)
+            if each.name == row["valve"]
+        )
+        settings = IdentificationSettings(assumed_mass=description.known["mass"])
+        assessment = assess(recorded.recording(), description.valve, settings)
+        friction = assessment.parameters["coulomb_friction"]
+        # The worker's libraries have one thread, which may change the order of a sum.
+        assert float(row["coulomb_friction_n"]) == pytest.approx(friction.value, rel=1e-9)
+        assert row["coulomb_friction_verdict"] == friction.verdict.value
+        assert float(row["rms_um"]) == pytest.approx(1e6 * assessment.rms, rel=1e-9)
+        assert (row["samples"], row["duration_s"]) == ("2000", "19.99")
+
+
+def test_killed_and_resumed(fleet, output, arguments):
+    code, _, _ = interrupted(arguments, output, lambda process: process.kill())
+    assert code == -signal.SIGKILL
+    before = output.read_bytes()
+    assert done(output) == Counter([("a.csv", ""), ("b.csv", ""), ("c.csv", "")])
+    with output.open("ab") as stream:
+        stream.write(b"endless.csv,,1,0123")  # what a kill amid a write leaves
+    code, out, err = run(arguments)
+    assert code == 0, err
+    assert "6 recordings: 3 done before, 3 to do" in err
+    assert output.read_bytes().startswith(before)
+    assert done(output) == Counter(fleet)
+    assert ["identified", "6"] in [line.split() for line in out.splitlines()]
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_interrupted(fleet, output, arguments, number, code):
+    """Ctrl-C goes to all processes of the group; so may a SIGTERM."""
+    found, out, err = interrupted(
+        arguments, output, lambda process: os.killpg(process.pid, number)
+    )
+    assert (found, out) == (code, "")
+    assert "Traceback" not in err
+    assert "interrupted with 3 of 6 recordings" in err
+    assert "the same command goes on" in err
+    assert len(done(output)) == 3
+    assert set(done(output)) < set(fleet)
+
+
+def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arguments):
+    for name in ("a", "b", "deadly", "e", "f"):
+        (folder / f"{name}.csv").write_text(texts[0])
+    code, _, err = run([*arguments, "--jobs", "2"], FAULTY)
+    assert code == 1, err
+    errors = {row["recording"]: row["error"] for row in rows_of(output)}
+    assert {name for name, error in errors.items() if error} == {"deadly.csv"}
+    assert "killed by SIGKILL" in errors["deadly.csv"]
+    assert len(errors) == 5
+
+    code, _, err = run([*arguments, "--retry-failed"])
+    assert code == 0, err
+    assert "5 recordings: 4 done before, 1 to do, 1 of them again" in err
+    assert max(done(output).values()) == 1
+
+
+def test_only_what_changed_is_done_again(folder, texts, output, arguments, capsys):
+    names = ["a.csv", "b.csv", "c.csv"]
+    for name, text in zip(names, texts, strict=False):
+        (folder / name).write_text(text)
+    (folder / "c.csv").write_text("nonsense")
+    assert main(arguments) == 1
+    first = {row["recording"]: row for row in rows_of(output)}
+    (folder / "b.csv").write_text(texts[5])
+    capsys.readouterr()
+    assert main(arguments) == 1
+    assert "3 recordings: 2 done before, 1 to do, 1 of them again" in capsys.readouterr().err
+    second = {row["recording"]: row for row in rows_of(output)}
+    assert list(second) == ["a.csv", "c.csv", "b.csv"] or set(second) == set(names)
+    assert (second["a.csv"], second["c.csv"]) == (first["a.csv"], first["c.csv"])
+    assert second["b.csv"]["coulomb_friction_n"] != first["b.csv"]["coulomb_friction_n"]
+
+    state = output.read_bytes()
+    assert main(arguments) == 1
+    assert output.read_bytes() == state
+
+
+def test_other_options_are_not_mixed_in_silence(folder, texts, output, arguments, capsys):
+    (folder / "a.csv").write_text(texts[0])
+    assert main(arguments) == 0
+    state = output.read_bytes()
+    capsys.readouterr()
+    assert main([*arguments, "--fix", "mass=1.6"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "1 recordings in it were identified with other options" in line
+    assert output.read_bytes() == state
+    assert main([*arguments, "--fix", "mass=1.6", "--redo"]) == 0
+    (row,) = rows_of(output)
+    assert (row["mass_kg"], row["mass_verdict"]) == ("1.6", "fixed")
+
+
+def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yaml):
+    """The nearest description counts; JSON lines hold the same columns."""
+    output = tmp_path / "friction.jsonl"
+    double = bench_yaml.read_text().replace("0.0445", "0.089")
+    for name in ("alone", "own"):
+        (folder / name).mkdir()
+        (folder / name / "a.csv").write_text(texts[0])
+    write_bag(folder / "own" / "saved", messages_of(noisy(0), ""))
+    (folder / "own" / "saved" / "valve.yaml").write_text(bench_yaml.read_text())
+    (folder / "own" / "valve.yaml").write_text(double)
+    (folder / "own" / "b.csv").write_text(texts[0])
+    (folder / "own" / "b.valve.yaml").write_text("diaphragm_area: none")
+    assert main([str(folder), "--output", str(output)]) == 1
+    rows = {row["recording"]: row for row in map(json.loads, output.open())}
+    assert "pressure needs the diaphragm_area" in rows["alone/a.csv"]["error"]
+    assert "b.valve.yaml: diaphragm_area must be a number" in rows["own/b.csv"]["error"]
+    twice = rows["own/a.csv"]["coulomb_friction_n"] / rows["own/saved"]["coulomb_friction_n"]
+    assert twice == pytest.approx(2, rel=0.01)
+
+    shutil.copy(bench_yaml, folder / "alone" / "a.valve.yaml")  # mended: no --redo is asked for
+    assert main([str(folder), "--output", str(output)]) == 1
+    rows = {row["recording"]: row for row in map(json.loads, output.open())}
+    assert rows["alone/a.csv"]["error"] is None
+    assert len(rows) == 4
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (["--jobs", "0"], "--jobs must be at least 1"),
+        (["--fix", "mass=heavy"], "'heavy' is not a number"),
+        (["--output", "friction.xlsx"], "must end in .csv or .jsonl"),
+        (["--order", "1"], "order must be at least 2"),
+        (["--valve", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
+        ([], "there are no CSV files and no bags in it"),
+    ],
+)
+def test_bad_arguments_are_refused_at_once(arguments, output, capsys, extra, message):
+    assert main([*arguments, *extra]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    assert line.startswith("identify_recordings: ")
+    assert message in line
+    assert not output.exists()
+
+
+def test_the_output_may_lie_among_the_recordings(folder, texts, bench_yaml):
+    (folder / "a.csv").write_text(texts[0])
+    arguments = [str(folder), "--output", str(folder / "out.csv"), "--valve", str(bench_yaml)]
+    assert main(arguments) == 0
+    assert main(arguments) == 0
+    assert done(folder / "out.csv") == Counter([("a.csv", "")])
+    assert main([*arguments[:2], str(folder / "a.csv"), *arguments[3:]]) == 2
+    assert (folder / "a.csv").read_text() == texts[0]

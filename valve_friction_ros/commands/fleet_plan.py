@@ -1,0 +1,117 @@
+"""What `identify_recordings` has to do: each recording with its valve, and what is done already."""
+
+import argparse
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from valve_friction_ros.commands.identification_arguments import identification_settings
+from valve_friction_ros.commands.recording_arguments import reading_options, valve_of
+from valve_friction_ros.fleet import Entry, Findings, FoundRecording, Job, Options, ResultsFile
+
+__all__ = ["Plan", "forget_stale", "make_plan"]
+
+_VALVE_FILE = "valve.yaml"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be done with a recording.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    content, settings : str
+        Fingerprints of its files and of its options.
+    job : Job or str
+        How it is identified, or why it cannot be.
+    """
+
+    name: str
+    content: str
+    settings: str
+    job: Job | str
+
+
+def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
+    """Choose the description that is nearest to a recording."""
+    beside = found.path.parent
+    places = [beside / f"{found.stem}.{_VALVE_FILE}", beside / _VALVE_FILE]
+    if found.path.is_dir():
+        places.insert(1, found.path / _VALVE_FILE)
+    return next((place for place in places if place.exists()), common)
+
+
+def _plan(found: FoundRecording, options: argparse.Namespace) -> Plan:
+    reading = reading_options(options)
+    content = ""
+    try:
+        content = found.content()
+        description = valve_of(found.path, _valve_file(found, options.valve), reading)
+        job = Job(
+            found.path,
+            Options(
+                description.valve,
+                reading,
+                options.method,
+                identification_settings(options, description.known),
+                options.window,
+            ),
+        )
+    except (ValueError, OSError) as error:
+        return Plan(found.name, content, "", str(error))
+    return Plan(found.name, content, job.options.fingerprint(), job)
+
+
+def make_plan(findings: Findings, options: argparse.Namespace) -> Iterator[Plan]:
+    """Plan each recording, in the order of their names."""
+    return (_plan(found, options) for found in findings.recordings)
+
+
+def _is_current(entry: Entry, plan: Plan) -> bool:
+    return (entry.content, entry.settings) == (plan.content, plan.settings)
+
+
+def forget_stale(
+    results: ResultsFile, plans: Mapping[str, Plan], options: argparse.Namespace
+) -> tuple[list[Plan], int]:
+    """Drop the rows that do not hold any more, and return what is left to do.
+
+    Parameters
+    ----------
+    results : ResultsFile
+        The rows of former runs.
+    plans : mapping of str to Plan
+        The recordings by name.
+    options : argparse.Namespace
+        Tells by ``redo`` whether good rows of other options may go, and by ``retry_failed``
+        whether refused ones are tried again.
+
+    Returns
+    -------
+    tuple of list of Plan, int
+        What is left to do, and of how many recordings rows were dropped.
+
+    Raises
+    ------
+    ValueError
+        If good rows were made with other options, and may not go.
+    """
+    done, others = set(), 0
+    for entry in results.entries():
+        plan = plans.get(entry.recording)
+        if plan is None:
+            continue
+        if _is_current(entry, plan) and not (options.retry_failed and entry.failed):
+            done.add(entry.recording)
+        elif entry.content == plan.content and entry.settings != plan.settings:
+            others += not entry.refused
+    if others and not options.redo:
+        raise ValueError(
+            f"{results.path}: {others} recordings in it were identified with other options, "
+            "another valve file or another version: give another --output, or --redo to replace "
+            "them"
+        )
+    dropped = results.keep(lambda entry: entry.recording not in plans or entry.recording in done)
+    return [plan for plan in plans.values() if plan.name not in done], dropped

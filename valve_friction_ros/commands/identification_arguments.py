@@ -1,0 +1,89 @@
+"""Arguments of the commands that identify: the method and its settings."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+
+from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
+    FIXABLE,
+    METHODS,
+    IdentificationSettings,
+)
+
+__all__ = ["add_identification_arguments", "identification_settings"]
+
+
+def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the method and what it takes."""
+    defaults = IdentificationSettings()
+    parser.add_argument(
+        "--method",
+        choices=[*METHODS],
+        default=DEFAULT_METHOD,
+        help="sweep: several fast strokes; force_balance: a valve signature, two periods or more "
+        "of a slow triangle (%(default)s)",
+    )
+    parser.add_argument(
+        "--fix",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"take a parameter as known ({', '.join(FIXABLE)}); NAME alone: from the valve file",
+    )
+    parser.add_argument(
+        "--position-bias",
+        type=float,
+        metavar="M",
+        help="x̄ of (10) in m: the paper's form of four columns, F_0 = k·x̄",
+    )
+    parser.add_argument(
+        "--window",
+        type=int,
+        help=f"derivative window d, samples, for both estimates of the sweep; by default "
+        f"{defaults.window} for the published one, and chosen from the noise of the record for the "
+        "refined one and for the force balance",
+    )
+    parser.add_argument(
+        "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
+    )
+
+
+def _fixed(entries: Sequence[str], known: Mapping[str, float]) -> dict[str, float]:
+    fixed = {}
+    for entry in entries:
+        name, separator, text = entry.partition("=")
+        name = name.strip()
+        if name in fixed:
+            raise ValueError(f"--fix {name} is given twice")
+        if separator:
+            try:
+                fixed[name] = float(text)
+            except ValueError:
+                raise ValueError(f"--fix {entry}: {text!r} is not a number") from None
+        elif name in known:
+            fixed[name] = known[name]
+        else:
+            raise ValueError(
+                f"--fix {name}: give a value, as {name}=VALUE, or a valve file with it"
+            )
+    return fixed
+
+
+def identification_settings(
+    options: argparse.Namespace, known: Mapping[str, float]
+) -> IdentificationSettings:
+    """Build the settings from the parsed arguments, and from what the valve file names.
+
+    Raises
+    ------
+    ValueError
+        If they do not go together.
+    """
+    defaults = IdentificationSettings()
+    return IdentificationSettings(
+        window=defaults.window if options.window is None else options.window,
+        order=options.order,
+        fixed=_fixed(options.fix, known),
+        position_bias=options.position_bias,
+        assumed_mass=known.get("mass", defaults.assumed_mass),
+    )

@@ -1,0 +1,219 @@
+"""Command `identify_recordings`: identify all recordings of a folder, on all cores."""
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from valve_friction_ros.commands.fleet_plan import Plan, forget_stale, make_plan
+from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.identification_arguments import (
+    add_identification_arguments,
+    identification_settings,
+)
+from valve_friction_ros.commands.recording_arguments import add_reading_arguments, reading_options
+from valve_friction_ros.commands.stop_signals import StopSignals
+from valve_friction_ros.commands.valve_file import read_valve_file
+from valve_friction_ros.fleet import (
+    REFUSED,
+    DeadWorker,
+    Job,
+    ResultsFile,
+    Tally,
+    error_cells,
+    find_recordings,
+    identify_job,
+    in_processes,
+    key_cells,
+    row_format,
+    tally,
+    usable_cores,
+)
+from valve_friction_ros.fleet.row import Cell
+from valve_friction_ros.identification import FIXABLE
+
+__all__ = ["main"]
+
+_NAME = "identify_recordings"
+_EXIT_SOME_REFUSED = 1
+_EXIT_NOTHING = 2
+_SHOWN_SKIPPED = 10
+_SHOWN_REASONS = 10
+
+_Rows = list[Mapping[str, Cell]]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog=_NAME,
+        description="Identify all recordings in a folder and those below it, on all cores, a row "
+        "a valve in one file. The same command goes on where it was interrupted.",
+        epilog="Exit code 0: all were identified; 1: some were refused; 2: all were, or nothing "
+        "was done; 130, 143: interrupted.",
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="where the recordings are")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="FILE.csv or FILE.jsonl (JSON lines); rows are in the order in which they finished",
+    )
+    parser.add_argument(
+        "--valve",
+        type=Path,
+        metavar="FILE.yaml",
+        help="valve of the recordings that have neither NAME.valve.yaml beside them nor valve.yaml "
+        "in their bag or beside them",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=usable_cores(),
+        metavar="N",
+        help="recordings at a time, a process each (%(default)s)",
+    )
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="identify again what was refused before"
+    )
+    parser.add_argument(
+        "--redo", action="store_true", help="replace rows that were made with other options"
+    )
+    add_identification_arguments(parser)
+    add_reading_arguments(parser)
+    return parser
+
+
+def _require_sense(options: argparse.Namespace) -> None:
+    """Refuse at once what would be refused of every recording."""
+    if options.jobs < 1:
+        raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
+    row_format(options.output)
+    reading_options(options)
+    identification_settings(options, dict.fromkeys(FIXABLE, 1.0))
+    if options.valve is not None:
+        read_valve_file(options.valve)
+
+
+def _planned(options: argparse.Namespace, stop: StopSignals) -> dict[str, Plan]:
+    findings = find_recordings(options.folder, options.output)
+    if findings.skipped:
+        shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
+        more = len(findings.skipped) - _SHOWN_SKIPPED
+        rest = f" and {more} more" if more > 0 else ""
+        print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
+    if not findings.recordings:
+        raise ValueError(f"{options.folder}: there are no CSV files and no bags in it")
+    plans = {}
+    for plan in make_plan(findings, options):
+        if stop.wanted():
+            break
+        plans[plan.name] = plan
+    return plans
+
+
+def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[tuple[Plan, _Rows]]:
+    """Yield each recording with its rows as it finishes."""
+    by_job: dict[Path, Plan] = {}
+    possible: list[Job] = []
+    for plan in plans:
+        if isinstance(plan.job, Job):
+            by_job[plan.job.path] = plan
+            possible.append(plan.job)
+        else:
+            yield plan, [error_cells("", plan.job, Path(plan.name))]
+    for job, answer in in_processes(identify_job, possible, jobs, stop.wanted):
+        if isinstance(answer, DeadWorker):
+            yield by_job[job.path], [error_cells("", str(answer), job.path)]
+        else:
+            yield by_job[job.path], answer
+
+
+def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: StopSignals) -> None:
+    """Identify and write, and show how far it is."""
+    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    columns = (
+        TextColumn("identifying"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        task = progress.add_task("", total=len(plans))
+        for plan, rows in _finished(plans, jobs, stop):
+            keys = key_cells(plan.name, plan.content, plan.settings, len(rows))
+            results.append([{**row, **keys} for row in rows])
+            progress.advance(task)
+            for row in rows:
+                if row.get("error"):
+                    label = ", ".join(filter(None, (plan.name, str(row["valve"]))))
+                    console.print(f"{label}: {row['error']}")
+
+
+def _print_tally(counted: Tally) -> None:
+    console = Console(highlight=False, markup=False)
+    table = Table("Coulomb friction", "valves", box=None, header_style="bold")
+    table.columns[1].justify = "right"
+    for outcome, count in sorted(counted.outcomes.items(), key=lambda one: one[0] == REFUSED):
+        table.add_row(outcome, str(count))
+    console.print(table)
+    reasons = counted.reasons()
+    if not reasons:
+        return
+    console.print()
+    table = Table("refused", "reason", "for example", box=None, header_style="bold")
+    table.columns[0].justify = "right"
+    for reason in reasons[:_SHOWN_REASONS]:
+        table.add_row(str(reason.count), reason.text, reason.example)
+    console.print(table)
+
+
+def _run(options: argparse.Namespace, stop: StopSignals) -> int:
+    _require_sense(options)
+    plans = _planned(options, stop)
+    if stop.wanted():
+        print(f"{_NAME}: interrupted before anything was done", file=sys.stderr)
+        return stop.exit_code
+    with ResultsFile(options.output) as results:
+        left, dropped = forget_stale(results, plans, options)
+        print(
+            f"{len(plans)} recordings: {len(plans) - len(left)} done before, {len(left)} to do"
+            + (f", {dropped} of them again" if dropped else ""),
+            file=sys.stderr,
+        )
+        _identify(left, results, options.jobs, stop)
+        mine = (entry for entry in results.entries() if entry.recording in plans)
+        if stop.wanted():
+            print(
+                f"{_NAME}: interrupted with {sum(1 for _ in mine)} of {len(plans)} recordings in "
+                f"{options.output}: the same command goes on from there",
+                file=sys.stderr,
+            )
+            return stop.exit_code
+        counted = tally(mine)
+    _print_tally(counted)
+    refused = counted.outcomes[REFUSED]
+    if refused == 0:
+        return 0
+    return _EXIT_NOTHING if refused == counted.outcomes.total() else _EXIT_SOME_REFUSED
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    options = _parser().parse_args(arguments)
+    with StopSignals() as stop:
+        try:
+            return _run(options, stop)
+        except (ValueError, OSError) as error:
+            print(f"{_NAME}:", *str(error).splitlines(), file=sys.stderr)
+            return _EXIT_NOTHING
+
+
+if __name__ == "__main__":
+    sys.exit(main())

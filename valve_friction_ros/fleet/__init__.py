@@ -1,0 +1,31 @@
+"""Many recordings identified by many processes into one file; no ROS."""
+
+from valve_friction_ros.fleet.discovery import Findings, FoundRecording, find_recordings
+from valve_friction_ros.fleet.job import Job, Options, identify_job
+from valve_friction_ros.fleet.results_file import Entry, ResultsFile
+from valve_friction_ros.fleet.row import COLUMNS, error_cells, key_cells
+from valve_friction_ros.fleet.row_format import row_format
+from valve_friction_ros.fleet.tally import REFUSED, Reason, Tally, tally
+from valve_friction_ros.fleet.workers import DeadWorker, in_processes, usable_cores
+
+__all__ = [
+    "COLUMNS",
+    "REFUSED",
+    "DeadWorker",
+    "Entry",
+    "Findings",
+    "FoundRecording",
+    "Job",
+    "Options",
+    "Reason",
+    "ResultsFile",
+    "Tally",
+    "error_cells",
+    "find_recordings",
+    "identify_job",
+    "in_processes",
+    "key_cells",
+    "row_format",
+    "tally",
+    "usable_cores",
+]

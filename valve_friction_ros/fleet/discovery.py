@@ -1,0 +1,169 @@
+"""Which files and folders below a folder are recordings."""
+
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["Findings", "FoundRecording", "find_recordings", "is_valve_file"]
+
+_METADATA = "metadata.yaml"
+_BAG_KEY = b"rosbag2_bagfile_information"
+_VALVE_ENDING = "valve.yaml"
+_PACKED = (".gz", ".zstd")
+_STORAGE = (".mcap", ".db3")
+_ENDINGS = (".csv", ".tsv", ".bag", *_STORAGE)
+"""Endings of recordings; a bag of ROS 1 is one, so that its refusal says how to convert it."""
+
+
+@dataclass(frozen=True)
+class FoundRecording:
+    """A recording, not yet read.
+
+    Attributes
+    ----------
+    path : Path
+        The file, or the folder of a bag.
+    name : str
+        Its path from the searched folder, with slashes.
+    """
+
+    path: Path
+    name: str
+
+    @property
+    def stem(self) -> str:
+        """Its name without folders and endings: ``NAME`` of ``NAME.valve.yaml``."""
+        return self.path.name if self.path.is_dir() else _bare(self.path.name)
+
+    def content(self) -> str:
+        """Return a fingerprint of size and time of change of its file or files.
+
+        Raises
+        ------
+        OSError
+            If they cannot be looked at.
+        """
+        folder = self.path.is_dir()
+        files = sorted(self.path.iterdir()) if folder else [self.path]
+        digest = hashlib.blake2b(digest_size=8)
+        for file in files:
+            if not is_valve_file(file.name):
+                state = file.stat()
+                name = file.name if folder else ""
+                digest.update(f"{name}\0{state.st_size}\0{state.st_mtime_ns}\n".encode())
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a folder holds.
+
+    Attributes
+    ----------
+    recordings : tuple of FoundRecording
+        In the order of their names.
+    skipped : tuple of str
+        Names of what is no recording, likewise.
+    """
+
+    recordings: tuple[FoundRecording, ...]
+    skipped: tuple[str, ...]
+
+
+def is_valve_file(name: str) -> bool:
+    """Tell whether a file describes a valve: ``valve.yaml`` or ``NAME.valve.yaml``."""
+    return name == _VALVE_ENDING or name.endswith(f".{_VALVE_ENDING}")
+
+
+def _unpacked_name(name: str) -> str:
+    for ending in _PACKED:
+        if name.lower().endswith(ending):
+            return name[: -len(ending)]
+    return name
+
+
+def _bare(name: str) -> str:
+    return Path(_unpacked_name(name)).stem
+
+
+def _is_recording(name: str) -> bool:
+    return Path(_unpacked_name(name)).suffix.lower() in _ENDINGS
+
+
+def _is_storage(name: str) -> bool:
+    return Path(_unpacked_name(name)).suffix.lower() in _STORAGE
+
+
+def _is_bag_folder(folder: Path, files: list[str]) -> bool:
+    """Tell a bag's folder by its metadata beside its storage, or by what they say."""
+    if _METADATA not in files:
+        return False
+    if any(_is_storage(name) for name in files):
+        return True
+    try:
+        return _BAG_KEY in (folder / _METADATA).read_bytes()
+    except OSError:
+        return False
+
+
+def _can_be_written(name: str) -> bool:
+    """Tell whether a name fits on a line of UTF-8."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return name.isprintable()
+
+
+def find_recordings(folder: Path, left_out: Path | None = None) -> Findings:
+    """Find the recordings in a folder and in those below it.
+
+    A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
+    each CSV or TSV file, gzipped or not, and each storage file of a bag is one, told by its
+    ending. Hidden files and folders and links to folders are skipped; so is a name that cannot
+    be written on a line.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to search.
+    left_out : Path, optional
+        A file that is neither a recording nor worth a word: the output.
+
+    Raises
+    ------
+    ValueError
+        If it is no folder, or cannot be read.
+    """
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: no such folder")
+    unreadable: list[OSError] = []
+    recordings, skipped = [], []
+    own = None if left_out is None else left_out.resolve()
+    for place, folders, files in os.walk(folder, onerror=unreadable.append):
+        here = Path(place)
+        below = here.relative_to(folder)
+        if _is_bag_folder(here, files):
+            recordings.append(here)
+            folders.clear()
+            continue
+        closed = {name for name in folders if name.startswith(".") or (here / name).is_symlink()}
+        skipped += [f"{(below / name).as_posix()}/" for name in closed]
+        folders[:] = sorted(set(folders) - closed)
+        for name in files:
+            path = here / name
+            if path.resolve() == own or is_valve_file(name):
+                continue
+            if name.startswith(".") or not _is_recording(name) or not path.is_file():
+                skipped.append((below / name).as_posix())
+            else:
+                recordings.append(path)
+    if unreadable:
+        error = unreadable[0]
+        raise ValueError(f"{error.filename}: cannot be read: {error.strerror}")
+    found = [FoundRecording(path, path.relative_to(folder).as_posix()) for path in recordings]
+    strange = [one for one in found if not _can_be_written(one.name)]
+    skipped += [one.name for one in strange]
+    good = sorted((one for one in found if one not in strange), key=lambda one: one.name)
+    return Findings(tuple(good), tuple(sorted(skipped)))

@@ -1,0 +1,118 @@
+"""A row of the output: its columns, with units in their names, and its cells."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Assessment
+from valve_friction_ros.model import Recording
+
+__all__ = ["COLUMNS", "Cell", "error_cells", "key_cells", "result_cells"]
+
+Cell = str | float | int | None
+
+_SUFFIXES = {
+    "kg": "_kg",
+    "N": "_n",
+    "N·s/m": "_n_s_per_m",
+    "N/m": "_n_per_m",
+    "m/s": "_m_per_s",
+    "s": "_s",
+    "1": "",
+}
+
+
+def _parameter_columns(name: str) -> tuple[str, str, str]:
+    suffix = _SUFFIXES[ASSESSED_UNITS[name]]
+    return f"{name}{suffix}", f"{name}_half_width{suffix}", f"{name}_verdict"
+
+
+COLUMNS: tuple[str, ...] = (
+    "recording",
+    "valve",
+    "valves",
+    "content",
+    "settings",
+    "method",
+    *(column for name in ASSESSED_UNITS for column in _parameter_columns(name)),
+    "fit",
+    "rms_um",
+    "samples",
+    "duration_s",
+    "warnings",
+    "error",
+)
+"""All columns: what a row is about, what came of it, and last why nothing did."""
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _parameter_cells(name: str, parameter: AssessedParameter | None) -> Mapping[str, Cell]:
+    columns = _parameter_columns(name)
+    if parameter is None:
+        return dict.fromkeys(columns)
+    cells = (_number(parameter.value), _number(parameter.half_width), parameter.verdict.value)
+    return dict(zip(columns, cells, strict=True))
+
+
+def result_cells(
+    valve: str, assessment: Assessment, recording: Recording, notes: Sequence[str]
+) -> Mapping[str, Cell]:
+    """Fill the cells of an identified valve.
+
+    Parameters
+    ----------
+    valve : str
+        Its name in the recording.
+    assessment : Assessment
+        What was identified; a parameter that it does not hold leaves its cells empty.
+    recording : Recording
+        What it was identified from.
+    notes : sequence of str
+        Notes of the reading, which join the warnings.
+    """
+    cells: dict[str, Cell] = {"valve": _one_line(valve), "method": assessment.method}
+    for name in ASSESSED_UNITS:
+        cells |= _parameter_cells(name, assessment.parameters.get(name))
+    warnings = "; ".join(map(_one_line, (*notes, *assessment.warnings)))
+    return cells | {
+        "fit": _number(assessment.fit),
+        "rms_um": _number(1e6 * assessment.rms),
+        "samples": len(recording),
+        "duration_s": round((len(recording) - 1) * recording.sample_period, 9),
+        "warnings": warnings or None,
+    }
+
+
+def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
+    """Fill the cells of a valve that was refused; `path`, which the row names, leaves `reason`."""
+    for start in (f"{path}, {valve}: ", f"{path}: "):
+        while reason.startswith(start):
+            reason = reason.removeprefix(start)
+    return {"valve": _one_line(valve), "error": _one_line(reason)}
+
+
+def key_cells(recording: str, content: str, settings: str, valves: int) -> Mapping[str, Cell]:
+    """Fill the cells by which a later run knows what was done.
+
+    Parameters
+    ----------
+    recording : str
+        Name of the recording.
+    content, settings : str
+        Fingerprints of its files and of the options.
+    valves : int
+        Number of rows of this recording.
+    """
+    return {
+        "recording": recording,
+        "content": content,
+        "settings": settings,
+        "valves": valves,
+    }
