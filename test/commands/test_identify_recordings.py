@@ -71,7 +71,7 @@ def output(tmp_path):
 
 @pytest.fixture
 def arguments(folder, output, bench_yaml):
-    return [str(folder), "--output", str(output), "--valve", str(bench_yaml)]
+    return [str(folder), "--output", str(output), "--valve", str(bench_yaml), "--jobs", "1"]
 
 
 def start(arguments, script=None):
@@ -133,7 +133,7 @@ def fleet(folder, texts):
 
 def interrupted(arguments, output, kill):
     """Run until the third row is there and the fourth is being worked on; then `kill`."""
-    process = start([*arguments, "--jobs", "1"], FAULTY)
+    process = start(arguments, FAULTY)
     wait_until(lambda: number_of_lines(output) == 4)
     workers = children(process)
     kill(process)
@@ -152,7 +152,7 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
     (folder / "broken.csv").write_text("time_s,position_m,pressure_pa\n0,abc,1\n")
     (folder / "notes.txt").write_text("about the plant")
     (folder / ".hidden.csv").write_text(texts[0])
-    code, out, err = run(arguments)
+    code, out, err = run([*arguments, "--jobs", "2"])
     assert code == 1, err
     assert done(output) == Counter(
         [
@@ -165,8 +165,12 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
     )
     assert "skipped, no recordings: .hidden.csv, notes.txt" in err
     assert "broken.csv: row 2, column 'position_m': 'abc' is not a number" in err
-    assert [line.split() for line in out.splitlines()[1:3]] == [["identified", "4"], ["refused", "1"]]
-    assert "row …, column 'position_m'" in out
+    assert [line.split() for line in out.splitlines()[1:3]] == [
+        ["identified", "4"],
+        ["refused", "1"],
+    ]
+    assert "1 refused: row …, column 'position_m': 'abc' is not a number" in out
+    assert "(for example broken.csv)" in out
 
     description = read_valve_file(bench_yaml)
     for row in rows_of(output):
@@ -207,9 +211,7 @@ def test_killed_and_resumed(fleet, output, arguments):
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted(fleet, output, arguments, number, code):
     """Ctrl-C goes to all processes of the group; so may a SIGTERM."""
-    found, out, err = interrupted(
-        arguments, output, lambda process: os.killpg(process.pid, number)
-    )
+    found, out, err = interrupted(arguments, output, lambda process: os.killpg(process.pid, number))
     assert (found, out) == (code, "")
     assert "Traceback" not in err
     assert "interrupted with 3 of 6 recordings" in err
@@ -218,7 +220,7 @@ def test_interrupted(fleet, output, arguments, number, code):
     assert set(done(output)) < set(fleet)
 
 
-def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arguments):
+def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arguments, capsys):
     for name in ("a", "b", "deadly", "e", "f"):
         (folder / f"{name}.csv").write_text(texts[0])
     code, _, err = run([*arguments, "--jobs", "2"], FAULTY)
@@ -228,9 +230,8 @@ def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arg
     assert "killed by SIGKILL" in errors["deadly.csv"]
     assert len(errors) == 5
 
-    code, _, err = run([*arguments, "--retry-failed"])
-    assert code == 0, err
-    assert "5 recordings: 4 done before, 1 to do, 1 of them again" in err
+    assert main([*arguments, "--retry-failed"]) == 0
+    assert "5 recordings: 4 done before, 1 to do, 1 of them again" in capsys.readouterr().err
     assert max(done(output).values()) == 1
 
 
@@ -246,7 +247,7 @@ def test_only_what_changed_is_done_again(folder, texts, output, arguments, capsy
     assert main(arguments) == 1
     assert "3 recordings: 2 done before, 1 to do, 1 of them again" in capsys.readouterr().err
     second = {row["recording"]: row for row in rows_of(output)}
-    assert list(second) == ["a.csv", "c.csv", "b.csv"] or set(second) == set(names)
+    assert list(second) == ["a.csv", "c.csv", "b.csv"]
     assert (second["a.csv"], second["c.csv"]) == (first["a.csv"], first["c.csv"])
     assert second["b.csv"]["coulomb_friction_n"] != first["b.csv"]["coulomb_friction_n"]
 
@@ -281,7 +282,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
     (folder / "own" / "valve.yaml").write_text(double)
     (folder / "own" / "b.csv").write_text(texts[0])
     (folder / "own" / "b.valve.yaml").write_text("diaphragm_area: none")
-    assert main([str(folder), "--output", str(output)]) == 1
+    assert main([str(folder), "--output", str(output), "--jobs", "1"]) == 1
     rows = {row["recording"]: row for row in map(json.loads, output.open())}
     assert "pressure needs the diaphragm_area" in rows["alone/a.csv"]["error"]
     assert "b.valve.yaml: diaphragm_area must be a number" in rows["own/b.csv"]["error"]
@@ -289,7 +290,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
     assert twice == pytest.approx(2, rel=0.01)
 
     shutil.copy(bench_yaml, folder / "alone" / "a.valve.yaml")  # mended: no --redo is asked for
-    assert main([str(folder), "--output", str(output)]) == 1
+    assert main([str(folder), "--output", str(output), "--jobs", "1"]) == 1
     rows = {row["recording"]: row for row in map(json.loads, output.open())}
     assert rows["alone/a.csv"]["error"] is None
     assert len(rows) == 4
@@ -318,7 +319,10 @@ def test_bad_arguments_are_refused_at_once(arguments, output, capsys, extra, mes
 
 def test_the_output_may_lie_among_the_recordings(folder, texts, bench_yaml):
     (folder / "a.csv").write_text(texts[0])
-    arguments = [str(folder), "--output", str(folder / "out.csv"), "--valve", str(bench_yaml)]
+    arguments = [
+        *(str(folder), "--output", str(folder / "out.csv")),
+        *("--valve", str(bench_yaml), "--jobs", "1"),
+    ]
     assert main(arguments) == 0
     assert main(arguments) == 0
     assert done(folder / "out.csv") == Counter([("a.csv", "")])

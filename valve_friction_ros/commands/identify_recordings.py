@@ -164,14 +164,13 @@ def _print_tally(counted: Tally) -> None:
         table.add_row(outcome, str(count))
     console.print(table)
     reasons = counted.reasons()
-    if not reasons:
-        return
-    console.print()
-    table = Table("refused", "reason", "for example", box=None, header_style="bold")
-    table.columns[0].justify = "right"
     for reason in reasons[:_SHOWN_REASONS]:
-        table.add_row(str(reason.count), reason.text, reason.example)
-    console.print(table)
+        console.print(
+            f"{reason.count:>6} refused: {reason.text} (for example {reason.example})",
+            soft_wrap=True,
+        )
+    if len(reasons) > _SHOWN_REASONS:
+        console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
 
 
 def _run(options: argparse.Namespace, stop: StopSignals) -> int:

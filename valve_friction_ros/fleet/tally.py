@@ -12,7 +12,7 @@ __all__ = ["REFUSED", "Reason", "Tally", "tally"]
 
 REFUSED = "refused"
 
-_NUMBER = re.compile(r"[-+−]?\b\d[\d.,]*(?:e[-+]?\d+)?")
+_NUMBER = re.compile(r"[-+−]?\b\d+(?:[.,]\d+)*(?:e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)

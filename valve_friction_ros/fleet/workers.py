@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from tempfile import TemporaryDirectory
@@ -91,6 +92,8 @@ class _Worker(Generic[_Task, _Answer]):
         self.process: SpawnProcess = context.Process(
             target=_work, args=(far_end, work), daemon=True
         )
+        # It would undo the mask of signals if it were started under it, by the first process.
+        resource_tracker.ensure_running()
         with _surroundings(folder):
             self.process.start()
         far_end.close()
