@@ -1,14 +1,18 @@
 """Many recordings on all cores: CSV files of 62.4 s at 1 kHz, read and identified.
 
 Wall-clock seconds a recording in the steady state: begun when as many answers are there as there
-are processes, so that their start does not count.
+are processes, so that their start does not count. Other work on the machine takes cores away from
+several processes and not from one; processor seconds a recording tell whether the processes are in
+each other's way.
 """
 
+import os
 import statistics
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,38 +60,76 @@ def _never() -> bool:
     return False
 
 
-def _seconds_a_recording(paths: Sequence[Path], processes: int) -> float:
+class _Answer(NamedTuple):
+    """When a recording was finished, and by whom."""
+
+    process: int
+    processor_time: float
+    error: object
+
+
+class _Cost(NamedTuple):
+    """Seconds a recording."""
+
+    wall: float
+    processor: float
+
+
+def _timed(job: Job) -> _Answer:
+    (row,) = identify_job(job)
+    return _Answer(os.getpid(), time.process_time(), row.get("error"))
+
+
+def _cost(paths: Sequence[Path], processes: int) -> _Cost:
     options = Options(BENCH_VALVE, ReadingOptions(), DEFAULT_METHOD, IdentificationSettings(), None)
     count = processes * (_RECORDINGS_A_PROCESS + 1)
     jobs = [Job(paths[number % len(paths)], options) for number in range(count)]
-    times = []
-    for _, answer in in_processes(identify_job, jobs, processes, _never):
-        if isinstance(answer, DeadWorker) or answer[0].get("error"):
+    ends: list[float] = []
+    processor_times: dict[int, list[float]] = {}
+    for _, answer in in_processes(_timed, jobs, processes, _never):
+        if isinstance(answer, DeadWorker) or answer.error:
             raise RuntimeError(f"a recording was not identified: {answer}")
-        times.append(time.monotonic())
-    return (times[-1] - times[processes - 1]) / (len(times) - processes)
+        ends.append(time.monotonic())
+        processor_times.setdefault(answer.process, []).append(answer.processor_time)
+    return _Cost(
+        (ends[-1] - ends[processes - 1]) / (count - processes),
+        sum(times[-1] - times[0] for times in processor_times.values())
+        / sum(len(times) - 1 for times in processor_times.values()),
+    )
 
 
 def measure(settings: Settings) -> Iterator[Row]:
     """Measure one process and one on each core, in turn."""
     cores = usable_cores()
-    seconds: dict[int, list[float]] = {1: [], cores: []}
+    costs: dict[int, list[_Cost]] = {1: [], cores: []}
     with tempfile.TemporaryDirectory() as folder:
         paths = _write(Path(folder))
         for repeat in range(settings.repeats):
-            for processes, found in seconds.items():
+            for processes, found in costs.items():
                 settings.say(f"{processes} processes, {repeat + 1} of {settings.repeats}")
-                found.append(_seconds_a_recording(paths, processes))
-    one, all_cores = (statistics.median(seconds[processes]) for processes in (1, cores))
+                found.append(_cost(paths, processes))
+    one, every = (
+        _Cost(*(statistics.median(column) for column in zip(*costs[processes], strict=True)))
+        for processes in (1, cores)
+    )
     wanted = _SHARE * cores
     yield Row(
         f"seconds a recording, {cores} processes",
-        all_cores,
+        every.wall,
         "s",
-        one,
+        one.wall,
         "one process",
         f"at least {wanted:.1f} times faster",
-        one >= wanted * all_cores,
+        one.wall >= wanted * every.wall,
     )
-    yield Row(f"recordings a second, {cores} processes", 1 / all_cores, "1/s")
-    yield Row("recordings a second, one process", 1 / one, "1/s")
+    yield Row(f"recordings a second, {cores} processes", 1 / every.wall, "1/s")
+    yield Row("recordings a second, one process", 1 / one.wall, "1/s")
+    yield Row(
+        f"processor seconds a recording, {cores} processes",
+        every.processor,
+        "s",
+        one.processor,
+        "one process",
+        f"at most 1/{_SHARE} of it",
+        _SHARE * every.processor <= one.processor,
+    )
