@@ -83,9 +83,11 @@ def test_what_is_kept_stays_as_it_is(fleet, ending, data):
 def test_the_file_of_another_program_is_left_alone(tmp_path, name, content):
     path = tmp_path / name
     path.write_text(content)
+    before = path.stat()
     with pytest.raises(ValueError, match="line 1 is no row of this command"):
         ResultsFile(path)
     assert path.read_text() == content
+    assert path.stat().st_mtime_ns == before.st_mtime_ns
 
 
 @pytest.mark.parametrize("ending", [".csv", ".jsonl"])
@@ -118,3 +120,16 @@ def test_one_writer_at_a_time(tmp_path):
             ResultsFile(path)
     with ResultsFile(path) as results:
         assert recordings_in(results) == []
+
+
+def test_a_draft_that_a_kill_left_and_a_link_do_not_disturb(tmp_path):
+    path, link = tmp_path / "there.csv", tmp_path / "out.csv"
+    link.symlink_to(path)
+    (tmp_path / ".there.csv.draft").write_text("half")
+    with ResultsFile(link) as results:
+        results.append(rows_of(0, 1, "one"))
+        results.append(rows_of(1, 1, "two"))
+        assert results.keep(lambda entry: entry.recording.startswith("1")) == 1
+    assert link.is_symlink()
+    with ResultsFile(path) as results:
+        assert recordings_in(results) == [("1, two", 1)]

@@ -8,6 +8,7 @@ from pathlib import Path
 from valve_friction_ros.commands.identification_arguments import identification_settings
 from valve_friction_ros.commands.recording_arguments import reading_options, valve_of
 from valve_friction_ros.fleet import Entry, Findings, FoundRecording, Job, Options, ResultsFile
+from valve_friction_ros.monitoring.recordings import ReadingOptions
 
 __all__ = ["Plan", "forget_stale", "make_plan"]
 
@@ -43,8 +44,7 @@ def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
     return next((place for place in places if place.exists()), common)
 
 
-def _plan(found: FoundRecording, options: argparse.Namespace) -> Plan:
-    reading = reading_options(options)
+def _plan(found: FoundRecording, options: argparse.Namespace, reading: ReadingOptions) -> Plan:
     content = ""
     try:
         content = found.content()
@@ -66,7 +66,8 @@ def _plan(found: FoundRecording, options: argparse.Namespace) -> Plan:
 
 def make_plan(findings: Findings, options: argparse.Namespace) -> Iterator[Plan]:
     """Plan each recording, in the order of their names."""
-    return (_plan(found, options) for found in findings.recordings)
+    reading = reading_options(options)
+    return (_plan(found, options, reading) for found in findings.recordings)
 
 
 def _is_current(entry: Entry, plan: Plan) -> bool:

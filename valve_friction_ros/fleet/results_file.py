@@ -83,8 +83,7 @@ class ResultsFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._format = row_format(path)
-        path.touch()
-        self._stream: BinaryIO = path.open("r+b")
+        self._stream: BinaryIO = path.open("a+b")  # leaves the time of change of a stranger alone
         try:
             self._lock(self._stream)
             self._recover()
@@ -113,17 +112,14 @@ class ResultsFile:
     def _recover(self) -> None:
         """Cut off what is incomplete; begin a new file with its header."""
         end = max((place for place, _ in self._scan()), default=0)
+        self._stream.truncate(end)
         if end == 0:
-            self._stream.seek(0)
-            self._stream.truncate()
             self._stream.write(self._format.header)
-        else:
-            self._stream.truncate(end)
         _flush(self._stream)
         self._flush_folder()
 
     def _flush_folder(self) -> None:
-        descriptor = os.open(self.path.parent, os.O_RDONLY)
+        descriptor = os.open(self.path.resolve().parent, os.O_RDONLY)
         try:
             os.fsync(descriptor)
         finally:
@@ -188,16 +184,18 @@ class ResultsFile:
         dropped = sum(not wanted(entry) for entry in self.entries())
         if dropped == 0:
             return 0
-        draft = self.path.with_name(f".{self.path.name}.draft")
-        stream: BinaryIO = draft.open("w+b")
+        place = self.path.resolve()
+        draft = place.with_name(f".{place.name}.draft")
+        stream: BinaryIO = draft.open("a+b")
         try:
             self._lock(stream)
+            stream.truncate(0)  # of what a kill left
             stream.write(self._format.header)
             for entry in self.entries():
                 if wanted(entry):
                     stream.writelines(map(self._format.encode, entry.rows))
             _flush(stream)
-            draft.rename(self.path)
+            draft.rename(place)
         except BaseException:
             stream.close()
             draft.unlink(missing_ok=True)
@@ -209,6 +207,5 @@ class ResultsFile:
 
     def append(self, rows: Sequence[_Row]) -> None:
         """Write the rows of a recording at the end; they are on the disk on return."""
-        self._stream.seek(0, os.SEEK_END)
         self._stream.write(b"".join(map(self._format.encode, rows)))
         _flush(self._stream)
