@@ -328,3 +328,15 @@ def test_the_output_may_lie_among_the_recordings(folder, texts, bench_yaml):
     assert done(folder / "out.csv") == Counter([("a.csv", "")])
     assert main([*arguments[:2], str(folder / "a.csv"), *arguments[3:]]) == 2
     assert (folder / "a.csv").read_text() == texts[0]
+
+
+@pytest.mark.parametrize("name", ["friction.csv", "friction.jsonl"])
+def test_a_recording_that_cannot_be_begun_is_not_tried_again(folder, texts, tmp_path, capsys, name):
+    (folder / "a.csv").write_text(texts[0])  # a pressure, and no valve file
+    arguments = [str(folder), "--output", str(tmp_path / name)]
+    assert main(arguments) == 2
+    assert "a.csv: pressure needs the diaphragm_area" in capsys.readouterr().err
+    assert main(arguments) == 2
+    assert "1 recordings: 1 done before, 0 to do" in capsys.readouterr().err
+    assert main([*arguments, "--retry-failed"]) == 2
+    assert "1 to do, 1 of them again" in capsys.readouterr().err

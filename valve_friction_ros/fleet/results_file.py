@@ -49,7 +49,7 @@ class Entry:
 
 def _entry(rows: Sequence[_Row]) -> Entry:
     recording, content, settings = (
-        str(rows[0][column]) for column in ("recording", "content", "settings")
+        str(rows[0][column] or "") for column in ("recording", "content", "settings")
     )
     return Entry(recording, content, settings, tuple(rows))
 
