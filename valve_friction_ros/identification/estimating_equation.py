@@ -47,6 +47,16 @@ class EstimatingEquation:
         mixed = one.T @ two
         return np.asarray(mixed + mixed.T, dtype=np.float64)
 
+    @property
+    def is_definite(self) -> bool:
+        """Tell whether the curvature has an inverse, and its root is a minimum."""
+        curvature = self.curvature
+        scale = np.sqrt(np.abs(np.diag(curvature)))
+        if not (scale > 0).all():
+            return False
+        values = np.linalg.eigvalsh(curvature / np.outer(scale, scale))
+        return bool(values[0] > np.finfo(float).eps * values[-1])
+
     def newton_step(self) -> NDArray[np.float64]:
         """Change of the coordinates that solves the equation, shape (p,)."""
         step = np.linalg.lstsq(self.curvature, self.scores.sum(axis=0), rcond=1e-14)[0]

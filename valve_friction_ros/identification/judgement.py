@@ -34,7 +34,9 @@ that was published for graphite. Slower records cannot tell F_c from the frictio
 FEWEST_STROKES = 3
 """Strokes below which the scatter between them is not known, and nothing is more than weak."""
 
-_FRICTION = ("viscous_friction", "coulomb_friction", "static_friction")
+_SPRING = ("mass", "spring_constant", "spring_preload", OFFSET)
+"""What is told as well where the model of the friction is doubted."""
+
 _FINEST = 5e-4
 _FINEST_SPRING = 2e-4
 """No interval is narrower than this share of the value, however quiet the record is: smoothing
@@ -86,7 +88,7 @@ def judge_refinement(
             lean = _RECTANGLE * abs(float(gradient @ by_mass))
             width = math.hypot(covariance.half_width(gradient), lean) + bound
             width = max(width, _finest(name, settings) * abs(values[name]))
-            reason = few or (doubt if name in _FRICTION else "")
+            reason = few or ("" if name in _SPRING else doubt)
             judgements[name] = judged(name, values[name], error, width, reason)
     return judgements
 

@@ -27,6 +27,9 @@ _OFFSET_SIGNIFICANCE = 11.0
 _FRICTIONS = ((1.0, 1.0), (0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
 """Factors of F_c and F_v to start from."""
 
+_FALL_SIGNIFICANCE = 3.0
+"""The same for a falling friction, which has halved the misfit before it is asked."""
+
 _SUSPICION = 1.8
 """Standard errors of the score test from which on a part of the model is tried."""
 
@@ -311,5 +314,7 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
         return best
     falling = refine(problem, nearest, names)
     improved = misfit_of(falling).systematic < _IMPROVEMENT * before.systematic
-    sure = _is_slip(falling) and deviation(falling, "stribeck_velocity") > SIGNIFICANCE
-    return falling if improved and sure else best
+    parts = (SLIP, "stribeck_velocity")
+    told = all(deviation(falling, name) > _FALL_SIGNIFICANCE for name in parts)
+    worth = falling.coordinates[SLIP] > _least(falling, SLIP)
+    return falling if improved and told and worth else best

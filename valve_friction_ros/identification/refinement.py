@@ -125,8 +125,8 @@ def _instrumented(
     """Solve the instrumented equation from the least-squares fit, and stay there if it fails.
 
     In a record of few strokes a single stick event can go one way under one half of the pressure
-    and another under the other half, or throw Newton's method off. The fit with its small bias
-    is then the better answer.
+    and another under the other half, throw Newton's method off, or leave an equation without a
+    minimum. The fit with its small bias is then the better answer.
     """
     record = problem.record
     allowed = _LARGEST_GROWTH * float(np.linalg.norm(problem.residual(fitted, record.pressure)))
@@ -140,6 +140,8 @@ def _instrumented(
         if not is_near(at):
             return fitted, _plain_equation(problem, fitted, units)
         equation = estimating_equation(problem, at, units)
+        if not equation.is_definite:
+            return fitted, _plain_equation(problem, fitted, units)
         step = equation.newton_step()
         largest = float(np.max(np.abs(step)))
         if largest < _CONVERGED or 0.5 * previous < largest < _JITTER:

@@ -106,12 +106,10 @@ def block_covariance(equation: EstimatingEquation, block: int) -> Covariance:
     free = one.shape[1]
     ends = _block_ends(one.shape[0], block)
     blocks = ends.size
+    if blocks <= free or not equation.is_definite:
+        return _unknown(free)
     scale = np.sqrt(np.abs(np.diag(equation.curvature)))
-    if blocks <= free or not (scale > 0).all():
-        return _unknown(free)
     values, vectors = np.linalg.eigh(equation.curvature / np.outer(scale, scale))
-    if not values[0] > np.finfo(float).eps * values[-1]:
-        return _unknown(free)
     root = (vectors / np.sqrt(values)) @ vectors.T
     sums = np.add.reduceat(equation.scores, ends) / scale @ root
     mixed = [
