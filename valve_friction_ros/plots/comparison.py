@@ -51,7 +51,8 @@ class Comparison(NamedTuple):
         size = 2 * residual.size
         spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
         products = np.fft.irfft(spectrum, size)[:lags]
-        return products / products[0] if products[0] > 0 else np.zeros_like(products)
+        power = float(products[0])
+        return np.asarray(products / power) if power > 0 else np.zeros(products.size)
 
 
 @singledispatch

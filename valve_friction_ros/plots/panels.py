@@ -59,9 +59,7 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
 def draw_pressure(axes: Axes, recording: Recording, drive: DriveScale, colour: str) -> None:
     """Draw the pressure over the time since the record began."""
     some = thinned(len(recording))
-    axes.plot(
-        recording.time[some], recording.pressure[some] / drive.pascals, color=colour, lw=1.2
-    )
+    axes.plot(recording.time[some], recording.pressure[some] / drive.pascals, color=colour, lw=1.2)
     axes.set_ylabel(drive.label)
 
 

@@ -6,7 +6,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import ForceBalanceAssessment, Sweep, SweepAssessment
+from valve_friction_ros.identification import (
+    Assessment,
+    ForceBalanceAssessment,
+    Sweep,
+    SweepAssessment,
+)
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.plots.case import PRESSURE, Case, DriveScale
 from valve_friction_ros.plots.comparison import Comparison
@@ -16,7 +21,6 @@ from valve_friction_ros.plots.panels import (
     draw_coulomb_sweep,
     draw_pressure,
     draw_sigma_sweep,
-    draw_signature,
     thinned,
 )
 from valve_friction_ros.plots.signature_figure import draw_signature_loop
@@ -63,7 +67,7 @@ def record_figure(recording: Recording, drive: DriveScale = PRESSURE) -> Figure:
 def signature_loop_figure(
     recording: Recording,
     valve: Valve,
-    assessment: SweepAssessment | ForceBalanceAssessment,
+    assessment: Assessment,
     drive: DriveScale = PRESSURE,
 ) -> Figure:
     """Draw stem position over pressure; by the force balance with P1, P2 and the sliding lines."""
@@ -72,8 +76,11 @@ def signature_loop_figure(
     if isinstance(assessment, ForceBalanceAssessment):
         draw_signature_loop(axes, recording, valve, assessment.signature, drive)
     else:
-        draw_signature(axes, [Case.of("recording", recording, assessment, drive)])
-        axes.set_title("")
+        some = thinned(len(recording))
+        pressure = recording.pressure[some] / drive.pascals
+        axes.plot(pressure, recording.position[some] * 1e3, color=COLOURS[0], lw=1.0)
+        axes.set_xlabel(drive.label)
+        axes.set_ylabel("stem [mm]")
     dress((axes,))
     return figure
 
