@@ -35,7 +35,7 @@ class Comparison(NamedTuple):
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of each sample since the first one, s, shape (m,)."""
-        return np.arange(self.measured.size) * self.sample_period
+        return np.arange(self.measured.size, dtype=np.float64) * self.sample_period
 
     @property
     def residual(self) -> NDArray[np.float64]:
@@ -52,7 +52,7 @@ class Comparison(NamedTuple):
         spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
         products = np.fft.irfft(spectrum, size)[:lags]
         power = float(products[0])
-        return np.asarray(products / power) if power > 0 else np.zeros(products.size)
+        return np.asarray(products / (power or 1.0), dtype=np.float64)
 
 
 @singledispatch

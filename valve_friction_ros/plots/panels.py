@@ -115,6 +115,7 @@ def draw_coulomb_sweep(axes: Axes, cases: Sequence[Case]) -> None:
             xytext=(0, 5),
             textcoords="offset points",
             ha="right",
+            bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1},
         )
         levels += [chosen, shown]
     if max(levels) > 0:

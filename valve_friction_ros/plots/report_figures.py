@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification import (
@@ -38,8 +39,6 @@ __all__ = [
 _WIDTH = 7.1
 """Between the margins of an A4 page, inches."""
 
-_LOOP_WIDTH = 5.2
-
 SETTLED_SHARE = 0.1
 """Share by which σ_s in the chosen region differs from that of the choice, at most."""
 
@@ -47,13 +46,13 @@ _LAGS = 200
 _BINS = 60
 
 
-def _paper_figure(height: float, width: float = _WIDTH) -> Figure:
-    return Figure(figsize=(width, height), layout="constrained", dpi=150)
+def _paper_figure(height: float) -> Figure:
+    return Figure(figsize=(_WIDTH, height), layout="constrained")
 
 
 def record_figure(recording: Recording, drive: DriveScale = PRESSURE) -> Figure:
     """Draw pressure and measured stem position over the time."""
-    figure = _paper_figure(3.4)
+    figure = _paper_figure(2.9)
     pressure, stem = figure.subplots(2, 1, sharex=True)
     some = thinned(len(recording))
     draw_pressure(pressure, recording, drive, COLOURS[0])
@@ -71,7 +70,7 @@ def signature_loop_figure(
     drive: DriveScale = PRESSURE,
 ) -> Figure:
     """Draw stem position over pressure; by the force balance with P1, P2 and the sliding lines."""
-    figure = _paper_figure(4.0, _LOOP_WIDTH)
+    figure = _paper_figure(3.4)
     axes = figure.subplots()
     if isinstance(assessment, ForceBalanceAssessment):
         draw_signature_loop(axes, recording, valve, assessment.signature, drive)
@@ -102,12 +101,15 @@ def sweep_figure(
 ) -> Figure:
     """Draw F_c, σ_s and R²_s over the threshold δv, the chosen region shaded."""
     case = Case.of("recording", recording, assessment, drive)
-    figure = _paper_figure(4.9)
+    figure = _paper_figure(4.5)
     coulomb, sigma, r_squared = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
     draw_coulomb_sweep(coulomb, [case])
     coulomb.set_title("● published choice, dashed: refined, with its 95 % band", fontsize="medium")
     draw_sigma_sweep(sigma, [case])
     sigma.set_xlabel("")
+    sigma.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    sigma.yaxis.set_major_formatter("{x:g}")
+    sigma.yaxis.set_minor_formatter(NullFormatter())
     r_squared.plot(case.thresholds, assessment.sweep.r_squared, color=COLOURS[0], lw=1.2)
     r_squared.axvline(case.threshold, color=COLOURS[0], ls=":", lw=1.2)
     r_squared.set_ylabel("$R^2_s$ [-]")
@@ -136,16 +138,16 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 def residual_figure(comparison: Comparison) -> Figure:
     """Draw the residual over the time, its histogram, and its autocorrelation."""
-    figure = _paper_figure(4.4)
+    figure = _paper_figure(4.0)
     panels = figure.subplot_mosaic([["time", "time"], ["histogram", "correlation"]])
     residual = comparison.residual * 1e6
     some = thinned(residual.size)
     panels["time"].plot(comparison.time[some], residual[some], color=COLOURS[1], lw=0.8)
     panels["time"].axhline(0, color="black", lw=0.8)
-    panels["time"].set_ylabel("simulated − measured [µm]")
+    panels["time"].set_ylabel("residual [µm]")
     panels["time"].set_xlabel("time [s]")
     panels["histogram"].hist(residual, bins=_BINS, color=COLOURS[1])
-    panels["histogram"].set_xlabel("simulated − measured [µm]")
+    panels["histogram"].set_xlabel("residual [µm]")
     panels["histogram"].set_ylabel("samples")
     correlation = comparison.autocorrelation(min(_LAGS, residual.size))
     lags = np.arange(correlation.size) * comparison.sample_period

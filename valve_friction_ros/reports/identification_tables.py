@@ -36,48 +36,57 @@ _WORDS = {
 }
 
 _NOTHING = "–"
+_WHOLE = 1e4
+"""Numbers from here on are written as whole ones."""
+
 _SINCE_1970 = 1e9
 """Start times beyond this, s, are taken for a clock that counts from 1970."""
 
 
 def _number(value: float) -> str:
-    return f"{value:.5g}" if math.isfinite(value) else _NOTHING
+    """Write five digits or more, without an exponent where one can do without."""
+    if not math.isfinite(value):
+        return _NOTHING
+    return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
 
 
 def _interval(parameter: AssessedParameter) -> str:
     if math.isnan(parameter.value) or parameter.verdict is Verdict.FIXED:
         return _NOTHING
-    low, high = parameter.interval
-    return f"{low:.5g} to {high:.5g}"
+    return " to ".join(map(_number, parameter.interval))
+
+
+def _judged(parameter: AssessedParameter) -> str:
+    return ": ".join(filter(None, (parameter.verdict.value, parameter.reason)))
 
 
 def parameter_table(record: IdentifiedRecord) -> Table:
-    """Return each parameter with its interval, verdict and reason, and its published value."""
-    published = record.assessment.published
-    beside = {} if published is None else published.values
-    rows = tuple(
-        (
-            _WORDS.get(name, name.replace("_", " ")),
-            _number(one.value),
-            _interval(one),
-            ASSESSED_UNITS[name],
-            one.verdict.value,
-            one.reason,
-            _number(beside.get(name, math.nan)),
-        )
-        for name, one in record.assessment.parameters.items()
-    )
-    columns = (
+    """Return each parameter with interval and verdict, and its published value if there is one."""
+    parameters, published = record.assessment.parameters, record.assessment.published
+    columns = [
         Column("parameter"),
         Column("value", is_number=True),
         Column("95 % interval", is_number=True),
-        Column("unit"),
         Column("verdict"),
-        Column("reason"),
-        Column("published method", is_number=True),
+    ]
+    rows = [
+        (
+            f"{_WORDS.get(name, name.replace('_', ' '))} [{ASSESSED_UNITS[name]}]",
+            _number(one.value),
+            _interval(one),
+            _judged(one),
+        )
+        for name, one in parameters.items()
+    ]
+    marked = (list(parameters).index("coulomb_friction"),)
+    if published is None:
+        return Table(tuple(columns), tuple(rows), marked=marked)
+    beside = (_number(published.values.get(name, math.nan)) for name in parameters)
+    return Table(
+        (*columns, Column("published method", is_number=True)),
+        tuple((*row, value) for row, value in zip(rows, beside, strict=True)),
+        marked=marked,
     )
-    places = {name: place for place, name in enumerate(record.assessment.parameters)}
-    return Table(columns, rows, marked=(places["coulomb_friction"],))
 
 
 def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
@@ -138,7 +147,7 @@ def record_table(record: IdentifiedRecord) -> Table:
         (drive.label, f"{pressure.min():.5g} to {pressure.max():.5g}"),
         ("stem [mm]", f"{position.min():.4g} to {position.max():.4g}"),
     ]
-    return _pairs(rows, "record", "")
+    return _pairs(rows, "record", "extent")
 
 
 def settings_table(record: IdentifiedRecord) -> Table:

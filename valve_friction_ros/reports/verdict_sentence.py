@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification import AssessedParameter, Verdict
 from valve_friction_ros.monitoring import StatusSignal, dead_band, percentage
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
@@ -16,6 +16,7 @@ class _Finding(NamedTuple):
 
 
 _AGAIN = "identify it again from a longer record with more strokes before anything is done"
+_CHECK = "check the sensors and their mounting, then identify it again"
 
 _ALARMS = {
     StatusSignal.FAILURE: _Finding(
@@ -57,17 +58,18 @@ def verdict_sentence(record: IdentifiedRecord) -> str:
 def _found(record: IdentifiedRecord) -> _Finding:
     friction, diagnosis = record.assessment.parameters["coulomb_friction"], record.diagnosis
     if diagnosis.ratio is None:
-        given = friction.verdict is Verdict.FIXED
-        sure = "given, not identified" if given else f"95 % sure, {friction.verdict.value}"
-        size = f"{friction.value:.4g}" + ("" if given else f" ± {friction.half_width:.2g}")
+        size = f"{friction.value:.4g}"
+        if friction.verdict is not Verdict.FIXED:
+            size += f" ± {friction.half_width:.2g}"
         return _Finding(
-            f"the friction is {size} N ({sure})",
+            f"the friction is {size} N{_sureness(friction)}",
             "whether it has grown cannot be said without a baseline, the friction of the healthy "
             "valve",
         )
-    low, high = f"{diagnosis.ratio.low:.2f}", f"{diagnosis.ratio.high:.2f}"
-    ratio = f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % sure: {low} to "
-    ratio += f"{high})"
+    ratio = (
+        f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % sure: "
+        f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
+    )
     if diagnosis.status_signal in _ALARMS:
         alarm = _ALARMS[diagnosis.status_signal]
         return _Finding(alarm.what.format(ratio=ratio), alarm.advice)
@@ -75,7 +77,18 @@ def _found(record: IdentifiedRecord) -> _Finding:
         return _Finding(f"the friction has perhaps grown, {ratio}", _AGAIN)
     if diagnosis.ratio.value <= record.limits.low_ratio:
         return _Finding(f"the friction has perhaps collapsed, {ratio}", _AGAIN)
-    return _Finding(f"the friction is normal, {ratio}", "nothing needs to be done")
+    advice = _CHECK if _doubt(record) else "nothing needs to be done"
+    return _Finding(f"the friction is normal, {ratio}", advice)
+
+
+def _sureness(friction: AssessedParameter) -> str:
+    """Say what stands behind the number, unless it is identified."""
+    words = {
+        Verdict.IDENTIFIED: "",
+        Verdict.WEAK: f", a weak estimate ({friction.reason})",
+        Verdict.FIXED: ", which was given and not identified",
+    }
+    return words[friction.verdict]
 
 
 def _doubt(record: IdentifiedRecord) -> str:
