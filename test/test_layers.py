@@ -20,7 +20,7 @@ MAY_IMPORT = {
     "reports": {"plots", "monitoring", "identification", "model"},
     "plots": {"monitoring", "identification", "model"},
     "fleet": {"monitoring", "identification", "model"},
-    "nodes": {"monitoring", "identification", "model"},
+    "nodes": {"reports", "monitoring", "identification", "model"},
 }
 ROS_ROOMS = {"nodes", "commands"}
 CORE = ["model", "identification", "monitoring", "fleet"]

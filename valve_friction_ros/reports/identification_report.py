@@ -33,6 +33,7 @@ _VERDICTS = (
     "against it. Weak: it is wider, or there is another reason, which is told. Not identifiable: "
     "the record holds nothing of it, and no number is shown. Fixed: it was given."
 )
+_FRICTION = "Friction against its baseline"
 _NO_STEM = (
     "Without a spring, or without an identifiable one, nothing calls the stem back, so that it "
     "cannot be simulated: there is no comparison, and no residual."
@@ -84,8 +85,8 @@ def _friction(record: IdentifiedRecord) -> Section:
             "There is no baseline, so that nothing can be said of excess friction. It is the "
             "Coulomb friction of this valve when it was healthy."
         )
-        return Section("Friction against its baseline", (none, table))
-    return Section("Friction against its baseline", (table,))
+        return Section(_FRICTION, (none, table))
+    return Section(_FRICTION, (table,))
 
 
 def _record(record: IdentifiedRecord) -> Section:
