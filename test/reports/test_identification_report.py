@@ -63,6 +63,8 @@ def test_the_time_of_a_record_is_told_where_its_clock_is_that_of_the_world(ident
     told = rows(dataclasses.replace(identified, recording=dated), "Record")
     assert told["began"] == ("2023-11-14 22:13:20 UTC",)
     assert "began" not in rows(identified, "Record")
+    mistaken = dataclasses.replace(identified.recording, start_time=1.7e18)
+    assert "began" not in rows(dataclasses.replace(identified, recording=mistaken), "Record")
 
 
 def test_notes_of_the_record_come_before_those_of_the_estimate(identified):

@@ -42,6 +42,9 @@ _WIDTH = 7.1
 SETTLED_SHARE = 0.1
 """Share by which σ_s in the chosen region differs from that of the choice, at most."""
 
+_PALE = "#8CC5E8"
+"""Lets what is drawn upon it be seen."""
+
 _LAGS = 200
 _BINS = 60
 
@@ -127,8 +130,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
     axes = figure.subplots()
     some = thinned(comparison.measured.size)
     time = comparison.time[some]
-    axes.plot(time, comparison.measured[some] * 1e3, color=COLOURS[0], lw=2.0, label="measured")
-    axes.plot(time, comparison.simulated[some] * 1e3, "k:", lw=1.3, label="simulated")
+    axes.plot(time, comparison.measured[some] * 1e3, color=_PALE, lw=3.0, label="measured")
+    axes.plot(time, comparison.simulated[some] * 1e3, "k:", lw=1.2, label="simulated")
     axes.set_ylabel("stem [mm]")
     axes.set_xlabel("time [s]")
     figure.legend(loc="outside upper right", ncols=2, frameon=False)

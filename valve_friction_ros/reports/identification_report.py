@@ -20,7 +20,6 @@ from valve_friction_ros.reports.identification_tables import (
     parameter_table,
     record_table,
     settings_table,
-    version_table,
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
@@ -75,7 +74,7 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     notes = (*record.notes, *assessment.all_warnings)
     if notes:
         yield Section("Notes", tuple(Paragraph(f"{note}.") for note in notes))
-    yield Section("Settings and versions", (settings_table(record), version_table()))
+    yield Section("Settings and versions", (settings_table(record),))
 
 
 def _friction(record: IdentifiedRecord) -> Section:

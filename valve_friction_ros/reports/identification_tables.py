@@ -20,7 +20,6 @@ __all__ = [
     "parameter_table",
     "record_table",
     "settings_table",
-    "version_table",
 ]
 
 _WORDS = {
@@ -39,8 +38,8 @@ _NOTHING = "–"
 _WHOLE = 1e4
 """Numbers from here on are written as whole ones."""
 
-_SINCE_1970 = 1e9
-"""Start times beyond this, s, are taken for a clock that counts from 1970."""
+_DATED = (1e9, 1e11)
+"""Start times between these, s, are taken for a clock that counts from 1970."""
 
 
 def _number(value: float) -> str:
@@ -138,7 +137,7 @@ def record_table(record: IdentifiedRecord) -> Table:
     recording, drive = record.recording, record.drive
     pressure, position = recording.pressure / drive.pascals, recording.position * 1e3
     rows = [("source", record.source)]
-    if recording.start_time > _SINCE_1970:
+    if _DATED[0] < recording.start_time < _DATED[1]:
         began = datetime.fromtimestamp(recording.start_time, timezone.utc)
         rows.append(("began", f"{began:%Y-%m-%d %H:%M:%S} UTC"))
     rows += [
@@ -151,7 +150,7 @@ def record_table(record: IdentifiedRecord) -> Table:
 
 
 def settings_table(record: IdentifiedRecord) -> Table:
-    """Return with what settings and what valve the record was identified."""
+    """Return with what settings, valve and software the record was identified."""
     settings, valve, assessment = record.settings, record.valve, record.assessment
     fixed = ", ".join(f"{name} = {value:g}" for name, value in settings.fixed.items())
     window = record.derivative_window
@@ -182,18 +181,19 @@ def settings_table(record: IdentifiedRecord) -> Table:
             "travel",
             f"{valve.travel * 1e3:g} mm" if math.isfinite(valve.travel) else "without stops",
         ),
+        ("software", _versions()),
     ]
     return _pairs(rows, "setting", "value")
 
 
-def version_table() -> Table:
-    """Return the versions of the software that the numbers depend on."""
-    rows = [
-        ("valve_friction_ros", valve_friction_ros.__version__),
-        ("numpy", np.__version__),
-        ("scipy", scipy.__version__),
-        ("numba", numba.__version__),
-        ("matplotlib", matplotlib.__version__),
-        ("Python", platform.python_version()),
-    ]
-    return _pairs(rows, "software", "version")
+def _versions() -> str:
+    """Name the versions of the software that the numbers depend on."""
+    versions = {
+        "valve_friction_ros": valve_friction_ros.__version__,
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+        "matplotlib": matplotlib.__version__,
+        "Python": platform.python_version(),
+    }
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
