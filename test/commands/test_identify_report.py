@@ -125,7 +125,7 @@ def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
     )
     assert page.lead.endswith(": plan work on the packing for the next stop.")
     told = page.table("friction")
-    assert told["diagnosis, as on /diagnostics"] == (diagnosis["message"],)
+    assert told["diagnosis"] == (diagnosis["message"],)
     assert told["friction of the healthy valve (baseline)"] == ("100 ± 2 N",)
 
 
@@ -214,7 +214,7 @@ def test_a_refused_record_has_no_report(call, write_csv, columns_of, quick_recor
 
 @pytest.mark.skipif(not BROWSERS, reason="no browser is installed: apt install chromium")
 def test_a_browser_shows_and_prints_it(reported, quick_csv, tmp_path):
-    """Each picture of the page is one of the printed pages."""
+    """A browser draws every picture of the page, on the screen and on paper."""
     page, _ = reported(quick_csv, *BASELINE)
     report = tmp_path / "report.html"
     dump = run_browser(tmp_path, "--dump-dom", report)

@@ -127,7 +127,7 @@ def friction_table(record: IdentifiedRecord) -> Table:
     signal = diagnosis.status_signal.value
     rows += [
         ("level", diagnosis.level.name + (f", NE 107 status signal {signal}" if signal else "")),
-        ("diagnosis, as on /diagnostics", diagnosis.message),
+        ("diagnosis", diagnosis.message),
     ]
     return _pairs(rows, "friction", "finding")
 
