@@ -77,8 +77,11 @@ class Reporting:
             # Costs memory and time at the start, and most nodes never report.
             from valve_friction_ros import reports  # noqa: PLC0415
 
-            page = reports.identification_report(
-                reports.IdentifiedRecord(
+            try:
+                folder = Path(told).expanduser() if told else data_folder() / "reports"
+                folder.mkdir(parents=True, exist_ok=True)
+                path = _free_name(folder, name)
+                record = reports.IdentifiedRecord(
                     name=valve,
                     source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
                     recording=last.job.snapshot.recording(),
@@ -90,12 +93,7 @@ class Reporting:
                     limits=limits,
                     notes=() if refusal is None else (f"a later record was refused: {refusal}",),
                 )
-            )
-            try:
-                folder = Path(told).expanduser() if told else data_folder() / "reports"
-                folder.mkdir(parents=True, exist_ok=True)
-                path = _free_name(folder, name)
-                reports.write_report(page, path)
+                reports.write_report(reports.identification_report(record), path)
             except OSError as error:
                 cause = error.strerror or error
                 raise RefusalError(f"cannot write a report into {folder}: {cause}") from None
