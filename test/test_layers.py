@@ -17,9 +17,10 @@ MAY_IMPORT = {
     "model": set(),
     "identification": {"model"},
     "monitoring": {"identification", "model"},
+    "reports": {"plots", "monitoring", "identification", "model"},
     "plots": {"monitoring", "identification", "model"},
     "fleet": {"monitoring", "identification", "model"},
-    "nodes": {"monitoring", "identification", "model"},
+    "nodes": {"reports", "monitoring", "identification", "model"},
 }
 ROS_ROOMS = {"nodes", "commands"}
 CORE = ["model", "identification", "monitoring", "fleet"]

@@ -8,6 +8,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 from bags import PRESSURE, messages_of, storage_file, write_bag
+from pages import PageReader
 
 from valve_friction_ros.commands.identify_recording import main
 from valve_friction_ros.model import Recording
@@ -161,6 +162,20 @@ class TestSeveralValves:
         picture = tmp_path / "one.png"
         assert call(fleet, "--valve-name", "fv_101", "--plot", picture)[0] == 0
         assert picture.read_bytes().startswith(b"\x89PNG")
+
+    def test_a_report_is_of_one(self, call, fleet, tmp_path):
+        report = tmp_path / "one.html"
+        which = "one valve: choose one of /fv_101, /fv_102, /fv_103 by --valve-name\n"
+        for options, purpose in (
+            (["--report", report], "--report is of"),
+            (["--baseline-coulomb-friction", "150"], "--baseline-coulomb-friction is of"),
+        ):
+            assert call(fleet, *options) == (2, "", f"identify_recording: {purpose} {which}")
+        assert not report.exists()
+        assert call(fleet, "--valve-name", "fv_101", "--report", report)[0] == 0
+        page = PageReader(report.read_text(encoding="utf-8"))
+        assert page.said("h1") == ["Friction of fv_101"]
+        assert page.table("record")["source"] == (f"{fleet}, /fv_101",)
 
 
 class TestNoRecording:

@@ -18,7 +18,7 @@ from valve_friction_ros.identification import (
     Verdict,
 )
 from valve_friction_ros.model import Valve
-from valve_friction_ros.monitoring import percentage
+from valve_friction_ros.monitoring import Diagnosis, percentage
 
 __all__ = ["as_json", "print_table"]
 
@@ -42,9 +42,28 @@ def _published(assessment: Assessment, name: str) -> float:
     return math.nan if estimate is None else estimate.values.get(name, math.nan)
 
 
-def as_json(assessment: Assessment, notes: Sequence[str] = ()) -> dict[str, Any]:
-    """Build the object that JSON shows of an assessment; `notes` join its warnings."""
+def _diagnosis_as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    ratio = diagnosis.ratio
+    return {
+        "level": diagnosis.level.name,
+        "ne_107": diagnosis.status_signal.value,
+        "message": diagnosis.message,
+        "ratio": None if ratio is None else json_number(ratio.value),
+        "ratio_interval": None
+        if ratio is None
+        else [json_number(ratio.low), json_number(ratio.high)],
+    }
+
+
+def as_json(
+    assessment: Assessment, notes: Sequence[str] = (), diagnosis: Diagnosis | None = None
+) -> dict[str, Any]:
+    """Build the object that JSON shows of an assessment.
+
+    `notes` join its warnings; `diagnosis` is there when there is one.
+    """
     misfit = assessment.misfit
+    told = {} if diagnosis is None else {"diagnosis": _diagnosis_as_json(diagnosis)}
     return {
         "method": assessment.method,
         "parameters": {
@@ -57,7 +76,8 @@ def as_json(assessment: Assessment, notes: Sequence[str] = ()) -> dict[str, Any]
         "rms": json_number(assessment.rms),
         "systematic_misfit": None if misfit is None else misfit.systematic,
         "model_describes": None if misfit is None else misfit.describes,
-        "warnings": [*notes, *_warnings(assessment)],
+        "warnings": [*notes, *assessment.all_warnings],
+        **told,
     }
 
 
@@ -94,15 +114,13 @@ def _(assessment: ForceBalanceAssessment) -> dict[str, Any]:
     }
 
 
-def _warnings(assessment: Assessment) -> list[str]:
-    """Warnings of the assessment, and of the published estimate beside it, each once."""
-    published = () if assessment.published is None else assessment.published.warnings
-    notes = (f"published estimate: {warning}" for warning in published)
-    return list(dict.fromkeys((*assessment.warnings, *notes)))
-
-
-def print_table(assessment: Assessment, valve: Valve, notes: Sequence[str] = ()) -> None:
-    """Print an assessment for people; `notes` join its warnings."""
+def print_table(
+    assessment: Assessment,
+    valve: Valve,
+    notes: Sequence[str] = (),
+    diagnosis: Diagnosis | None = None,
+) -> None:
+    """Print an assessment for people; `notes` join its warnings, and a `diagnosis` ends it."""
     table = Table(
         "parameter",
         "value",
@@ -133,8 +151,10 @@ def print_table(assessment: Assessment, valve: Valve, notes: Sequence[str] = ())
             console.print(f"{parameter.name} {parameter.verdict.value}: {parameter.reason}")
     for line in _summary(assessment, valve):
         console.print(line)
-    for warning in (*notes, *_warnings(assessment)):
+    for warning in (*notes, *assessment.all_warnings):
         console.print(f"note: {warning}")
+    if diagnosis is not None:
+        console.print(f"{diagnosis.level.name}: {diagnosis.message}")
 
 
 def _distance(rms: float, valve: Valve) -> str:

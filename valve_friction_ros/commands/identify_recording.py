@@ -4,7 +4,6 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from valve_friction_ros.commands.assessment_output import as_json, print_table
@@ -13,8 +12,12 @@ from valve_friction_ros.commands.identification_arguments import (
     add_identification_arguments,
     identification_settings,
 )
+from valve_friction_ros.commands.identification_files import (
+    add_file_arguments,
+    baseline_from,
+    identification_files,
+)
 from valve_friction_ros.commands.recording_arguments import (
-    DIRECT_DRIVE,
     add_recording_arguments,
     described_valve,
     reading_options,
@@ -28,6 +31,7 @@ from valve_friction_ros.identification import (
     RefusalError,
 )
 from valve_friction_ros.model import Valve
+from valve_friction_ros.monitoring import Diagnosis, diagnose
 from valve_friction_ros.monitoring.recorded_valve import RecordedValve
 from valve_friction_ros.monitoring.recordings import read_recordings
 
@@ -38,10 +42,11 @@ _EXIT_REFUSED = 2
 
 
 class _Result(NamedTuple):
-    """A valve of the file, and what came of it."""
+    """A valve of the file, what came of it, and its diagnosis where it has a baseline."""
 
     recorded: RecordedValve
     outcome: Assessment | RefusalError
+    diagnosis: Diagnosis | None = None
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -53,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the identification")
+    add_file_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser
 
@@ -77,29 +82,26 @@ def _identified(
 
 
 def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:
-    """Read and identify the valves of the file, and draw the one that is to be drawn."""
+    """Read and identify the valves of the file, and write the files that are to be written."""
     reading = reading_options(options)
     description = described_valve(options, reading)
     settings = identification_settings(options, description.known)
     method = METHODS[options.method]
-    if options.plot is not None:
-        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
-
-        plots.require_picture_file(options.plot)
-    recorded = read_recordings(options.file, description.valve, reading)
-    if options.plot is not None:
-        require_one(recorded, "--plot draws")
-    results = [
-        _Result(each, _identified(each, description.valve, method, settings, options.window))
-        for each in recorded
-    ]
-    if options.plot is not None and isinstance(results[0].outcome, Assessment):
-        drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
-        figure = plots.identification_figure(
-            recorded[0].recording(), description.valve, results[0].outcome, drive
-        )
-        figure.savefig(options.plot)
-    return description.valve, results
+    baseline, files = baseline_from(options), identification_files(options)
+    valve = description.valve
+    recorded = read_recordings(options.file, valve, reading)
+    files.require_one_valve(recorded)
+    if baseline is not None:
+        require_one(recorded, "--baseline-coulomb-friction is of")
+    results = []
+    for each in recorded:
+        outcome = _identified(each, valve, method, settings, options.window)
+        diagnosis = None
+        if isinstance(outcome, Assessment):
+            files.write(each, description, outcome, settings, options.window, baseline)
+            diagnosis = diagnose(outcome, valve, baseline) if baseline is not None else None
+        results.append(_Result(each, outcome, diagnosis))
+    return valve, results
 
 
 def _print_json(results: Sequence[_Result]) -> None:
@@ -107,19 +109,22 @@ def _print_json(results: Sequence[_Result]) -> None:
     answers = {
         recorded.name: {"error": str(outcome)}
         if isinstance(outcome, RefusalError)
-        else as_json(outcome, recorded.notes)
-        for recorded, outcome in results
+        else as_json(outcome, recorded.notes, diagnosis)
+        for recorded, outcome, diagnosis in results
     }
     answer = {"valves": answers} if len(results) > 1 else next(iter(answers.values()))
     print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
 
 
 def _print_tables(results: Sequence[_Result], valve: Valve) -> None:
-    good = [(recorded, outcome) for recorded, outcome in results if isinstance(outcome, Assessment)]
-    for number, (recorded, outcome) in enumerate(good):
+    printed = 0
+    for recorded, outcome, diagnosis in results:
+        if isinstance(outcome, RefusalError):
+            continue
         if len(results) > 1:
-            print("\n" * (number > 0) + recorded.name)
-        print_table(outcome, valve, recorded.notes)
+            print("\n" * (printed > 0) + recorded.name)
+        print_table(outcome, valve, recorded.notes, diagnosis)
+        printed += 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

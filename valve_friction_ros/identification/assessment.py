@@ -61,6 +61,13 @@ class Assessment(ABC):
         return {name: one.value for name, one in self.parameters.items()}
 
     @property
+    def all_warnings(self) -> tuple[str, ...]:
+        """The warnings, and those of the published estimate beside it, each once."""
+        published = () if self.published is None else self.published.warnings
+        notes = (f"published estimate: {warning}" for warning in published)
+        return tuple(dict.fromkeys((*self.warnings, *notes)))
+
+    @property
     @abstractmethod
     def fit(self) -> float:
         """Share of what was measured that the model reproduces, at most 1."""

@@ -27,6 +27,7 @@ from valve_friction_ros.nodes.identifier_parameters import (
 from valve_friction_ros.nodes.keeping import Job, Keeping
 from valve_friction_ros.nodes.late_answers import create_service_with_late_answers
 from valve_friction_ros.nodes.parameters import declare_parameters, reject_invalid, values_of
+from valve_friction_ros.nodes.reporting import Reporting
 from valve_friction_ros.nodes.results import ResultTopics
 from valve_friction_ros.nodes.running import run_nodes
 from valve_friction_ros.nodes.saving import saving
@@ -72,6 +73,7 @@ class Identifier(Node):
         super().__init__("identifier", namespace=namespace)
         declare_parameters(self, (*CHANGEABLE, *FIXED_AT_START, JOINT))
         self._monitor = FrictionMonitor(monitor_settings(values_of(self, CHANGEABLE)))
+        self._reporting = Reporting(self, self._monitor)
         reject_invalid(self, CHANGEABLE, monitor_settings)
         self._worker = worker
         self._results = ResultTopics(self)
@@ -87,6 +89,7 @@ class Identifier(Node):
         self._keeping.begin()
         create_service_with_late_answers(self, Trigger, "~/identify", self._identify)
         create_service_with_late_answers(self, Trigger, "~/save", self._save)
+        create_service_with_late_answers(self, Trigger, "~/report", self._report)
         create_service_with_late_answers(self, Trigger, "~/set_baseline", self._set_baseline)
         self.create_service(Trigger, "~/clear", self._clear)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
@@ -166,7 +169,7 @@ class Identifier(Node):
         self._identifying = False
         response = Trigger.Response()
         try:
-            self._accept(done.result())
+            self._accept(done.result(), job)
         except RefusalError as refusal:
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
@@ -186,15 +189,17 @@ class Identifier(Node):
         """Take over a success; a record that cannot be identified leaves everything as it is."""
         self._identifying = False
         try:
-            self._accept(done.result())
+            self._accept(done.result(), job)
         except RefusalError as refusal:
             self._schedule.skip(str(refusal))
         else:
             self._schedule.succeed()
             self._keeping.keep(job, self._publish_diagnostics)
 
-    def _accept(self, assessment: Assessment) -> None:
-        self._monitor.accept(assessment, self.get_clock().now().nanoseconds)
+    def _accept(self, assessment: Assessment, job: Job) -> None:
+        now = self.get_clock().now().nanoseconds
+        self._monitor.accept(assessment, now)
+        self._reporting.remember(job, assessment, now)
         self._results.publish(assessment, self._monitor)
 
     def _save(self, _: Trigger.Request, __: Trigger.Response) -> Future:
@@ -211,6 +216,25 @@ class Identifier(Node):
             return Trigger.Response(success=True, message=str(done.result()))
         except RefusalError as refusal:
             self.get_logger().warning(f"the buffer was not saved: {refusal}")
+            return Trigger.Response(message=str(refusal))
+
+    def _report(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> "Trigger.Response | Future":
+        try:
+            writing = self._reporting.writing()
+        except RefusalError as refusal:
+            response.message = str(refusal)
+            return response
+        answer = Future()
+        self._in_worker(lambda done: answer.set_result(self._reported(done)), writing)
+        return answer
+
+    def _reported(self, done: "ThreadFuture[Path]") -> Trigger.Response:
+        try:
+            return Trigger.Response(success=True, message=str(done.result()))
+        except RefusalError as refusal:
+            self.get_logger().warning(f"no report was written: {refusal}")
             return Trigger.Response(message=str(refusal))
 
     def _set_baseline(

@@ -13,6 +13,7 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.monitoring import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.nodes.keeping import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.parameters import ParameterSpec, optional
+from valve_friction_ros.nodes.reporting import REPORT_FOLDER
 from valve_friction_ros.nodes.saving import SAVE_FOLDER
 from valve_friction_ros.nodes.schedule import PERIOD
 from valve_friction_ros.nodes.valve_parameters import VALVE_PARAMETERS, valve_from
@@ -94,6 +95,7 @@ CHANGEABLE = (
         (0.0, 1.0),
     ),
     SAVE_FOLDER,
+    REPORT_FOLDER,
     HISTORY_DAYS,
     PERIOD,
 )

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification import AssessedParameter
 from valve_friction_ros.model import Recording
-from valve_friction_ros.plots.case import Case
+from valve_friction_ros.plots.case import Case, DriveScale
 
 __all__ = [
     "COLOURS",
     "draw_coulomb_sweep",
+    "draw_pressure",
     "draw_record",
     "draw_sigma_sweep",
     "draw_signature",
@@ -53,6 +54,13 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
     pressure_axes.tick_params(labelbottom=False)
     stem_axes.set_ylabel("stem [mm]")
     stem_axes.set_xlabel("time [s]")
+
+
+def draw_pressure(axes: Axes, recording: Recording, drive: DriveScale, colour: str) -> None:
+    """Draw the pressure over the time since the record began."""
+    some = thinned(len(recording))
+    axes.plot(recording.time[some], recording.pressure[some] / drive.pascals, color=colour, lw=1.2)
+    axes.set_ylabel(drive.label)
 
 
 def draw_stem(axes: Axes, recording: Recording, simulated: NDArray[np.float64]) -> None:
@@ -107,6 +115,7 @@ def draw_coulomb_sweep(axes: Axes, cases: Sequence[Case]) -> None:
             xytext=(0, 5),
             textcoords="offset points",
             ha="right",
+            bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1},
         )
         levels += [chosen, shown]
     if max(levels) > 0:

@@ -12,9 +12,9 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.plots.case import PRESSURE, DriveScale
 from valve_friction_ros.plots.page import dress, titled_figure
-from valve_friction_ros.plots.panels import COLOURS, draw_stem, thinned
+from valve_friction_ros.plots.panels import COLOURS, draw_pressure, draw_stem, thinned
 
-__all__ = ["draw_breakaway_points", "signature_figure"]
+__all__ = ["draw_breakaway_points", "draw_signature_loop", "signature_figure"]
 
 
 def draw_breakaway_points(
@@ -33,6 +33,50 @@ def draw_breakaway_points(
             zorder=4,
             label=label,
         )
+
+
+def draw_signature_loop(
+    axes: Axes,
+    recording: Recording,
+    valve: Valve,
+    signature: ValveSignature,
+    drive: DriveScale = PRESSURE,
+) -> None:
+    """Draw the valve signature with P1 and P2, and the lines of the sliding stem.
+
+    Parameters
+    ----------
+    axes : Axes
+        To draw on.
+    recording : Recording
+        Pressure and stem position.
+    valve : Valve
+        Turns forces into pressures.
+    signature : ValveSignature
+        What was read off the recording.
+    drive : DriveScale
+        How the pressure is shown.
+    """
+    some = thinned(len(recording))
+    pressure = recording.pressure[some] / drive.pascals
+    axes.plot(pressure, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
+    for stroke, colour in zip(_first_of_each_way(signature), COLOURS[1:], strict=False):
+        place = stroke.sliding.position[[0, -1]]
+        level = float(
+            np.mean(stroke.sliding.force - signature.spring_constant * stroke.sliding.position)
+        )
+        line = valve.actuator_pressure(level + signature.spring_constant * place) / drive.pascals
+        label = f"slides {'up' if stroke.direction > 0 else 'down'}, slope $S_a$/k"
+        axes.plot(line, place * 1e3, "--", color=colour, lw=1.6, label=label)
+    draw_breakaway_points(axes, signature, drive)
+    axes.set_xlabel(drive.label)
+    axes.set_ylabel("stem [mm]")
+    width = signature.dead_zone / drive.pascals
+    unit = drive.label.partition("[")[2].rstrip("]")
+    axes.set_title(
+        f"valve signature: dead zone {width:.4g} {unit}, x̄ {signature.position_bias * 1e3:.3g} mm"
+    )
+    axes.legend(loc="upper left", frameon=False)
 
 
 def signature_figure(
@@ -67,11 +111,8 @@ def signature_figure(
         [["pressure"], ["stem"], ["signature"]], height_ratios=[1, 1.2, 2.8]
     )
     panels["stem"].sharex(panels["pressure"])
-    some = thinned(len(recording))
-    time, signature = recording.time, assessment.signature
-    pressure = recording.pressure / drive.pascals
-    panels["pressure"].plot(time[some], pressure[some], color=COLOURS[0], lw=1.2)
-    panels["pressure"].set_ylabel(drive.label)
+    signature = assessment.signature
+    draw_pressure(panels["pressure"], recording, drive, COLOURS[0])
     panels["pressure"].tick_params(labelbottom=False)
     draw_stem(panels["stem"], recording, assessment.simulated)
     points = [stroke.breakaway for stroke in signature.strokes if stroke.breakaway is not None]
@@ -84,25 +125,7 @@ def signature_figure(
         zorder=4,
     )
     panels["stem"].set_title("stem (dotted: model; ●: breakaway)", loc="right", fontsize="small")
-    loop = panels["signature"]
-    loop.plot(pressure[some], recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
-    for stroke, colour in zip(_first_of_each_way(signature), COLOURS[1:], strict=False):
-        place = stroke.sliding.position[[0, -1]]
-        level = float(
-            np.mean(stroke.sliding.force - signature.spring_constant * stroke.sliding.position)
-        )
-        line = valve.actuator_pressure(level + signature.spring_constant * place) / drive.pascals
-        label = f"slides {'up' if stroke.direction > 0 else 'down'}, slope $S_a$/k"
-        loop.plot(line, place * 1e3, "--", color=colour, lw=1.6, label=label)
-    draw_breakaway_points(loop, signature, drive)
-    loop.set_xlabel(drive.label)
-    loop.set_ylabel("stem [mm]")
-    width = signature.dead_zone / drive.pascals
-    unit = drive.label.partition("[")[2].rstrip("]")
-    loop.set_title(
-        f"valve signature: dead zone {width:.4g} {unit}, x̄ {signature.position_bias * 1e3:.3g} mm"
-    )
-    loop.legend(loc="upper left", frameon=False)
+    draw_signature_loop(panels["signature"], recording, valve, signature, drive)
     dress(panels.values())
     return figure
 

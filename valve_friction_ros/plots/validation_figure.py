@@ -9,7 +9,7 @@ from valve_friction_ros.model import Valve
 from valve_friction_ros.monitoring import percentage
 from valve_friction_ros.plots.case import PRESSURE, DriveScale
 from valve_friction_ros.plots.page import dress, titled_figure
-from valve_friction_ros.plots.panels import COLOURS, draw_stem, thinned
+from valve_friction_ros.plots.panels import COLOURS, draw_pressure, draw_stem, thinned
 
 __all__ = ["validation_figure"]
 
@@ -47,10 +47,7 @@ def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = 
     panels["stem"].set_title("stem (dotted: simulated)", loc="right", fontsize="small")
     panels["residual"].plot(time, validation.residual[some] * 1e3, color=COLOURS[1], lw=0.9)
     panels["residual"].set_ylabel("simulated −\nmeasured [mm]")
-    panels["pressure"].plot(
-        time, recording.pressure[some] / drive.pascals, color=COLOURS[2], lw=1.2
-    )
-    panels["pressure"].set_ylabel(drive.label)
+    draw_pressure(panels["pressure"], recording, drive, COLOURS[2])
     for name in ("stem", "residual"):
         panels[name].set_xlabel("")
     panels["pressure"].set_xlabel("time [s]")

@@ -1,0 +1,242 @@
+"""`identify_recording --report`: one page, read as a browser reads it, and shown by one."""
+
+import json
+import math
+import re
+import shutil
+import struct
+import subprocess
+
+import pytest
+from pages import PNG, PageReader
+
+import valve_friction_ros
+from valve_friction_ros.commands.identify_recording import main
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, TriangleWave, simulate
+
+BASELINE = ["--baseline-coulomb-friction", "100", "--baseline-half-width", "2"]
+WORDS = {
+    "mass": "moving mass m [kg]",
+    "viscous_friction": "viscous friction F_v [N·s/m]",
+    "coulomb_friction": "Coulomb friction F_c [N]",
+    "static_friction": "static friction F_s [N]",
+    "spring_constant": "spring constant k [N/m]",
+    "spring_preload": "spring preload F_0 [N]",
+}
+SECTIONS = [
+    "Parameters",
+    "Friction against its baseline",
+    "Record",
+    "Valve signature",
+    "Sweep of the velocity threshold δv",
+    "Measured and simulated position",
+    "Residual",
+    "Notes",
+    "Settings and versions",
+]
+_NAMES = ("chromium", "chromium-browser", "google-chrome")
+BROWSERS = [path for path in map(shutil.which, _NAMES) if path is not None]
+
+
+@pytest.fixture
+def call(capsys):
+    """Function of arguments: exit code, stdout and stderr of the command in this process."""
+
+    def call(*arguments):
+        code = main([str(argument) for argument in arguments])
+        return (code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def quick_csv(write_csv, columns_of, quick_record):
+    return write_csv(columns_of(quick_record))
+
+
+@pytest.fixture
+def reported(call, tmp_path, bench_yaml):
+    """Function of a recording and options: its page, and the JSON that was printed beside it."""
+
+    def reported(path, *options, valve=("--valve", bench_yaml)):
+        page = tmp_path / "report.html"
+        code, out, err = call(path, *valve, *options, "--report", page, "--json")
+        assert (code, err) == (0, "")
+        return PageReader(page.read_text(encoding="utf-8")), json.loads(out)
+
+    return reported
+
+
+def shown(value):
+    """A number as the page shows it."""
+    if value is None:
+        return "–"
+    return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.5g}"
+
+
+def require_parameters(page, answer):
+    """Every parameter stands there as JSON has it, and what is withheld shows no number."""
+    table = page.table("parameter")
+    assert [*table] == [WORDS[name] for name in answer["parameters"]]
+    for name, told in answer["parameters"].items():
+        value, interval, verdict, *published = table[WORDS[name]]
+        assert value == shown(told["value"])
+        assert verdict == ": ".join(filter(None, (told["verdict"], told["reason"])))
+        low, high = told["interval"]
+        has_interval = low is not None and low < high
+        assert interval == (f"{shown(low)} to {shown(high)}" if has_interval else "–")
+        if answer["method"] == "sweep":
+            assert published == [shown(told["published"])]
+
+
+def test_the_page_holds_all_that_was_found(reported, quick_csv):
+    page, answer = reported(quick_csv, *BASELINE)
+    page.require_self_contained()
+    assert page.said("h1") == ["Friction of record.csv"]
+    assert page.said("h2") == [each for each in SECTIONS if each != "Notes" or answer["warnings"]]
+    require_parameters(page, answer)
+    assert {entry["verdict"] for entry in answer["parameters"].values()} > {"not identifiable"}
+    assert len(page.images) == 5
+    notes = [f"{warning}." for warning in answer["warnings"]]
+    assert [text for text in page.said("p") if text in notes] == notes
+    assert page.table("setting")["method"] == ("sweep",)
+    software = page.table("setting")["software"][0].split(", ")
+    assert f"valve_friction_ros {valve_friction_ros.__version__}" in software
+    assert {"numpy", "scipy", "Python"} < {each.split()[0] for each in software}
+    assert page.table("record")["samples"] == ("1000, one every 10 ms",)
+
+
+def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
+    page, answer = reported(quick_csv, *BASELINE)
+    diagnosis = answer["diagnosis"]
+    assert (diagnosis["level"], diagnosis["ne_107"]) == ("WARN", "M")
+    friction = answer["parameters"]["coulomb_friction"]
+    width = friction["interval"][1] - friction["value"]
+    share = math.hypot(width / friction["value"], 0.02)
+    ratio = friction["value"] / 100
+    assert diagnosis["ratio"] == pytest.approx(ratio)
+    assert diagnosis["ratio_interval"] == pytest.approx(
+        [ratio * math.exp(-share), ratio * math.exp(share)]
+    )
+    low, high = diagnosis["ratio_interval"]
+    assert page.lead.startswith(
+        f"The friction has grown, {ratio:.2f} times that of the healthy valve (95 % sure: "
+        f"{low:.2f} to {high:.2f})"
+    )
+    assert page.lead.endswith(": plan work on the packing for the next stop.")
+    told = page.table("friction")
+    assert told["diagnosis"] == (diagnosis["message"],)
+    assert told["friction of the healthy valve (baseline)"] == ("100 ± 2 N",)
+
+
+def test_without_a_baseline(reported, quick_csv):
+    page, answer = reported(quick_csv)
+    assert "diagnosis" not in answer
+    assert "cannot be said without a baseline" in page.lead
+    assert "excess friction" not in page.table("friction")
+
+
+def test_the_table_ends_with_the_diagnosis(call, quick_csv, bench_yaml):
+    code, out, _ = call(quick_csv, "--valve", bench_yaml, *BASELINE)
+    assert code == 0
+    assert " ".join(out.split()).partition("WARN: ")[2].startswith("friction has grown: coulomb")
+
+
+def test_a_valve_signature(reported, write_csv, columns_of):
+    pressure = TriangleWave().sample([each / 50 for each in range(7500)])
+    record = Recording(0.02, pressure, simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.02).position)
+    page, answer = reported(write_csv(columns_of(record)), "--method", "force_balance")
+    page.require_self_contained()
+    require_parameters(page, answer)
+    assert "Sweep of the velocity threshold δv" not in page.said("h2")
+    assert len(page.images) == 4
+    assert page.table("setting")["method"] == ("force_balance",)
+
+
+def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, quick_record):
+    force = 100 * quick_record.pressure / 1e5
+    path = write_csv(
+        {
+            "time_s": [round(each, 9) for each in quick_record.time],
+            "position_m": quick_record.position,
+            "force_n": force,
+        }
+    )
+    page, _ = reported(path, "--fix", "spring_constant=0", valve=())
+    page.require_self_contained()
+    assert "Residual" not in page.said("h2")
+    assert len(page.images) == 3
+    assert "drive force [N]" in page.table("record")
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--report", "r.pdf"], "r.pdf: a report is a page: give it a name that ends in .html"),
+        (["--report", "no/r.html"], "no/r.html: there is no folder no"),
+        (
+            ["--baseline-half-width", "2"],
+            "--baseline-half-width: give the baseline itself by --baseline-coulomb-friction",
+        ),
+        (
+            ["--baseline-coulomb-friction", "0"],
+            "baseline_coulomb_friction must be above zero, got 0",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told_before_anything_is_read(call, bench_yaml, options, reason):
+    """The recording is not even there."""
+    code, out, err = call("missing.csv", "--valve", bench_yaml, *options)
+    assert (code, out, err) == (2, "", f"identify_recording: {reason}\n")
+
+
+@pytest.fixture
+def unwritable():
+    """A folder in which not even root can make a file."""
+    return "/proc/self/fd"
+
+
+def test_a_folder_that_cannot_be_written_to(call, bench_yaml, unwritable):
+    path = f"{unwritable}/report.html"
+    code, out, err = call("missing.csv", "--valve", bench_yaml, "--report", path)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"identify_recording: {path}: cannot write into {unwritable}: ")
+    assert err.count("\n") == 1
+
+
+def test_a_refused_record_has_no_report(call, write_csv, columns_of, quick_record, bench_yaml):
+    rest = Recording(0.01, quick_record.pressure, 0.01 + 0 * quick_record.position)
+    path = write_csv(columns_of(rest))
+    report = path.with_suffix(".html")
+    assert call(path, "--valve", bench_yaml, "--report", report)[0] == 2
+    assert not report.exists()
+
+
+@pytest.mark.skipif(not BROWSERS, reason="no browser is installed: apt install chromium")
+def test_a_browser_shows_and_prints_it(reported, quick_csv, tmp_path):
+    """A browser draws every picture of the page, on the screen and on paper."""
+    page, _ = reported(quick_csv, *BASELINE)
+    report = tmp_path / "report.html"
+    dump = run_browser(tmp_path, "--dump-dom", report)
+    assert PageReader(dump).lead == page.lead
+    run_browser(tmp_path, f"--screenshot={tmp_path / 'shot.png'}", report)
+    shot = (tmp_path / "shot.png").read_bytes()
+    assert shot.startswith(PNG)
+    assert struct.unpack(">II", shot[16:24]) == (900, 3000)
+    run_browser(tmp_path, f"--print-to-pdf={tmp_path / 'report.pdf'}", report)
+    printed = (tmp_path / "report.pdf").read_bytes()
+    assert printed.startswith(b"%PDF-")
+    assert len(re.findall(rb"/Subtype */Image", printed)) == len(page.images)
+
+
+def run_browser(folder, *arguments):
+    common = [BROWSERS[0], "--headless", "--no-sandbox", "--disable-gpu", "--window-size=900,3000"]
+    done = subprocess.run(
+        [*common, f"--user-data-dir={folder / 'profile'}", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -1,0 +1,112 @@
+"""The report of the last estimate: drawn from its own record, whatever came since."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from live_nodes import NAMESPACE, PROJECT
+from pages import PageReader
+from records import quick_record
+
+from valve_friction_ros.model import HIGH_FRICTION
+
+IDENTIFIER = f"{NAMESPACE}/identifier"
+
+
+def report(client):
+    """Ask for a report; its path and its page."""
+    response = client.trigger("report")
+    assert response.success, response.message
+    path = Path(response.message)
+    return path, PageReader(path.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def bench(shared, tmp_path_factory):
+    """A node, its client, and the folder of its reports, which is not there yet."""
+    folder = tmp_path_factory.mktemp("reported") / "plant" / "reports"
+    shared.start_identifier({"report_folder": str(folder), "input_timeout": 600.0})
+    return shared.client, folder
+
+
+def test_the_last_estimate_is_drawn_from_its_own_record(bench):
+    client, folder = bench
+    before = client.trigger("report")
+    assert not before.success
+    assert before.message == "there is no estimate to report: identify first"
+    assert not folder.exists()
+
+    low = quick_record()
+    message = client.identified(low)
+    path, page = report(client)
+    assert path.parent == folder
+    assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z\.html", path.name)
+    page.require_self_contained()
+    assert page.said("h1") == ["Friction of fv_101"]
+    assert page.table("friction")["diagnosis"] == (message,)
+    assert page.table("record")["samples"][0].startswith(f"{len(low)}, ")
+    assert page.table("record")["source"][0].startswith(f"node {IDENTIFIER}, identified ")
+
+    # The buffer moves on, and a record that cannot be identified changes only the notes.
+    client.empty_the_buffer()
+    assert client.trigger("identify").success is False
+    again, later = report(client)
+    assert again == path.with_name(f"{path.stem}_2.html")
+    assert later.pictures() == page.pictures()
+    assert later.table("parameter") == page.table("parameter")
+    (note,) = set(later.said("p")) - set(page.said("p"))
+    assert note.startswith("a later record was refused: ")
+
+    # The next estimate takes its place.
+    high = quick_record(HIGH_FRICTION)
+    client.identified(high)
+    _, other = report(client)
+    assert other.table("record") != page.table("record")
+    assert other.pictures()[0] != page.pictures()[0]
+
+
+def test_friction_is_judged_against_the_baseline_in_force(bench):
+    client, _ = bench
+    client.identified(quick_record())
+    assert client.trigger("set_baseline").success
+    message = client.identified(quick_record(HIGH_FRICTION))
+    _, page = report(client)
+    assert page.lead.startswith("The friction is excessive, ")
+    assert page.table("friction")["level"] == ("ERROR, NE 107 status signal F",)
+    assert page.table("friction")["diagnosis"] == (message,)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("file/folder", "Not a directory"),
+        ("~nobody-of-that-name/reports", "Could not determine home directory."),
+    ],
+)
+def test_what_cannot_be_written_is_told_and_the_node_goes_on(bench, tmp_path, name, reason):
+    client, _ = bench
+    client.identified(quick_record())
+    (tmp_path / "file").write_text("")
+    folder = name if name.startswith("~") else str(tmp_path / name)
+    (result,) = client.set_parameters(IDENTIFIER, {"report_folder": folder})
+    assert result.successful
+    response = client.trigger("report")
+    assert not response.success
+    assert response.message == f"cannot write a report into {folder}: {reason}"
+    assert client.trigger("identify").success
+
+
+def test_a_node_that_reports_nothing_loads_nothing_for_it():
+    code = "import sys, valve_friction_ros.nodes.identifier; print(*sys.modules, sep='\\n')"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout.split()
+    assert "valve_friction_ros.nodes.reporting" in loaded
+    assert not {"matplotlib", "jinja2", "valve_friction_ros.reports"} & set(loaded)

@@ -1,0 +1,51 @@
+"""An identified record, and variations of it whose numbers the tests choose."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import (
+    AssessedParameter,
+    IdentificationSettings,
+    Verdict,
+    assess,
+)
+from valve_friction_ros.model import BENCH_VALVE, Recording, SensorNoise, SineWave, simulate
+from valve_friction_ros.reports import IdentifiedRecord
+
+
+@pytest.fixture(scope="session")
+def identified(benches):
+    """Four strokes at 100 Hz, with a little noise on both sensors."""
+    pressure = SineWave(period=4.0).sample(np.arange(800) / 100)
+    position = simulate(BENCH_VALVE, benches["low"].parameters, pressure, 0.01).position
+    noise = SensorNoise(position=10e-6, pressure=100.0, seed=1)
+    recording = noise.applied_to(Recording(0.01, pressure, position))
+    settings = IdentificationSettings(position_bias=1.13e-3)
+    assessment = assess(recording, BENCH_VALVE, settings)
+    return IdentifiedRecord("FV-101", "a test", recording, BENCH_VALVE, assessment, settings)
+
+
+@pytest.fixture(scope="session")
+def with_friction(identified):
+    """Function of F_c, half width and verdict: the record, with k 2e5 N/m and F_s unknown."""
+
+    def parameter(name, value, half_width, verdict, reason):
+        return AssessedParameter(name, value, half_width / 2, half_width, verdict, reason)
+
+    def build(value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason="", **changes):
+        nan, unknown = float("nan"), Verdict.NOT_IDENTIFIABLE
+        parameters = {
+            **identified.assessment.parameters,
+            "coulomb_friction": parameter("coulomb_friction", value, half_width, verdict, reason),
+            "static_friction": parameter("static_friction", nan, nan, unknown, "hidden"),
+            "spring_constant": parameter("spring_constant", 2e5, 1.0, Verdict.IDENTIFIED, ""),
+        }
+        misfit = changes.pop("misfit", identified.assessment.misfit)
+        assessment = dataclasses.replace(
+            identified.assessment, parameters=parameters, misfit=misfit
+        )
+        return dataclasses.replace(identified, assessment=assessment, **changes)
+
+    return build

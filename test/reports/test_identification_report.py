@@ -1,0 +1,123 @@
+"""What stands on the report of an identification, before it becomes a page."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import Verdict
+from valve_friction_ros.monitoring import Baseline
+from valve_friction_ros.plots.comparison import Comparison
+from valve_friction_ros.plots.report_figures import chosen_region
+from valve_friction_ros.reports import (
+    Page,
+    identification_report,
+    require_report_file,
+    write_report,
+)
+
+FRICTION = "Friction against its baseline"
+
+
+def section(page, title):
+    (found,) = (section for section in page.sections if section.title == title)
+    return found
+
+
+def rows(record, title):
+    (table,) = (
+        block
+        for block in section(identification_report(record), title).blocks
+        if block.kind == "table"
+    )
+    return {row[0]: row[1:] for row in table.rows}
+
+
+def test_excess_friction_has_the_interval_of_both(with_friction):
+    """Half widths of 3 and 4 N make one of 5 N."""
+    told = rows(with_friction(150.0, 3.0, baseline=Baseline(100.0, 4.0)), FRICTION)
+    assert told["friction of the healthy valve (baseline)"] == ("100 ± 4 N",)
+    assert told["excess friction"] == ("+50 ± 5 N",)
+    assert told["level"] == ("WARN, NE 107 status signal M",)
+
+
+def test_without_a_baseline_nothing_is_said_of_excess(with_friction):
+    record = with_friction(150.0, 3.0)
+    assert "excess friction" not in rows(record, FRICTION)
+    words = section(identification_report(record), FRICTION).blocks[0].text
+    assert words.startswith("There is no baseline")
+
+
+def test_what_is_not_identifiable_has_no_ratio(with_friction):
+    nan = float("nan")
+    record = with_friction(
+        nan, nan, Verdict.NOT_IDENTIFIABLE, "too short", baseline=Baseline(100.0)
+    )
+    assert not {"excess friction", "friction over baseline"} & set(rows(record, FRICTION))
+    told = rows(record, "Parameters")["Coulomb friction F_c [N]"]
+    assert told[:3] == ("–", "–", "not identifiable: too short")
+
+
+def test_the_time_of_a_record_is_told_where_its_clock_is_that_of_the_world(identified):
+    dated = dataclasses.replace(identified.recording, start_time=1.7e9)
+    told = rows(dataclasses.replace(identified, recording=dated), "Record")
+    assert told["began"] == ("2023-11-14 22:13:20 UTC",)
+    assert "began" not in rows(identified, "Record")
+    mistaken = dataclasses.replace(identified.recording, start_time=1.7e18)
+    assert "began" not in rows(dataclasses.replace(identified, recording=mistaken), "Record")
+
+
+def test_notes_of_the_record_come_before_those_of_the_estimate(identified):
+    warned = dataclasses.replace(identified.assessment, warnings=("clocks differ",))
+    record = dataclasses.replace(identified, assessment=warned, notes=("cut off",))
+    notes = [block.text for block in section(identification_report(record), "Notes").blocks]
+    assert notes[:2] == ["cut off.", "clocks differ."]
+
+
+def test_the_region_holds_the_choice_and_ends_where_sigma_leaves_its_tenth(identified):
+    sweep = dataclasses.replace(
+        identified.assessment.sweep,
+        thresholds=np.arange(1.0, 8.0),
+        sigma=np.array([9.0, 1.2, 1.05, 1.0, 0.95, 0.8, 1.0]),
+    )
+    assert chosen_region(sweep, 4.0) == (3.0, 5.0)
+    assert chosen_region(sweep, 1.0) == (1.0, 1.0)
+    assert chosen_region(sweep, 7.0) == (7.0, 7.0)
+
+
+def test_autocorrelation_of_what_is_known():
+    """Two plus and two minus ones after each other: 1, then 1/4 of what was, then −2/4 …."""
+    measured = np.zeros(4)
+    comparison = Comparison(0.5, measured, np.array([1.0, 1.0, -1.0, -1.0]))
+    assert comparison.time.tolist() == [0.0, 0.5, 1.0, 1.5]
+    assert comparison.autocorrelation(4) == pytest.approx([1.0, 0.25, -0.5, -0.25])
+    assert Comparison(0.5, measured, measured).autocorrelation(2).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("report.pdf", "a report is a page: give it a name that ends in .html"),
+        ("nowhere/report.html", "there is no folder {folder}/nowhere"),
+        ("folder.html", "is a folder: give the report another name"),
+    ],
+)
+def test_files_that_are_no_place_for_a_report(tmp_path, name, reason):
+    (tmp_path / "folder.html").mkdir()
+    path = tmp_path / name
+    with pytest.raises(ValueError) as refused:  # noqa: PT011 - the whole message is compared
+        require_report_file(path)
+    assert str(refused.value) == f"{path}: {reason.format(folder=tmp_path)}"
+
+
+def test_a_report_that_cannot_be_written_leaves_what_is_at_its_place(tmp_path):
+    path = tmp_path / "report.html"
+    path.mkdir()
+    with pytest.raises(IsADirectoryError):
+        write_report(Page("one", "lead", ()), path)
+    assert list(tmp_path.iterdir()) == [path]
+    path.rmdir()
+    path.write_text("before")
+    write_report(Page("one", "lead", ()), path)
+    assert "<h1>one</h1>" in path.read_text()
+    assert list(tmp_path.iterdir()) == [path]

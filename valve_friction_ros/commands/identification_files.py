@@ -1,0 +1,124 @@
+"""What `identify_recording` writes of one valve beside its answer: a picture and a report."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from valve_friction_ros.commands.recording_arguments import DIRECT_DRIVE, require_one
+from valve_friction_ros.commands.valve_file import ValveFile
+from valve_friction_ros.identification import Assessment, IdentificationSettings
+from valve_friction_ros.monitoring import Baseline
+from valve_friction_ros.monitoring.recorded_valve import RecordedValve
+
+__all__ = ["IdentificationFiles", "add_file_arguments", "baseline_from", "identification_files"]
+
+
+def add_file_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the picture, the report, and the baseline that friction is compared with."""
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the identification")
+    parser.add_argument(
+        "--report",
+        type=Path,
+        metavar="FILE.html",
+        help="write a page for people: verdict, parameters, pictures, settings; one file",
+    )
+    parser.add_argument(
+        "--baseline-coulomb-friction",
+        type=float,
+        metavar="N",
+        help="F_c of this valve when it was healthy, to tell its excess friction",
+    )
+    parser.add_argument(
+        "--baseline-half-width",
+        type=float,
+        metavar="N",
+        help="half the width of the 95 %% interval of the baseline (0: it is exact)",
+    )
+
+
+def baseline_from(options: argparse.Namespace) -> Baseline | None:
+    """Build the baseline from the parsed arguments.
+
+    Raises
+    ------
+    ValueError
+        If it is impossible, or its interval is given without it.
+    """
+    friction, width = options.baseline_coulomb_friction, options.baseline_half_width
+    if friction is None:
+        if width is not None:
+            raise ValueError(
+                "--baseline-half-width: give the baseline itself by --baseline-coulomb-friction"
+            )
+        return None
+    return Baseline(friction, 0.0 if width is None else width)
+
+
+class IdentificationFiles(NamedTuple):
+    """The files to write."""
+
+    plot: Path | None
+    report: Path | None
+
+    def require_one_valve(self, recorded: Sequence[RecordedValve]) -> None:
+        """Refuse several valves; raises ValueError, which names them."""
+        if self.plot is not None:
+            require_one(recorded, "--plot draws")
+        if self.report is not None:
+            require_one(recorded, "--report is of")
+
+    def write(
+        self,
+        recorded: RecordedValve,
+        description: ValveFile,
+        assessment: Assessment,
+        settings: IdentificationSettings,
+        window: int | None,
+        baseline: Baseline | None,
+    ) -> None:
+        """Write them; raises OSError where that fails."""
+        if self == (None, None):
+            return
+        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
+
+        recording = recorded.recording()
+        drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
+        if self.plot is not None:
+            figure = plots.identification_figure(recording, description.valve, assessment, drive)
+            figure.savefig(self.plot)
+        if self.report is not None:
+            from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
+
+            record = reports.IdentifiedRecord(
+                name=recorded.name.strip("/") or recorded.path.name,
+                source=recorded.label,
+                recording=recording,
+                valve=description.valve,
+                assessment=assessment,
+                settings=settings,
+                derivative_window=window,
+                baseline=baseline,
+                drive=drive,
+                notes=recorded.notes,
+            )
+            reports.write_report(reports.identification_report(record), self.report)
+
+
+def identification_files(options: argparse.Namespace) -> IdentificationFiles:
+    """Return the files that were asked for, and refuse those that cannot be written.
+
+    Raises
+    ------
+    ValueError
+        One line that names the file and the cause.
+    """
+    if options.plot is not None:
+        from valve_friction_ros.plots import require_picture_file  # noqa: PLC0415 - slow to import
+
+        require_picture_file(options.plot)
+    if options.report is not None:
+        from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
+
+        require_report_file(options.report)
+    return IdentificationFiles(options.plot, options.report)

@@ -1,0 +1,32 @@
+"""Reports for people: pages that stand in one file; no ROS."""
+
+from valve_friction_ros.reports.identification_report import identification_report
+from valve_friction_ros.reports.identified_record import IdentifiedRecord
+from valve_friction_ros.reports.page import (
+    Block,
+    Column,
+    Page,
+    Paragraph,
+    Picture,
+    Section,
+    Table,
+    render,
+)
+from valve_friction_ros.reports.report_file import require_report_file, write_report
+from valve_friction_ros.reports.verdict_sentence import verdict_sentence
+
+__all__ = [
+    "Block",
+    "Column",
+    "IdentifiedRecord",
+    "Page",
+    "Paragraph",
+    "Picture",
+    "Section",
+    "Table",
+    "identification_report",
+    "render",
+    "require_report_file",
+    "verdict_sentence",
+    "write_report",
+]

@@ -1,0 +1,169 @@
+"""The report of one identification: a page from the verdict down to the settings."""
+
+import math
+from collections.abc import Iterator
+
+from valve_friction_ros.identification import ForceBalanceAssessment, SweepAssessment
+from valve_friction_ros.monitoring import percentage
+from valve_friction_ros.plots.comparison import Comparison, comparison_of
+from valve_friction_ros.plots.report_figures import (
+    SETTLED_SHARE,
+    chosen_region,
+    comparison_figure,
+    record_figure,
+    residual_figure,
+    signature_loop_figure,
+    sweep_figure,
+)
+from valve_friction_ros.reports.identification_tables import (
+    friction_table,
+    parameter_table,
+    record_table,
+    settings_table,
+)
+from valve_friction_ros.reports.identified_record import IdentifiedRecord
+from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
+from valve_friction_ros.reports.verdict_sentence import verdict_sentence
+
+__all__ = ["identification_report"]
+
+_VERDICTS = (
+    "Identified: the interval reaches no further than 5 % of the value, and nothing else speaks "
+    "against it. Weak: it is wider, or there is another reason, which is told. Not identifiable: "
+    "the record holds nothing of it, and no number is shown. Fixed: it was given."
+)
+_FRICTION = "Friction against its baseline"
+_NO_STEM = (
+    "Without a spring, or without an identifiable one, nothing calls the stem back, so that it "
+    "cannot be simulated: there is no comparison, and no residual."
+)
+
+
+def identification_report(record: IdentifiedRecord) -> Page:
+    """Return the page that tells what was identified from a record, and why.
+
+    Parameters
+    ----------
+    record : IdentifiedRecord
+        Record, assessment, and what to judge it by.
+
+    Returns
+    -------
+    Page
+        The verdict in one sentence, then parameters, friction against its baseline, the record,
+        the valve signature, the sweep, the measured against the simulated position, the residual,
+        notes, settings and versions. What a method does not have is left out.
+    """
+    return Page(f"Friction of {record.name}", verdict_sentence(record), tuple(_sections(record)))
+
+
+def _sections(record: IdentifiedRecord) -> Iterator[Section]:
+    assessment = record.assessment
+    yield Section("Parameters", (parameter_table(record), Paragraph(_VERDICTS)))
+    yield _friction(record)
+    yield _record(record)
+    yield _signature(record)
+    if isinstance(assessment, SweepAssessment):
+        yield _sweep(record, assessment)
+    comparison = comparison_of(assessment)
+    if comparison is None:
+        yield Section("Measured and simulated position", (Paragraph(_NO_STEM),))
+    else:
+        yield _comparison(record, comparison)
+        yield _residual(record, comparison)
+    notes = (*record.notes, *assessment.all_warnings)
+    if notes:
+        yield Section("Notes", tuple(Paragraph(f"{note}.") for note in notes))
+    yield Section("Settings and versions", (settings_table(record),))
+
+
+def _friction(record: IdentifiedRecord) -> Section:
+    table = friction_table(record)
+    if record.baseline is None:
+        none = Paragraph(
+            "There is no baseline, so that nothing can be said of excess friction. It is the "
+            "Coulomb friction of this valve when it was healthy."
+        )
+        return Section(_FRICTION, (none, table))
+    return Section(_FRICTION, (table,))
+
+
+def _record(record: IdentifiedRecord) -> Section:
+    drive = record.drive.label.partition(" [")[0]
+    picture = Picture(
+        record_figure(record.recording, record.drive),
+        f"The record: {drive} and stem position over the time.",
+        f"Two curves over {record.recording.duration:.3g} s: {drive} above, stem position below.",
+    )
+    return Section("Record", (picture, record_table(record)))
+
+
+def _signature(record: IdentifiedRecord) -> Section:
+    assessment, drive = record.assessment, record.drive.label.partition(" [")[0]
+    caption = f"Stem position over {drive}: the wider the loop, the more friction."
+    if isinstance(assessment, ForceBalanceAssessment):
+        signature = assessment.signature
+        share = percentage(signature.dead_zone_share)
+        caption += (
+            f" P₁ and P₂ are where the stem breaks away upwards and downwards, the dashed lines "
+            f"its sliding. The dead zone, the loop's width, is {share} of the pressure's span."
+        )
+    picture = Picture(
+        signature_loop_figure(record.recording, record.valve, assessment, record.drive),
+        caption,
+        f"A loop of stem position over {drive}.",
+    )
+    return Section("Valve signature", (picture,))
+
+
+def _sweep(record: IdentifiedRecord, assessment: SweepAssessment) -> Section:
+    estimate = assessment.published or assessment.start
+    low, high = chosen_region(assessment.sweep, estimate.threshold)
+    caption = (
+        f"The friction force balance, fitted to the samples faster than each threshold δv. Chosen: "
+        f"{estimate.threshold * 1e3:.3g} mm/s, with {estimate.samples} samples above it, "
+        f"σ_s {estimate.sigma:.4g} N and R² {estimate.r_squared:.5f}. Shaded: the region around "
+        f"it, {low * 1e3:.3g} to {high * 1e3:.3g} mm/s, where σ_s stays within "
+        f"{100 * SETTLED_SHARE:.0f} % of that."
+    )
+    picture = Picture(
+        sweep_figure(record.recording, assessment, record.drive),
+        caption,
+        "Coulomb friction, standard deviation and correlation over the velocity threshold, with "
+        "the chosen threshold and the region around it marked.",
+    )
+    return Section("Sweep of the velocity threshold δv", (picture,))
+
+
+def _comparison(record: IdentifiedRecord, comparison: Comparison) -> Section:
+    assessment = record.assessment
+    share = record.valve.share_of_travel(assessment.rms)
+    of_travel = f", {percentage(share)} of the travel" if math.isfinite(share) else ""
+    picture = Picture(
+        comparison_figure(comparison),
+        f"The measured stem, and dotted upon it the stem of the identified model under the same "
+        f"{record.drive.label.partition(' [')[0]}. Fit {100 * assessment.fit:.2f} %, rms "
+        f"{assessment.rms * 1e6:.3g} µm{of_travel}.",
+        "Measured and simulated stem position over the time, one upon the other.",
+    )
+    return Section("Measured and simulated position", (picture,))
+
+
+def _residual(record: IdentifiedRecord, comparison: Comparison) -> Section:
+    misfit = record.assessment.misfit
+    caption = (
+        "What the model does not explain: simulated less measured position over the time, its "
+        "histogram, and its autocorrelation. Noise alone would keep the latter within the grey "
+        "band beyond lag 0."
+    )
+    if misfit is not None:
+        caption += (
+            f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are not noise; "
+            f"up to {misfit.tolerated * 1e6:.3g} µm count as chance."
+        )
+    picture = Picture(
+        residual_figure(comparison),
+        caption,
+        "Residual over the time; below it its histogram and its autocorrelation.",
+    )
+    return Section("Residual", (picture,))

@@ -1,0 +1,199 @@
+"""The tables of a report of an identification."""
+
+import math
+import platform
+from datetime import datetime, timezone
+
+import matplotlib
+import numba
+import numpy as np
+import scipy
+
+import valve_friction_ros
+from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Verdict
+from valve_friction_ros.monitoring import Baseline, dead_band, percentage
+from valve_friction_ros.reports.identified_record import IdentifiedRecord
+from valve_friction_ros.reports.page import Column, Table
+
+__all__ = [
+    "friction_table",
+    "parameter_table",
+    "record_table",
+    "settings_table",
+]
+
+_WORDS = {
+    "mass": "moving mass m",
+    "viscous_friction": "viscous friction F_v",
+    "coulomb_friction": "Coulomb friction F_c",
+    "static_friction": "static friction F_s",
+    "spring_constant": "spring constant k",
+    "spring_preload": "spring preload F_0",
+    "stribeck_velocity": "Stribeck velocity v_s",
+    "coulomb_asymmetry": "asymmetry of F_c",
+    "viscous_asymmetry": "asymmetry of F_v",
+}
+
+_NOTHING = "–"
+_WHOLE = 1e4
+"""Numbers from here on are written as whole ones."""
+
+_DATED = (1e9, 1e11)
+"""Start times between these, s, are taken for a clock that counts from 1970."""
+
+
+def _number(value: float) -> str:
+    """Write five digits or more, without an exponent where one can do without."""
+    if not math.isfinite(value):
+        return _NOTHING
+    return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
+
+
+def _interval(parameter: AssessedParameter) -> str:
+    if math.isnan(parameter.value) or parameter.verdict is Verdict.FIXED:
+        return _NOTHING
+    return " to ".join(map(_number, parameter.interval))
+
+
+def _judged(parameter: AssessedParameter) -> str:
+    return ": ".join(filter(None, (parameter.verdict.value, parameter.reason)))
+
+
+def parameter_table(record: IdentifiedRecord) -> Table:
+    """Return each parameter with interval and verdict, and its published value if there is one."""
+    parameters, published = record.assessment.parameters, record.assessment.published
+    columns = [
+        Column("parameter"),
+        Column("value", is_number=True),
+        Column("95 % interval", is_number=True),
+        Column("verdict"),
+    ]
+    rows = [
+        (
+            f"{_WORDS.get(name, name.replace('_', ' '))} [{ASSESSED_UNITS[name]}]",
+            _number(one.value),
+            _interval(one),
+            _judged(one),
+        )
+        for name, one in parameters.items()
+    ]
+    marked = (list(parameters).index("coulomb_friction"),)
+    if published is None:
+        return Table(tuple(columns), tuple(rows), marked=marked)
+    beside = (_number(published.values.get(name, math.nan)) for name in parameters)
+    return Table(
+        (*columns, Column("published method", is_number=True)),
+        tuple((*row, value) for row, value in zip(rows, beside, strict=True)),
+        marked=marked,
+    )
+
+
+def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
+    return Table((Column(first), Column(second)), tuple(rows))
+
+
+def _excess(friction: AssessedParameter, baseline: Baseline) -> str:
+    width = math.hypot(friction.half_width, baseline.half_width)
+    return f"{friction.value - baseline.coulomb_friction:+.4g} ± {width:.2g} N"
+
+
+def friction_table(record: IdentifiedRecord) -> Table:
+    """Return the Coulomb friction beside its baseline, and the diagnosis."""
+    friction = record.assessment.parameters["coulomb_friction"]
+    baseline, diagnosis, limits = record.baseline, record.diagnosis, record.limits
+    rows = []
+    if baseline is not None:
+        healthy = f"{baseline.coulomb_friction:.5g}"
+        healthy += f" ± {baseline.half_width:.2g}" if baseline.half_width > 0 else ""
+        rows.append(("friction of the healthy valve (baseline)", f"{healthy} N"))
+    if baseline is not None and diagnosis.ratio is not None:
+        ratio = diagnosis.ratio
+        rows += [
+            ("excess friction", _excess(friction, baseline)),
+            (
+                "friction over baseline",
+                f"{ratio.value:.3g}, 95 % interval {ratio.low:.3g} to {ratio.high:.3g}",
+            ),
+            (
+                "limits of that ratio",
+                f"collapsed below {limits.low_ratio:g}, worth maintenance above "
+                f"{limits.warn_ratio:g}, excessive above {limits.error_ratio:g}; "
+                "a limit counts as passed when the whole interval lies beyond it",
+            ),
+        ]
+    share = dead_band(record.assessment, record.valve)
+    if math.isfinite(share):
+        rows.append(("dead band (F_c + F_s)/k", f"{percentage(share)} of the travel"))
+    signal = diagnosis.status_signal.value
+    rows += [
+        ("level", diagnosis.level.name + (f", NE 107 status signal {signal}" if signal else "")),
+        ("diagnosis", diagnosis.message),
+    ]
+    return _pairs(rows, "friction", "finding")
+
+
+def record_table(record: IdentifiedRecord) -> Table:
+    """Return where the record comes from, and its extent."""
+    recording, drive = record.recording, record.drive
+    pressure, position = recording.pressure / drive.pascals, recording.position * 1e3
+    rows = [("source", record.source)]
+    if _DATED[0] < recording.start_time < _DATED[1]:
+        began = datetime.fromtimestamp(recording.start_time, timezone.utc)
+        rows.append(("began", f"{began:%Y-%m-%d %H:%M:%S} UTC"))
+    rows += [
+        ("duration", f"{recording.duration:.4g} s"),
+        ("samples", f"{len(recording)}, one every {recording.sample_period * 1e3:.4g} ms"),
+        (drive.label, f"{pressure.min():.5g} to {pressure.max():.5g}"),
+        ("stem [mm]", f"{position.min():.4g} to {position.max():.4g}"),
+    ]
+    return _pairs(rows, "record", "extent")
+
+
+def settings_table(record: IdentifiedRecord) -> Table:
+    """Return with what settings, valve and software the record was identified."""
+    settings, valve, assessment = record.settings, record.valve, record.assessment
+    fixed = ", ".join(f"{name} = {value:g}" for name, value in settings.fixed.items())
+    window = record.derivative_window
+    bias = settings.position_bias
+    rows = [
+        ("method", assessment.method),
+        (
+            "derivative window",
+            f"{assessment.window} samples, "
+            + ("chosen from the noise of the record" if window is None else "as given"),
+        ),
+    ]
+    if assessment.published is not None:
+        rows.append(
+            (
+                "of the published method",
+                f"window {assessment.published.settings.window} samples, polynomial order "
+                f"{settings.order}, {settings.steps} thresholds",
+            )
+        )
+    rows += [
+        ("given parameters", fixed or "none"),
+        ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
+        ("mass where the record does not tell it", f"{settings.assumed_mass:g} kg"),
+        ("diaphragm area S_a", f"{valve.diaphragm_area:g} m²"),
+        ("pressure reference P_ref", f"{valve.pressure_reference:g} Pa"),
+        (
+            "travel",
+            f"{valve.travel * 1e3:g} mm" if math.isfinite(valve.travel) else "without stops",
+        ),
+        ("software", _versions()),
+    ]
+    return _pairs(rows, "setting", "value")
+
+
+def _versions() -> str:
+    """Name the versions of the software that the numbers depend on."""
+    versions = {
+        "valve_friction_ros": valve_friction_ros.__version__,
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+        "matplotlib": matplotlib.__version__,
+        "Python": platform.python_version(),
+    }
+    return ", ".join(f"{name} {version}" for name, version in versions.items())

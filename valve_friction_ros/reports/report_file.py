@@ -1,0 +1,50 @@
+"""Files that reports are written to."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from valve_friction_ros.reports.page import Page, render
+
+__all__ = ["require_report_file", "write_report"]
+
+_ENDINGS = (".html", ".htm")
+
+
+def require_report_file(path: Path) -> None:
+    """Refuse a file that a report cannot be written to, before long work is done for it.
+
+    Raises
+    ------
+    ValueError
+        If the ending is not that of a page, or the folder is not there or cannot be written to;
+        the message names it.
+    """
+    if path.suffix.lower() not in _ENDINGS:
+        raise ValueError(f"{path}: a report is a page: give it a name that ends in .html")
+    if not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}")
+    if path.is_dir():
+        raise ValueError(f"{path}: is a folder: give the report another name")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        cause = error.strerror or error
+        raise ValueError(f"{path}: cannot write into {path.parent}: {cause}") from None
+
+
+def write_report(page: Page, path: Path) -> None:
+    """Write a page as one HTML file; nobody meets half of it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; what was at its place stays as it was.
+    """
+    draft = path.with_name(f".{os.getpid()}_{path.name}")
+    try:
+        draft.write_text(render(page), encoding="utf-8")
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)

@@ -1,0 +1,108 @@
+"""The verdict on a valve in one sentence, for those who plan its maintenance."""
+
+import math
+from typing import NamedTuple
+
+from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.monitoring import StatusSignal, dead_band, percentage
+from valve_friction_ros.reports.identified_record import IdentifiedRecord
+
+__all__ = ["verdict_sentence"]
+
+
+class _Finding(NamedTuple):
+    what: str
+    advice: str
+
+
+_AGAIN = "identify it again from a longer record with more strokes before anything is done"
+_CHECK = "check the sensors and their mounting, then identify it again"
+
+_ALARMS = {
+    StatusSignal.FAILURE: _Finding(
+        "the friction is excessive, {ratio}",
+        "plan work on the packing now, and expect the loop to oscillate until then",
+    ),
+    StatusSignal.OUT_OF_SPECIFICATION: _Finding(
+        "the friction has collapsed, {ratio}", "check the packing for leakage now"
+    ),
+    StatusSignal.MAINTENANCE_REQUIRED: _Finding(
+        "the friction has grown, {ratio}", "plan work on the packing for the next stop"
+    ),
+}
+
+
+def verdict_sentence(record: IdentifiedRecord) -> str:
+    """Return one sentence: what was found, how sure it is, what follows from it, what to do.
+
+    It says in plain words what the diagnosis of the monitor says.
+    """
+    friction = record.assessment.parameters["coulomb_friction"]
+    if math.isnan(friction.value):
+        finding = _Finding(
+            f"this record does not tell the friction ({friction.reason})",
+            "move the valve through several fast strokes both ways and identify it again",
+        )
+    elif friction.value < 0:
+        finding = _Finding(
+            f"the friction comes out as {friction.value:.4g} N, which cannot be",
+            "check the direction of both signals and identify it again",
+        )
+    else:
+        finding = _found(record)
+    doubt = _doubt(record)
+    sentence = f"{doubt}{finding.what}{_consequence(record)}: {finding.advice}."
+    return sentence[0].upper() + sentence[1:]
+
+
+def _found(record: IdentifiedRecord) -> _Finding:
+    friction, diagnosis = record.assessment.parameters["coulomb_friction"], record.diagnosis
+    if diagnosis.ratio is None:
+        size = f"{friction.value:.4g}"
+        if friction.verdict is not Verdict.FIXED:
+            size += f" ± {friction.half_width:.2g}"
+        return _Finding(
+            f"the friction is {size} N{_sureness(friction)}",
+            "whether it has grown cannot be said without a baseline, the friction of the healthy "
+            "valve",
+        )
+    ratio = (
+        f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % sure: "
+        f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
+    )
+    if diagnosis.status_signal in _ALARMS:
+        alarm = _ALARMS[diagnosis.status_signal]
+        return _Finding(alarm.what.format(ratio=ratio), alarm.advice)
+    if diagnosis.ratio.value >= record.limits.warn_ratio:
+        return _Finding(f"the friction has perhaps grown, {ratio}", _AGAIN)
+    if diagnosis.ratio.value <= record.limits.low_ratio:
+        return _Finding(f"the friction has perhaps collapsed, {ratio}", _AGAIN)
+    advice = _CHECK if _doubt(record) else "nothing needs to be done"
+    return _Finding(f"the friction is normal, {ratio}", advice)
+
+
+def _sureness(friction: AssessedParameter) -> str:
+    """Say what stands behind the number, unless it is identified."""
+    words = {
+        Verdict.IDENTIFIED: "",
+        Verdict.WEAK: f", a weak estimate ({friction.reason})",
+        Verdict.FIXED: ", which was given and not identified",
+    }
+    return words[friction.verdict]
+
+
+def _doubt(record: IdentifiedRecord) -> str:
+    misfit = record.assessment.misfit
+    if misfit is None or misfit.describes:
+        return ""
+    return (
+        "to be taken with caution, since the model does not describe this valve "
+        f"({misfit.systematic * 1e6:.3g} µm of the stem's motion remain unexplained): "
+    )
+
+
+def _consequence(record: IdentifiedRecord) -> str:
+    share = dead_band(record.assessment, record.valve)
+    if math.isnan(share) or share < 0:
+        return ""
+    return f", and the stem ignores reversals smaller than {percentage(share)} of its travel"
