@@ -64,7 +64,7 @@ def imported_modules(path):
 def test_manifest_names_every_message_package_and_library():
     root = ET.parse(PROJECT / "package.xml").getroot()
     declared = {element.text for element in root.iter("exec_depend")}
-    keys = {"yaml": "python3-yaml"} | {
+    keys = {"yaml": "python3-yaml", "jinja2": "python3-jinja2"} | {
         name: f"python3-{name}" for name in ("matplotlib", "numba", "numpy", "rich", "scipy")
     }
     # rosbags brings the libraries that it reads bags with.
