@@ -1,0 +1,77 @@
+"""A number of the paper beside ours, and whether they agree."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = ["Check", "summary", "within", "written"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that a reader of the paper ticks off.
+
+    Attributes
+    ----------
+    item : int
+        Section of the report that it belongs to, from 1.
+    name : str
+        What is compared, with its place in the paper.
+    paper, ours : str
+        Both values, in the paper's unit.
+    criterion : str
+        When they count as equal; chosen before they were known.
+    matched : bool
+        Whether they do.
+    why : str
+        The reason, where they do not.
+    """
+
+    item: int
+    name: str
+    paper: str
+    ours: str
+    criterion: str
+    matched: bool
+    why: str = ""
+
+
+def written(value: float, digits: int = 4) -> str:
+    """Write a number with so many digits, or all of its whole ones; a dash if there is none."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    return f"{value:.{min(places, 9)}f}"
+
+
+def within(
+    item: int,
+    name: str,
+    paper: float,
+    ours: float,
+    share: float,
+    unit: str = "",
+    digits: int = 4,
+    why: str = "",
+) -> Check:
+    """Compare two numbers: equal within a share of the paper's."""
+    tail = f" {unit}" if unit else ""
+    matched = abs(ours - paper) <= share * abs(paper)
+    return Check(
+        item,
+        name,
+        f"{written(paper, digits)}{tail}",
+        f"{written(ours, digits)}{tail}",
+        f"within {100 * share:g} %",
+        matched,
+        "" if matched else why,
+    )
+
+
+def summary(checks: Sequence[Check]) -> str:
+    """Say in one line how many checks matched, and name those that did not."""
+    missed = [check.name for check in checks if not check.matched]
+    count = f"{len(checks) - len(missed)} of {len(checks)} matched"
+    return f"{count}; not matched: {'; '.join(missed)}" if missed else f"{count}."
