@@ -99,7 +99,7 @@ def _reproduce(benches: dict[str, Bench], output: Path, progress: Callable[[str]
     progress("figures")
     pictures = draw_figures(programme)
     for name, picture in pictures.items():
-        picture.figure.savefig(output / f"{name}.png")
+        (output / f"{name}.png").write_bytes(picture.png)
     progress("report")
     text = render(report_page(programme, checks, pictures))
     (output / _PAGE).write_text(text, encoding="utf-8")

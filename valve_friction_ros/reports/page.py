@@ -3,6 +3,7 @@
 import base64
 import io
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -88,12 +89,17 @@ class Picture:
     caption: str
     alt: str
 
-    @property
-    def source(self) -> str:
-        """The picture itself as a data address (PNG, base64)."""
+    @cached_property
+    def png(self) -> bytes:
+        """The picture itself, drawn once."""
         stream = io.BytesIO()
         self.figure.savefig(stream, format="png", dpi=_DOTS_PER_INCH)
-        return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode('ascii')}"
+        return stream.getvalue()
+
+    @property
+    def source(self) -> str:
+        """The picture as a data address (PNG, base64)."""
+        return f"data:image/png;base64,{base64.b64encode(self.png).decode('ascii')}"
 
 
 Block = Paragraph | Table | Picture

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["Check", "summary", "within", "written"]
+__all__ = ["Check", "compared", "summary", "within", "written"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,11 @@ class Check:
         Whether they do.
     why : str
         The reason, where they do not.
+
+    Raises
+    ------
+    ValueError
+        If a reason is given for a match, or none for a mismatch.
     """
 
     item: int
@@ -34,6 +39,18 @@ class Check:
     criterion: str
     matched: bool
     why: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a mismatch that nobody explains."""
+        if self.matched == bool(self.why):
+            raise ValueError(f"{self.name}: a reason belongs to a mismatch, and to nothing else")
+
+
+def compared(
+    item: int, name: str, paper: str, ours: str, criterion: str, matched: bool, why: str
+) -> Check:
+    """Return a check that keeps the reason only where it did not match."""
+    return Check(item, name, paper, ours, criterion, bool(matched), "" if matched else why)
 
 
 def written(value: float, digits: int = 4) -> str:
@@ -52,21 +69,19 @@ def within(
     paper: float,
     ours: float,
     share: float,
-    unit: str = "",
+    unit: str,
+    why: str,
     digits: int = 4,
-    why: str = "",
 ) -> Check:
     """Compare two numbers: equal within a share of the paper's."""
-    tail = f" {unit}" if unit else ""
-    matched = abs(ours - paper) <= share * abs(paper)
-    return Check(
+    return compared(
         item,
         name,
-        f"{written(paper, digits)}{tail}",
-        f"{written(ours, digits)}{tail}",
+        f"{written(paper, digits)} {unit}",
+        f"{written(ours, digits)} {unit}",
         f"within {100 * share:g} %",
-        matched,
-        "" if matched else why,
+        abs(ours - paper) <= share * abs(paper),
+        why,
     )
 
 
@@ -74,4 +89,4 @@ def summary(checks: Sequence[Check]) -> str:
     """Say in one line how many checks matched, and name those that did not."""
     missed = [check.name for check in checks if not check.matched]
     count = f"{len(checks) - len(missed)} of {len(checks)} matched"
-    return f"{count}; not matched: {'; '.join(missed)}" if missed else f"{count}."
+    return f"{count}; not matched: {'; '.join(missed)}." if missed else f"{count}."

@@ -39,7 +39,12 @@ class FreeSweep(NamedTuple):
     @property
     def chosen_estimates(self) -> dict[str, float]:
         """Estimates at the chosen δv, by name."""
-        return {name: float(one[self.chosen]) for name, one in self.sweep.estimates.items()}
+        return self.estimates_at(self.threshold)
+
+    def estimates_at(self, threshold: float) -> dict[str, float]:
+        """Return the estimates at the δv, m/s, nearest to `threshold`, by name."""
+        place = int(np.argmin(np.abs(self.sweep.thresholds - threshold)))
+        return {name: float(one[place]) for name, one in self.sweep.estimates.items()}
 
     @property
     def region(self) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from valve_friction_ros.identification import (
     step_test,
     validate,
 )
-from valve_friction_ros.model import KarnoppParameters, StemState, simulate
+from valve_friction_ros.model import KarnoppParameters, Recording, StemState, simulate
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.bench import Bench
 from valve_friction_ros.reproduction.experiments import Experiment, Experiments, Plan, run_all
@@ -31,6 +32,7 @@ __all__ = [
     "BenchResult",
     "Comparison",
     "Identified",
+    "MassByBias",
     "Programme",
     "compared",
     "identified",
@@ -38,6 +40,9 @@ __all__ = [
     "rounded_bias",
     "run_programme",
 ]
+
+_ROUNDING = 5e-6
+"""Half of the last digit of x̄ in (16), m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +137,33 @@ class BenchResult:
     steps: StepTest
 
 
+class MassByBias(NamedTuple):
+    """A mass, kg, as the sweep regresses it with a bias x̄, m."""
+
+    position_bias: float
+    mass: float
+
+
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """The results by bench, model 1 without any noise, and how noise scatters the estimates."""
+    """All results of the programme.
+
+    Attributes
+    ----------
+    results : mapping of str to BenchResult
+        By bench.
+    without_noise : mapping of str to Estimate
+        Model 1 of the paper's packings without any noise.
+    mass_by_bias : tuple of MassByBias
+        The mass of the packing "low" without noise, with x̄ at either end and in the middle of
+        what rounds to the same 0.01 mm.
+    scatter : Scatter
+        How noise scatters the estimates.
+    """
 
     results: Mapping[str, BenchResult]
     without_noise: Mapping[str, Estimate]
+    mass_by_bias: tuple[MassByBias, ...]
     scatter: Scatter
 
 
@@ -262,5 +288,19 @@ def run_programme(
         )
         for bench in published
     }
+    low = experiments["low"].square.clean
+    mass_by_bias = _mass_by_bias(benches["low"], low, without_noise["low"].threshold)
     scatter = measure_scatter(published, plan, seeds, progress)
-    return Programme(MappingProxyType(results), MappingProxyType(without_noise), scatter)
+    return Programme(
+        MappingProxyType(results), MappingProxyType(without_noise), mass_by_bias, scatter
+    )
+
+
+def _mass_by_bias(bench: Bench, recording: Recording, threshold: float) -> tuple[MassByBias, ...]:
+    middle = rounded_bias(bench.position_bias)
+    found = []
+    for bias in (middle - _ROUNDING, middle, middle + _ROUNDING):
+        settings = IdentificationSettings(position_bias=bias, assumed_mass=bench.assumed_mass)
+        sweep = free_sweep(recording, bench.valve, settings)
+        found.append(MassByBias(bias, sweep.estimates_at(threshold)["mass"]))
+    return tuple(found)

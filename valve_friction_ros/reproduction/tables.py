@@ -30,7 +30,7 @@ def check_table(checks: Sequence[Check], caption: str = "") -> Table:
             one.name,
             one.paper,
             one.ours,
-            one.criterion if one.matched else f"{one.criterion}. Not matched: {one.why}",
+            one.criterion if one.matched else f"{one.criterion}. Not matched: {one.why}.",
         )
         for one in checks
     )
@@ -203,7 +203,7 @@ def _step_row(step: StepMetrics) -> tuple[str, ...]:
     return (
         f"{step.time:.1f}",
         f"{step.input_change:+.2f}",
-        f"{step.output_change:+.2f}",
+        f"{step.output_change:+.2f}" if step.moved else "0",
         f"{step.gain:.3f}" if step.moved else "0",
         *(f"{value:.3f}" if step.moved else "–" for value in (step.dead_time, step.t63, step.t86)),
         f"{100 * step.overshoot:.1f}" if step.moved else "–",
