@@ -10,7 +10,7 @@ from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.checks import NOTATION
 from valve_friction_ros.reproduction.experiments import Experiment
 from valve_friction_ros.reproduction.programme import BenchResult, Comparison
-from valve_friction_ros.reproduction.record_figures import new_figure
+from valve_friction_ros.reproduction.record_figures import new_figure, packing_name
 
 __all__ = ["estimates_figure", "quality_figure", "validation_figure"]
 
@@ -75,32 +75,33 @@ def validation_figure(
     result: BenchResult, experiment: Experiment, models: dict[str, Comparison]
 ) -> Figure:
     """Draw one of Figs. 6 to 9: measured stem and models, and what lies between them."""
-    figure = new_figure(6.8)
-    stem, published, ours = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
-    recording = experiment.measured
-    some = thinned(len(recording))
-    time = recording.time[some]
-    stem.plot(time, recording.position[some] * 1e3, color="0.6", lw=3.0, label="measured")
     styles = {
         "model 1": (COLOURS[0], "-"),
         "model 2": (COLOURS[1], "--"),
         "paper's model 2": (COLOURS[2], "-."),
     }
-    for name, (colour, line) in styles.items():
-        if name not in models:
-            continue
+    drawn = {name: style for name, style in styles.items() if name in models}
+    of_paper = [name for name in drawn if name.startswith("paper")]
+    figure = new_figure(6.8)
+    rows = 3 if of_paper else 2
+    panels = figure.subplots(rows, 1, sharex=True, height_ratios=[2, *[1] * (rows - 1)])
+    stem = panels[0]
+    recording = experiment.measured
+    some = thinned(len(recording))
+    time = recording.time[some]
+    stem.plot(time, recording.position[some] * 1e3, color="0.6", lw=3.0, label="measured")
+    for name, (colour, line) in drawn.items():
         one = models[name]
-        stem.plot(
-            time, one.validation.simulated[some] * 1e3, line, color=colour, lw=1.1, label=name
-        )
-        error = one.error[some] * 1e6
-        axes = published if name.startswith("paper") else ours
-        axes.plot(time, error, line, color=colour, lw=1.1)
+        simulated = one.validation.simulated[some] * 1e3
+        stem.plot(time, simulated, line, color=colour, lw=1.1, label=name)
+        axes = panels[1] if name in of_paper else panels[-1]
+        axes.plot(time, one.error[some] * 1e6, line, color=colour, lw=1.1)
     stem.set_ylabel("stem position [mm]")
-    stem.set_title(f"{result.bench.name} friction")
-    published.set_ylabel("paper's model 2\nerror [µm]")
-    ours.set_ylabel("our models\nerror [µm]")
-    ours.set_xlabel("time [s]")
+    stem.set_title(packing_name(result))
+    if of_paper:
+        panels[1].set_ylabel("paper's model 2\nerror [µm]")
+    panels[-1].set_ylabel("our models\nerror [µm]")
+    panels[-1].set_xlabel("time [s]")
     figure.legend(*stem.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    dress([stem, published, ours])
+    dress(panels)
     return figure

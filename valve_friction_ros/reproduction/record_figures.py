@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from valve_friction_ros.plots import draw_breakaway_points
 from valve_friction_ros.plots.page import dress
 from valve_friction_ros.plots.panels import COLOURS, thinned
+from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.experiments import Experiment
 from valve_friction_ros.reproduction.force_terms import force_terms
 from valve_friction_ros.reproduction.programme import BenchResult
@@ -16,6 +17,7 @@ __all__ = [
     "force_terms_figure",
     "input_output_figure",
     "new_figure",
+    "packing_name",
     "signatures_figure",
 ]
 
@@ -23,6 +25,12 @@ __all__ = [
 def new_figure(height: float) -> Figure:
     """Return an empty figure of the page's width."""
     return Figure(figsize=(9.5, height), layout="constrained", dpi=110)
+
+
+def packing_name(result: BenchResult) -> str:
+    """Say which packing a result is of."""
+    name = result.bench.name
+    return f"{name} friction" if name in paper.PACKINGS else f"{name} packing"
 
 
 def _draw_pressure(axes: Axes, experiment: Experiment, duration: float) -> None:
@@ -79,7 +87,7 @@ def input_output_figure(low: BenchResult, high: BenchResult) -> Figure:
             spread = np.linspace(0, recording.duration, model.simulated.size)
             few = thinned(spread.size)
             bottom.plot(spread[few], model.simulated[few] * 1e3, "k:", lw=1.3, label="estimated")
-        top.set_title(f"{result.bench.name} friction")
+        top.set_title(packing_name(result))
         bottom.set_xlabel("time [s]")
     panels[0, 0].set_ylabel("pressure [kPa]")
     panels[1, 0].set_ylabel("stem position [mm]")
@@ -102,7 +110,7 @@ def signatures_figure(*results: BenchResult) -> Figure:
             recording.position[some] * 1e3,
             color=colour,
             lw=1.2,
-            label=f"{result.bench.name} friction: dead zone {zone:.2f} kPa",
+            label=f"{packing_name(result)}: dead zone {zone:.2f} kPa",
         )
         draw_breakaway_points(axes, signature, colour=colour)
         _draw_dead_zone(axes, result, colour)

@@ -9,6 +9,7 @@ from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.check import Check, written
 from valve_friction_ros.reproduction.checks import NOTATION
 from valve_friction_ros.reproduction.programme import BenchResult, Comparison, Programme
+from valve_friction_ros.reproduction.record_figures import packing_name
 
 __all__ = [
     "check_table",
@@ -108,7 +109,7 @@ def parameter_table(result: BenchResult) -> Table:
         )
     titles = ("paper, model 1", "paper, model 2", "truth", "model 1", "model 2", "refined")
     columns = (Column("parameter"), *(Column(title, is_number=True) for title in titles))
-    return Table(columns, tuple(rows), f"{name} friction; ± half the 95 % interval")
+    return Table(columns, tuple(rows), f"{packing_name(result)}; ± half the 95 % interval")
 
 
 def validation_table(models: Mapping[str, Comparison], caption: str) -> Table:
@@ -194,9 +195,7 @@ def step_table(result: BenchResult) -> Table:
         "overshoot [%]",
     )
     columns = (*(Column(title, is_number=True) for title in titles), Column("stem"))
-    return Table(
-        columns, rows, f"{result.bench.name} friction; in percent of pressure range and travel"
-    )
+    return Table(columns, rows, f"{packing_name(result)}; in percent of pressure range and travel")
 
 
 def _step_row(step: StepMetrics) -> tuple[str, ...]:
