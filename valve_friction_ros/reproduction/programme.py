@@ -61,6 +61,8 @@ class Identified:
         Model 2, from the triangle.
     refined : SweepAssessment
         Model 1 refined by simulation, from the square wave.
+    own_preload : SweepAssessment
+        The same with F_0 a parameter of its own in place of x̄, and the nominal mass given.
     """
 
     position_bias: float
@@ -68,6 +70,7 @@ class Identified:
     free: FreeSweep
     force_balance: ForceBalanceAssessment
     refined: SweepAssessment
+    own_preload: SweepAssessment
 
     @property
     def top_speed(self) -> float:
@@ -81,6 +84,7 @@ class Identified:
             "model 1": self.published.parameters(),
             "model 2": self.force_balance.model(),
             "refined": self.refined.model(),
+            "refined, own F_0": self.own_preload.model(),
         }
 
 
@@ -178,8 +182,9 @@ def identified(
     force_balance: ForceBalanceAssessment,
     position_bias: float,
 ) -> Identified:
-    """Identify model 1 and its refinement from the square wave, with x̄ from the triangle."""
+    """Identify the square wave: model 1 with x̄ from the triangle, and the refined model."""
     settings = IdentificationSettings(position_bias=position_bias, assumed_mass=bench.assumed_mass)
+    own_preload = IdentificationSettings(fixed={"mass": bench.assumed_mass})
     square = experiments.square.measured
     return Identified(
         position_bias,
@@ -187,6 +192,7 @@ def identified(
         free_sweep(square, bench.valve, settings),
         force_balance,
         assess(square, bench.valve, settings),
+        assess(square, bench.valve, own_preload),
     )
 
 

@@ -93,7 +93,7 @@ def parameter_table(result: BenchResult) -> Table:
             regressed = found.free.chosen_estimates["mass"]
             model_1 = written(regressed)
             if key in found.published.fixed:
-                model_1 += f" (not told; {published:g} assumed)"
+                model_1 += " (not told)"
         rows.append(
             (
                 f"{symbol} [{unit}]",
@@ -105,9 +105,18 @@ def parameter_table(result: BenchResult) -> Table:
                 model_1,
                 _interval(found.force_balance.parameters[key]),
                 _interval(found.refined.parameters[key]),
+                _interval(found.own_preload.parameters[key]),
             )
         )
-    titles = ("paper, model 1", "paper, model 2", "truth", "model 1", "model 2", "refined")
+    titles = (
+        "paper, model 1",
+        "paper, model 2",
+        "truth",
+        "model 1",
+        "model 2",
+        "refined",
+        "refined, own F_0",
+    )
     columns = (Column("parameter"), *(Column(title, is_number=True) for title in titles))
     return Table(columns, tuple(rows), f"{packing_name(result)}; ± half the 95 % interval")
 
