@@ -4,35 +4,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from valve_friction_ros.model import KarnoppParameters
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.check import Check, compared, within, written
 from valve_friction_ros.reproduction.experiments import SINE
 from valve_friction_ros.reproduction.force_terms import force_terms
+from valve_friction_ros.reproduction.parameter_checks import NOTATION, parameter_checks
 from valve_friction_ros.reproduction.programme import BenchResult, Programme
+from valve_friction_ros.reproduction.truth_checks import (
+    dead_band_checks,
+    graphite_checks,
+    noise_checks,
+)
 from valve_friction_ros.reproduction.validation_checks import validation_checks
 
-__all__ = ["NOTATION", "TOLERANCES", "all_checks"]
-
-NOTATION = {
-    "mass": ("m", "kg"),
-    "spring_constant": ("k", "N/m"),
-    "viscous_friction": ("F_v", "N·s/m"),
-    "coulomb_friction": ("F_c", "N"),
-    "static_friction": ("F_s", "N"),
-}
-"""Symbol and unit of the parameters of Table 1, in its order."""
-
-TOLERANCES = {
-    "mass": 0.1,
-    "spring_constant": 0.01,
-    "viscous_friction": 0.05,
-    "coulomb_friction": 0.05,
-    "static_friction": 0.05,
-}
-"""Shares of the paper's value within which a parameter counts as reproduced."""
-
-_EXACT = 1e-4
+__all__ = ["all_checks"]
 
 
 def all_checks(programme: Programme) -> tuple[Check, ...]:
@@ -47,9 +32,9 @@ def all_checks(programme: Programme) -> tuple[Check, ...]:
         *_table(high),
         *_terms(high),
         *validation_checks(programme),
-        *_dead_bands(low, high),
-        *_noise(programme),
-        *_graphite(programme),
+        *dead_band_checks(low, high),
+        *noise_checks(programme),
+        *graphite_checks(programme),
     )
 
 
@@ -188,31 +173,11 @@ def _sweep(low: BenchResult) -> Iterator[Check]:
     )
 
 
-def _parameter_checks(
-    item: int,
-    place: str,
-    wanted: KarnoppParameters,
-    found: dict[str, float],
-    reasons: dict[str, str],
-) -> Iterator[Check]:
-    for name, value in found.items():
-        symbol, unit = NOTATION[name]
-        yield within(
-            item,
-            f"{place}, {symbol}",
-            getattr(wanted, name),
-            value,
-            TOLERANCES[name],
-            unit,
-            why=reasons.get(name, "so far the noise of this run leads the method astray"),
-        )
-
-
 def _table(one: BenchResult) -> Iterator[Check]:
     name, found = one.bench.name, one.identified
     mass = {"mass": found.free.chosen_estimates["mass"]}
     sweep = {key: found.published.values[key] for key in NOTATION}
-    yield from _parameter_checks(
+    yield from parameter_checks(
         5,
         f"Table 1, model 1, {name}",
         paper.MODEL_1[name],
@@ -223,7 +188,7 @@ def _table(one: BenchResult) -> Iterator[Check]:
         },
     )
     balance = {key: found.force_balance.values[key] for key in NOTATION if key != "mass"}
-    yield from _parameter_checks(
+    yield from parameter_checks(
         5,
         f"Table 1, model 2, {name}",
         paper.MODEL_2[name],
@@ -260,62 +225,3 @@ def _terms(high: BenchResult) -> Iterator[Check]:
         max(viscous, inertia) < 0.05 * spring,
         "the noise of this run hides it",
     )
-
-
-def _dead_bands(low: BenchResult, high: BenchResult) -> Iterator[Check]:
-    for one in (low, high):
-        truth = 2 * one.bench.truth.static_friction / one.bench.valve.diaphragm_area
-        share = 100 * truth / paper.PRESSURE_SPAN
-        band = one.steps.dead_band
-        yield compared(
-            8,
-            f"ISA dead band, {one.bench.name} (truth instead of paper)",
-            f"{share:.2f} %",
-            f"{band.ignored:.2f} to {band.answered:.2f} %",
-            "2·F_s/S_a lies between",
-            band.ignored <= share <= band.answered,
-            "the noise of this run hides it",
-        )
-
-
-def _noise(programme: Programme) -> Iterator[Check]:
-    for name, estimate in programme.without_noise.items():
-        truth, found = programme.results[name].bench.truth, estimate.values
-        errors = {key: abs(found[key] / getattr(truth, key) - 1) for key in NOTATION}
-        mass = errors.pop("mass")
-        yield compared(
-            9,
-            f"model 1 without noise, {name} (truth instead of paper)",
-            "k, F_v, F_c, F_s, m",
-            f"off by {100 * max(errors.values()):.1g} %, m by {100 * mass:.1f} %",
-            "k, F_v, F_c, F_s within 0.01 %, m within 10 %",
-            max(errors.values()) <= _EXACT and mass <= TOLERANCES["mass"],
-            "the configured bench is another than the one that this holds for",
-        )
-    masses = np.array([paper.MODEL_1[name].mass for name in paper.PACKINGS])
-    published = float(np.sqrt(np.mean((masses / paper.NOMINAL_MASS - 1) ** 2)))
-    for name in paper.PACKINGS:
-        bench = programme.results[name].bench
-        level = programme.scatter.level(name, bench.noise)
-        ours = level.deviation["mass"] / bench.truth.mass
-        matched = 0.5 <= ours / published <= 2
-        yield compared(
-            9,
-            f"Table 1, scatter of the regressed mass, {name}",
-            f"{100 * published:.0f} % (rms, about the nominal mass)",
-            f"{100 * ours:.2g} %",
-            "within a factor of 2",
-            matched,
-            "no noise serves both packings: with ten times the viscous friction, noise of the "
-            "velocity weighs ten times as much on the mass",
-        )
-
-
-def _graphite(programme: Programme) -> Iterator[Check]:
-    one = programme.results["graphite"]
-    names = ("coulomb_friction", "static_friction", "spring_constant")
-    for method, model in one.identified.models().items():
-        found = {name: getattr(model, name) for name in names}
-        yield from _parameter_checks(
-            10, f"graphite (truth instead of paper), {method}", one.bench.truth, found, {}
-        )

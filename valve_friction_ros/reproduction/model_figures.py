@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from valve_friction_ros.plots.page import dress
 from valve_friction_ros.plots.panels import COLOURS, thinned
 from valve_friction_ros.reproduction import paper
-from valve_friction_ros.reproduction.checks import NOTATION
 from valve_friction_ros.reproduction.experiments import Experiment
+from valve_friction_ros.reproduction.parameter_checks import NOTATION
 from valve_friction_ros.reproduction.programme import BenchResult, Comparison
 from valve_friction_ros.reproduction.record_figures import new_figure, packing_name
 

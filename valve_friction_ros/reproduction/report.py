@@ -278,8 +278,8 @@ def _graphite(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
             f"F_0 is {one.bench.truth.spring_preload:.0f} N, eleven times that of "
             "the Teflon packing, so "
             "that an error of k in (15) weighs eleven times as much in x̄ of (14), which model 1 is "
-            "given; the refinement then explains the rest by a clock offset that the bench does not "
-            "have. With F_0 identified instead, and the mass given, it needs none. "
+            "given; the refinement then explains the rest by a clock offset that the bench has "
+            "not. With F_0 identified instead, and the mass given, it needs none. "
             f"On the sine model 1 is off by {1e6 * one.sine['model 1'].true_rms:.2g} µm rms, "
             f"model 2 by {1e6 * one.sine['model 2'].true_rms:.2g} µm."
         ),
