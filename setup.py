@@ -53,6 +53,7 @@ setup(
             "demo = valve_friction_ros.commands.demo:main",
             "validate_recording = valve_friction_ros.commands.validate_recording:main",
             "history = valve_friction_ros.commands.history:main",
+            "reproduce_paper = valve_friction_ros.commands.reproduce_paper:main",
             "identify_recording = valve_friction_ros.commands.identify_recording:main",
             "identify_recordings = valve_friction_ros.commands.identify_recordings:main",
         ],

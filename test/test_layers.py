@@ -17,6 +17,7 @@ MAY_IMPORT = {
     "model": set(),
     "identification": {"model"},
     "monitoring": {"identification", "model"},
+    "reproduction": {"reports", "plots", "monitoring", "identification", "model"},
     "reports": {"plots", "monitoring", "identification", "model"},
     "plots": {"monitoring", "identification", "model"},
     "fleet": {"monitoring", "identification", "model"},

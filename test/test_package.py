@@ -27,6 +27,7 @@ EXECUTABLES = {
     "identify_recording",
     "identify_recordings",
     "pressure_source",
+    "reproduce_paper",
     "simulator",
     "validate_recording",
 }

@@ -1,0 +1,123 @@
+"""The command: what it writes, what it says last, and what it refuses."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from valve_friction_ros.commands.reproduce_paper import main
+from valve_friction_ros.reproduction import all_checks
+
+PICTURES = {
+    "excitations",
+    "figure_1",
+    "figure_2",
+    "figure_2_graphite",
+    "figure_3_low",
+    "figure_3_high",
+    "figure_4_low",
+    "figure_4_high",
+    "figure_5",
+    "figure_6",
+    "figure_7",
+    "figure_8",
+    "figure_9",
+    "validation_graphite_isa",
+}
+
+
+class Reader(HTMLParser):
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.text, self.images = [], {}, 0
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.images += tag == "img" and dict(attrs)["src"].startswith("data:image/png;base64,")
+
+    def handle_data(self, data):
+        self.text.setdefault(self.open[-1] if self.open else "", []).append(data.strip())
+
+
+@pytest.fixture(scope="module")
+def page(reproduced):
+    return Reader((reproduced.output / "reproduction.html").read_text(encoding="utf-8"))
+
+
+def test_the_report_and_every_figure_are_written(reproduced):
+    assert reproduced.code == 0
+    names = {path.name for path in reproduced.output.iterdir()}
+    assert names == {"reproduction.html", *(f"{name}.png" for name in PICTURES)}
+    for name in PICTURES:
+        assert (reproduced.output / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_last_line_counts_and_names(reproduced):
+    checks = all_checks(reproduced.programme)
+    missed = [check.name for check in checks if not check.matched]
+    count, _, names = reproduced.lines[-1].partition("; not matched: ")
+    assert count == f"{len(checks) - len(missed)} of {len(checks)} matched"
+    assert names == "; ".join(missed) + "."
+
+
+def test_every_item_has_its_section_and_its_checks(reproduced, page):
+    titles = [title for title in page.text["h2"] if title]
+    assert [title.partition(".")[0] for title in titles] == [str(n) for n in range(1, 11)]
+    checks = all_checks(reproduced.programme)
+    assert {check.item for check in checks} == set(range(1, 11))
+    cells = page.text["td"]
+    assert cells.count("✓") == sum(check.matched for check in checks)
+    assert cells.count("✗") == sum(not check.matched for check in checks)
+    for check in checks:
+        assert check.name in cells
+    assert page.images == len(PICTURES)
+
+
+def test_the_page_needs_no_other_file(reproduced):
+    text = (reproduced.output / "reproduction.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?:|<script|<link|url\(", text)
+
+
+def test_the_noise_of_the_run_is_stated(page):
+    assert any("1 µm and 5 Pa (standard deviations), seed 3" in text for text in page.text["p"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--seed", "-1"], "--seed must not be negative"),
+        (["--position-noise-um", "-1"], "position"),
+        (["--pressure-noise-pa", "nan"], "pressure"),
+        (["--config", "nowhere"], "bench_low.yaml"),
+    ],
+)
+def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, told):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("reproduce_paper: ")
+    assert told in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_that_is_a_file_is_refused(tmp_path, capsys):
+    (tmp_path / "taken").write_text("")
+    assert main(["--output", str(tmp_path / "taken")]) == 2
+    assert "taken" in capsys.readouterr().err
+
+
+def test_noise_of_the_command_line_replaces_the_configured(monkeypatch, tmp_path):
+    from valve_friction_ros.commands import reproduce_paper
+
+    seen = {}
+
+    def refuse(benches, *_):
+        seen.update({name: bench.noise for name, bench in benches.items()})
+        raise ValueError("enough")
+
+    monkeypatch.setattr(reproduce_paper, "run_programme", refuse)
+    options = ["--output", str(tmp_path), "--position-noise-um", "0", "--pressure-noise-pa", "7"]
+    assert main([*options, "--seed", "4"]) == 2
+    assert {(one.position, one.pressure, one.seed) for one in seen.values()} == {(0.0, 7.0, 4)}

@@ -1,0 +1,199 @@
+"""The programme: exact where there is no noise, and checks that can fail."""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import IdentificationSettings, assess_force_balance, identify
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    GRAPHITE_PACKING,
+    GRAPHITE_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    SensorNoise,
+    SquareWave,
+)
+from valve_friction_ros.reproduction import (
+    BENCH_NAMES,
+    Check,
+    all_checks,
+    find_bench_folder,
+    progress_steps,
+    read_bench,
+    run,
+    summary,
+)
+from valve_friction_ros.reproduction.check import within, written
+from valve_friction_ros.reproduction.experiments import TRIANGLE
+from valve_friction_ros.reproduction.force_terms import force_terms
+from valve_friction_ros.reproduction.programme import rounded_bias
+
+KNOWN = {
+    "low": (BENCH_VALVE, LOW_FRICTION),
+    "high": (BENCH_VALVE, HIGH_FRICTION),
+    "graphite": (GRAPHITE_VALVE, GRAPHITE_PACKING),
+}
+
+
+def bench(name, noise=None):
+    found = read_bench(find_bench_folder(), name)
+    return found if noise is None else found.with_noise(noise)
+
+
+@pytest.mark.parametrize("name", BENCH_NAMES)
+def test_configured_benches_are_those_of_the_model(name):
+    found = bench(name)
+    valve, truth = KNOWN[name]
+    assert found.valve == valve
+    assert vars(found.truth) == pytest.approx(vars(truth), rel=1e-15)
+    assert found.square == SquareWave()
+    assert found.noise == SensorNoise(1e-6, 5.0)
+    assert (found.sample_period, found.converter_lag, found.assumed_mass) == (1e-3, 1.3, 1.6)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("mass: 1.542", "mass: heavy"), "simulator.mass"),
+        (("mass: 1.542", "mass: -1.0"), "mass"),
+        (("position_noise", "position_nois"), "simulator has no position_noise"),
+        (("  pressure_source:", "  source:"), "no parameters of pressure_source"),
+        (("sample_rate: 1000.0", "sample_rate: 0.0"), "sample_rate"),
+        (("/**:", "/**: ["), "not YAML"),
+    ],
+)
+def test_wrong_bench_files_are_refused_in_one_line(tmp_path, change, told):
+    text = (find_bench_folder() / "bench_low.yaml").read_text(encoding="utf-8")
+    (tmp_path / "bench_low.yaml").write_text(text.replace(*change), encoding="utf-8")
+    with pytest.raises(ValueError, match=told) as raised:
+        read_bench(tmp_path, "low")
+    assert "bench_low.yaml" in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_missing_bench_file_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"bench_high\.yaml: cannot be read"):
+        read_bench(tmp_path, "high")
+
+
+@pytest.mark.parametrize("name", ["low", "high"])
+def test_without_noise_model_1_is_the_truth(name):
+    """The paper's whole way, x̄ from the triangle included."""
+    silent = bench(name, SensorNoise())
+    triangle = run(silent, TRIANGLE, 2.5 * TRIANGLE.period)
+    np.testing.assert_array_equal(triangle.measured.position, triangle.clean.position)
+    signature = assess_force_balance(triangle.measured, silent.valve).signature
+    bias = rounded_bias(signature.position_bias)
+    assert bias == 1.13e-3
+    square = run(silent, silent.square, 3 * silent.square.period)
+    settings = IdentificationSettings(position_bias=bias, assumed_mass=1.6)
+    found = identify(square.measured, silent.valve, settings).values
+    for key in ("viscous_friction", "coulomb_friction", "static_friction", "spring_constant"):
+        assert found[key] == pytest.approx(getattr(silent.truth, key), rel=1e-4)
+
+
+def test_noise_is_of_the_sensors_only_and_by_the_seed():
+    first, again, other = (
+        run(bench("low", SensorNoise(1e-5, 100.0, seed)), SquareWave(), 10.4) for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(first.measured.position, again.measured.position)
+    assert not np.array_equal(first.measured.position, other.measured.position)
+    np.testing.assert_array_equal(first.clean.position, other.clean.position)
+    error = first.measured.position - first.clean.position
+    assert np.std(error) == pytest.approx(1e-5, rel=4 / np.sqrt(2 * error.size))
+
+
+def test_x_bar_is_rounded_like_the_papers():
+    assert rounded_bias(1.12344e-3, 1.1378e-3) == 1.13e-3
+    assert rounded_bias(1.1249e-3, 1.1251e-3) == pytest.approx(1.125e-3)
+
+
+def test_numbers_are_written_with_their_digits():
+    assert [written(x) for x in (205000.4, 152.7, 0.0081234, 0.0)] == [
+        "205000",
+        "152.7",
+        "0.008123",
+        "0",
+    ]
+    assert written(float("nan")) == "–"
+
+
+def test_a_check_fails_beyond_its_criterion_and_says_why():
+    assert within(1, "k", 100.0, 101.0, 0.01, "N/m", "because").matched
+    missed = within(1, "k", 100.0, 101.1, 0.01, "N/m", "because")
+    assert (missed.matched, missed.why) == (False, "because")
+    assert not within(1, "k", 100.0, float("nan"), 0.01, "N/m", "because").matched
+    with pytest.raises(ValueError, match="reason"):
+        Check(1, "k", "", "", "", matched=False)
+    good = within(1, "m", 1.0, 1.0, 0.01, "kg", "because")
+    assert summary([good, missed]) == "1 of 2 matched; not matched: k."
+    assert summary([good]) == "1 of 1 matched."
+
+
+def missed(programme):
+    return {check.name for check in all_checks(programme) if not check.matched}
+
+
+def test_what_cannot_match_does_not(reproduced):
+    """The paper contradicts itself in k, and its model 2 is not the simulated valve."""
+    names = missed(reproduced.programme)
+    assert names >= {
+        "section 5, lowest pressure of the sine",
+        "(16), k of (15), low",
+        "Table 1, model 2, low, F_v",
+        "Table 1, model 2, high, F_v",
+        "Table 1, model 2, high, F_c",
+        "Fig. 7, model 2 deviates visibly",
+    }
+    assert not any(name.startswith(("Fig. 2", "Fig. 5")) for name in names)
+    for symbol in ("k", "F_v", "F_c", "F_s"):
+        for name in ("low", "high"):
+            assert f"Table 1, model 1, {name}, {symbol}" not in names
+
+
+def with_low(programme, result):
+    results = {**programme.results, "low": result}
+    return replace(programme, results=MappingProxyType(results))
+
+
+def test_a_wrong_model_1_would_be_noticed(reproduced):
+    programme = reproduced.programme
+    low = programme.results["low"]
+    published = replace(low.identified.published, coulomb_friction=152.7 * 1.06)
+    wrong = replace(low, identified=replace(low.identified, published=published))
+    assert missed(with_low(programme, wrong)) - missed(programme) == {"Table 1, model 1, low, F_c"}
+
+
+def test_a_wrong_winner_would_be_noticed(reproduced):
+    programme = reproduced.programme
+    low = programme.results["low"]
+    swapped = {**low.sine, "model 1": low.sine["model 2"], "model 2": low.sine["model 1"]}
+    wrong = replace(low, sine=MappingProxyType(swapped))
+    assert "Fig. 6, model 1 beats model 2" in missed(with_low(programme, wrong))
+    assert "Fig. 6, model 1 beats model 2" not in missed(programme)
+
+
+def test_graphite_is_told_from_teflon(reproduced):
+    for name, result in reproduced.programme.results.items():
+        model = result.identified.force_balance.model()
+        assert (model.static_friction > model.coulomb_friction) == (name == "graphite")
+
+
+def test_terms_add_up_to_the_force_while_the_stem_slides(reproduced):
+    result = reproduced.programme.results["high"]
+    time, terms = force_terms(result)
+    clean = result.experiments.sine.clean
+    first = round(time[0] / clean.sample_period)
+    force = result.bench.valve.actuator_force(clean.pressure[first : first + time.size])
+    # Far from a rest, where the window of the derivatives would reach into it.
+    middle = np.abs(terms["F_v·ẋ"]) > 0.8 * np.max(np.abs(terms["F_v·ẋ"]))
+    assert np.count_nonzero(middle) > 1000
+    residual = (sum(terms.values()) - force)[middle]
+    assert np.max(np.abs(residual)) < 0.01 * result.bench.truth.coulomb_friction
+
+
+def test_progress_is_told_as_often_as_announced(reproduced):
+    assert len(reproduced.told) == progress_steps(reproduced.programme.results)

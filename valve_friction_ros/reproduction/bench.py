@@ -1,0 +1,139 @@
+"""The benches on which the paper is reproduced, as their configuration files describe them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from valve_friction_ros.model import KarnoppParameters, SensorNoise, SquareWave, Valve
+from valve_friction_ros.model.checks import require_finite, require_positive
+
+__all__ = ["BENCH_NAMES", "Bench", "find_bench_folder", "read_bench"]
+
+BENCH_NAMES = ("low", "high", "graphite")
+"""The benches of ``config/bench_<name>.yaml``: the paper's two, and the packing it announces."""
+
+_PARAMETERS = tuple(field.name for field in fields(KarnoppParameters))
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A simulated valve with its converter and its sensors.
+
+    Attributes
+    ----------
+    name : str
+        What the packing is called: low, high, graphite.
+    valve : Valve
+        Geometry.
+    truth : KarnoppParameters
+        What the identification is to find.
+    square : SquareWave
+        The identification signal.
+    converter_lag : float
+        Time constant of the V/P converter, s.
+    sample_period : float
+        Time between two samples of both sensors, s.
+    noise : SensorNoise
+        Of both sensors; the stem feels the pressure without it.
+    assumed_mass : float
+        The nominal mass of the moving parts, kg.
+    """
+
+    name: str
+    valve: Valve
+    truth: KarnoppParameters
+    square: SquareWave
+    converter_lag: float
+    sample_period: float
+    noise: SensorNoise
+    assumed_mass: float
+
+    @property
+    def position_bias(self) -> float:
+        """The true x̄ of (10), m."""
+        return self.truth.spring_preload / self.truth.spring_constant
+
+    def with_noise(self, noise: SensorNoise) -> "Bench":
+        """Return the same bench with other noise."""
+        return replace(self, noise=noise)
+
+
+def find_bench_folder() -> Path:
+    """Find the folder of the configuration files, in the sources or where they are installed.
+
+    Raises
+    ------
+    ValueError
+        If it is nowhere.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for above in package.parents:
+        for folder in (above / "config", above / "share" / package.name / "config"):
+            if (folder / f"bench_{BENCH_NAMES[0]}.yaml").is_file():
+                return folder
+    raise ValueError(f"the folder config of {package.name} is not there: give it by --config")
+
+
+def read_bench(folder: Path, name: str) -> Bench:
+    """Read a bench from ``bench_<name>.yaml``, the parameter file of its three nodes.
+
+    Raises
+    ------
+    ValueError
+        In one line: the file, and what is wrong with it.
+    """
+    path = folder / f"bench_{name}.yaml"
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        cause = (isinstance(error, OSError) and error.strerror) or error
+        raise ValueError(f"{path}: cannot be read: {cause}") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    try:
+        source, simulator, identifier = (
+            _Section(content, node) for node in ("pressure_source", "simulator", "identifier")
+        )
+        return Bench(
+            name=name,
+            valve=Valve(
+                diaphragm_area=simulator["diaphragm_area"],
+                pressure_reference=simulator["pressure_reference"],
+                travel=simulator["travel"],
+                pressure_minimum=identifier["pressure_minimum"],
+                pressure_maximum=identifier["pressure_maximum"],
+            ),
+            truth=KarnoppParameters(
+                **{key: simulator[key] for key in _PARAMETERS if key in simulator}
+            ),
+            square=SquareWave(source["low"], source["high"], source["period"]),
+            converter_lag=source["converter_lag"],
+            sample_period=1 / require_positive("sample_rate", source["sample_rate"]),
+            noise=SensorNoise(simulator["position_noise"], source["pressure_noise"]),
+            assumed_mass=identifier["assumed_mass"],
+        )
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+class _Section:
+    """The numbers of one node in a parameter file."""
+
+    def __init__(self, content: Any, node: str) -> None:
+        inner = content
+        for key in ("/**", node, "ros__parameters"):
+            inner = inner.get(key) if isinstance(inner, Mapping) else None
+        if not isinstance(inner, Mapping):
+            raise ValueError(f"there are no parameters of {node}")
+        self._node, self._values = node, inner
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._values
+
+    def __getitem__(self, name: str) -> float:
+        if name not in self._values:
+            raise ValueError(f"{self._node} has no {name}")
+        return require_finite(f"{self._node}.{name}", self._values[name])

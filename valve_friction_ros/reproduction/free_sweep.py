@@ -1,0 +1,72 @@
+"""The sweep as the paper regresses it: four parameters, the mass among them, told or not."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    Sweep,
+    differentiate,
+    sweep_thresholds,
+)
+from valve_friction_ros.identification.force_balance_regression import force_balance_regression
+from valve_friction_ros.identification.threshold import choose_threshold
+from valve_friction_ros.model import Recording, Valve
+
+__all__ = ["FreeSweep", "free_sweep"]
+
+_REGION = 1.05
+"""σ_s up to this multiple of the least belongs to the region that the paper chooses from."""
+
+
+class FreeSweep(NamedTuple):
+    """A sweep of all four parameters of (3), and the step that is chosen.
+
+    `identify` regresses anew with an assumed mass where the record does not tell it; here the
+    regressed one stays, whatever it is worth.
+    """
+
+    sweep: Sweep
+    chosen: int
+    window: int
+
+    @property
+    def threshold(self) -> float:
+        """The chosen δv, m/s."""
+        return float(self.sweep.thresholds[self.chosen])
+
+    @property
+    def chosen_estimates(self) -> dict[str, float]:
+        """Estimates at the chosen δv, by name."""
+        return self.estimates_at(self.threshold)
+
+    def estimates_at(self, threshold: float) -> dict[str, float]:
+        """Return the estimates at the δv, m/s, nearest to `threshold`, by name."""
+        place = int(np.argmin(np.abs(self.sweep.thresholds - threshold)))
+        return {name: float(one[place]) for name, one in self.sweep.estimates.items()}
+
+    @property
+    def region(self) -> tuple[float, float]:
+        """From the least to the largest δv, m/s, with a σ_s within 5 % of the least.
+
+        Where samples are fewer than four derivative windows, σ_s means nothing and is left out.
+        """
+        sweep = self.sweep
+        usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * self.window)
+        sigma = np.where(usable, sweep.sigma, np.inf)
+        inside = sweep.thresholds[sigma <= _REGION * sigma.min()]
+        return float(inside[0]), float(inside[-1])
+
+
+def free_sweep(recording: Recording, valve: Valve, settings: IdentificationSettings) -> FreeSweep:
+    """Sweep (3) to (8) with (17) and (18), nothing assumed."""
+    derivatives = differentiate(
+        recording.position, recording.sample_period, settings.window, settings.order
+    )
+    force = valve.actuator_force(recording.pressure)
+    regression = force_balance_regression(force, recording.position, derivatives, settings)
+    first = float(regression.speed.max()) / settings.resolution
+    steps = np.arange(1, settings.steps + 1, dtype=np.float64)
+    sweep = sweep_thresholds(regression, np.multiply(first, steps, dtype=np.float64))
+    return FreeSweep(sweep, choose_threshold(sweep, settings.window), settings.window)

@@ -1,0 +1,312 @@
+"""The paper's programme: experiments, identification by each method, validation."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification import (
+    Estimate,
+    ForceBalanceAssessment,
+    IdentificationSettings,
+    StepTest,
+    SweepAssessment,
+    Validation,
+    assess,
+    assess_force_balance,
+    identify,
+    step_test,
+    validate,
+)
+from valve_friction_ros.model import KarnoppParameters, Recording, StemState, simulate
+from valve_friction_ros.reproduction import paper
+from valve_friction_ros.reproduction.bench import Bench
+from valve_friction_ros.reproduction.experiments import Experiment, Experiments, Plan, run_all
+from valve_friction_ros.reproduction.free_sweep import FreeSweep, free_sweep
+from valve_friction_ros.reproduction.scatter import Scatter, measure_scatter
+
+__all__ = [
+    "BenchResult",
+    "Comparison",
+    "Identified",
+    "MassByBias",
+    "Programme",
+    "compared",
+    "identified",
+    "progress_steps",
+    "rounded_bias",
+    "run_programme",
+]
+
+_ROUNDING = 5e-6
+"""Half of the last digit of x̄ in (16), m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What each method makes of the records of one bench.
+
+    Attributes
+    ----------
+    position_bias : float
+        x̄ that model 1 was given, m.
+    published : Estimate
+        Model 1, the sweep, from the square wave.
+    free : FreeSweep
+        The same with the mass as it is regressed, for Figs. 3 and 4.
+    force_balance : ForceBalanceAssessment
+        Model 2, from the triangle.
+    refined : SweepAssessment
+        Model 1 refined by simulation, from the square wave.
+    own_preload : SweepAssessment
+        The same with F_0 a parameter of its own in place of x̄, and the nominal mass given.
+    """
+
+    position_bias: float
+    published: Estimate
+    free: FreeSweep
+    force_balance: ForceBalanceAssessment
+    refined: SweepAssessment
+    own_preload: SweepAssessment
+
+    @property
+    def top_speed(self) -> float:
+        """|ẋ|max of (8), m/s, as the derivatives show it."""
+        first = self.free.sweep.thresholds[0]
+        return float(first * self.published.settings.resolution)
+
+    def models(self) -> dict[str, KarnoppParameters]:
+        """Return the models to simulate, by name, with DV = 0."""
+        return {
+            "model 1": self.published.parameters(),
+            "model 2": self.force_balance.model(),
+            "refined": self.refined.model(),
+            "refined, own F_0": self.own_preload.model(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model beside a record, and beside the stem without sensor noise.
+
+    Attributes
+    ----------
+    validation : Validation
+        Against what the sensors saw.
+    error : ndarray of float, shape (n,)
+        Stem of the model less that of the true valve, both under the true pressure, m.
+    """
+
+    validation: Validation
+    error: NDArray[np.float64] = field(repr=False)
+
+    @property
+    def true_rms(self) -> float:
+        """Root mean square of `error`, m."""
+        return float(np.sqrt(np.mean(self.error**2)))
+
+    @property
+    def true_maximum(self) -> float:
+        """Largest magnitude of `error`, m."""
+        return float(np.max(np.abs(self.error)))
+
+
+@dataclass(frozen=True, eq=False)
+class BenchResult:
+    """All that the programme yields on one bench.
+
+    Attributes
+    ----------
+    bench : Bench
+        The simulated valve.
+    experiments : Experiments
+        Its records.
+    identified : Identified
+        Its models.
+    sine, isa : mapping of str to Comparison
+        Validations by model: those of `Identified.models`, and of the paper's packings also
+        "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1.
+    steps : StepTest
+        Metrics of the ISA test, input and position in percent of their spans.
+    """
+
+    bench: Bench
+    experiments: Experiments
+    identified: Identified
+    sine: Mapping[str, Comparison]
+    isa: Mapping[str, Comparison]
+    steps: StepTest
+
+
+class MassByBias(NamedTuple):
+    """A mass, kg, as the sweep regresses it with a bias x̄, m."""
+
+    position_bias: float
+    mass: float
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """All results of the programme.
+
+    Attributes
+    ----------
+    results : mapping of str to BenchResult
+        By bench.
+    without_noise : mapping of str to Estimate
+        Model 1 of the paper's packings without any noise.
+    mass_by_bias : tuple of MassByBias
+        The mass of the packing "low" without noise, with x̄ at either end and in the middle of
+        what rounds to the same 0.01 mm.
+    scatter : Scatter
+        How noise scatters the estimates.
+    """
+
+    results: Mapping[str, BenchResult]
+    without_noise: Mapping[str, Estimate]
+    mass_by_bias: tuple[MassByBias, ...]
+    scatter: Scatter
+
+
+def rounded_bias(*biases: float) -> float:
+    """Return the mean of x̄, m, each rounded to 0.01 mm as the paper does it in (16)."""
+    return round(sum(round(bias, 5) for bias in biases) / len(biases), 6)
+
+
+def identified(
+    bench: Bench,
+    experiments: Experiments,
+    force_balance: ForceBalanceAssessment,
+    position_bias: float,
+) -> Identified:
+    """Identify the square wave: model 1 with x̄ from the triangle, and the refined model."""
+    settings = IdentificationSettings(position_bias=position_bias, assumed_mass=bench.assumed_mass)
+    own_preload = IdentificationSettings(fixed={"mass": bench.assumed_mass})
+    square = experiments.square.measured
+    return Identified(
+        position_bias,
+        identify(square, bench.valve, settings),
+        free_sweep(square, bench.valve, settings),
+        force_balance,
+        assess(square, bench.valve, settings),
+        assess(square, bench.valve, own_preload),
+    )
+
+
+def compared(bench: Bench, experiment: Experiment, model: KarnoppParameters) -> Comparison:
+    """Simulate an experiment with a model, and compare the stems."""
+    clean = experiment.clean
+    start = StemState(float(clean.position[0]))
+    stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
+    return Comparison(
+        validate(experiment.measured, bench.valve, model), stem.position - clean.position
+    )
+
+
+def _steps(bench: Bench, isa: Experiment) -> StepTest:
+    recording = isa.measured
+    share = (recording.pressure - isa.command[0]) / paper.PRESSURE_SPAN
+    starts = [int(start) for start in np.flatnonzero(np.diff(isa.command)) + 1]
+    return step_test(
+        100 * share,
+        100 * recording.position / bench.valve.travel,
+        recording.sample_period,
+        starts,
+    )
+
+
+def _result(bench: Bench, experiments: Experiments, found: Identified) -> BenchResult:
+    models = found.models()
+    if bench.name in paper.PACKINGS:
+        models["model 1, DV 1 %"] = replace(
+            models["model 1"], limit_velocity=0.01 * found.top_speed
+        )
+        models["paper's model 2"] = paper.MODEL_2[bench.name]
+    sine, isa = (
+        MappingProxyType({name: compared(bench, one, model) for name, model in models.items()})
+        for one in (experiments.sine, experiments.isa)
+    )
+    return BenchResult(bench, experiments, found, sine, isa, _steps(bench, experiments.isa))
+
+
+def progress_steps(benches: Mapping[str, Bench]) -> int:
+    """Count how often `run_programme` tells of its progress."""
+    return 2 * len(benches) + 1 + 2 * len(paper.PACKINGS)
+
+
+def run_programme(
+    benches: Mapping[str, Bench],
+    plan: Plan,
+    seeds: int,
+    progress: Callable[[str], object] = lambda _: None,
+) -> Programme:
+    """Run the whole programme.
+
+    Parameters
+    ----------
+    benches : mapping of str to Bench
+        By name, the paper's two packings among them; x̄ is shared between these, as in the paper.
+    plan : Plan
+        How much is recorded.
+    seeds : int
+        Repetitions with other noise, for the scatter.
+    progress : callable
+        Is told what is done next.
+
+    Returns
+    -------
+    Programme
+        All results.
+
+    Raises
+    ------
+    RefusalError, ValueError
+        If the noise hides what a method needs; the message says what.
+    """
+    experiments, balances = {}, {}
+    for name, bench in benches.items():
+        progress(f"{name}: experiments and valve signature")
+        experiments[name] = run_all(bench, plan)
+        settings = IdentificationSettings(assumed_mass=bench.assumed_mass)
+        balances[name] = assess_force_balance(
+            experiments[name].triangle.measured, bench.valve, settings
+        )
+    biases = {name: each.signature.position_bias for name, each in balances.items()}
+    shared = rounded_bias(*(biases[name] for name in paper.PACKINGS))
+    results = {}
+    for name, bench in benches.items():
+        progress(f"{name}: models and validation")
+        bias = shared if name in paper.PACKINGS else rounded_bias(biases[name])
+        found = identified(bench, experiments[name], balances[name], bias)
+        results[name] = _result(bench, experiments[name], found)
+    published = [benches[name] for name in paper.PACKINGS]
+    progress("without noise")
+    without_noise = {
+        bench.name: identify(
+            experiments[bench.name].square.clean,
+            bench.valve,
+            IdentificationSettings(
+                position_bias=rounded_bias(bench.position_bias), assumed_mass=bench.assumed_mass
+            ),
+        )
+        for bench in published
+    }
+    low = experiments["low"].square.clean
+    mass_by_bias = _mass_by_bias(benches["low"], low, without_noise["low"].threshold)
+    scatter = measure_scatter(published, plan, seeds, progress)
+    return Programme(
+        MappingProxyType(results), MappingProxyType(without_noise), mass_by_bias, scatter
+    )
+
+
+def _mass_by_bias(bench: Bench, recording: Recording, threshold: float) -> tuple[MassByBias, ...]:
+    middle = rounded_bias(bench.position_bias)
+    found = []
+    for bias in (middle - _ROUNDING, middle, middle + _ROUNDING):
+        settings = IdentificationSettings(position_bias=bias, assumed_mass=bench.assumed_mass)
+        sweep = free_sweep(recording, bench.valve, settings)
+        found.append(MassByBias(bias, sweep.estimates_at(threshold)["mass"]))
+    return tuple(found)
