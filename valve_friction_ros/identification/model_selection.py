@@ -30,6 +30,10 @@ _FRICTIONS = ((1.0, 1.0), (0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
 _FALL_SIGNIFICANCE = 3.0
 """The same for a falling friction, which has halved the misfit before it is asked."""
 
+_LIKE_PRESLIDING = (OFFSET, "mass")
+"""A stem that creeps before it breaks away, as where friction falls it does, looks like one that
+is early, or heavy."""
+
 _SUSPICION = 1.8
 """Standard errors of the score test from which on a part of the model is tried."""
 
@@ -150,8 +154,8 @@ def with_demanded(
     elif may_slip and SLIP not in refinement.names and _is_suspected(refinement, SLIP):
         refinement = _slipping(refinement, start)
     left = [name for name in candidates if name != SLIP and name not in refinement.names]
-    if "stribeck_velocity" in refinement.names and OFFSET in left:
-        left.remove(OFFSET)  # presliding looks like a stem that is early
+    if "stribeck_velocity" in refinement.names:
+        left = [name for name in left if name not in _LIKE_PRESLIDING]
     while trials := _sure_trials(refinement, left):
         refinement = min(trials, key=lambda trial: trial.rms)
         left = [name for name in left if name not in refinement.names]
