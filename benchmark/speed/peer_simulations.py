@@ -89,8 +89,8 @@ def ivp(
             rtol=tolerance,
             atol=0.01 * tolerance,
         )
-        if solution.t.size:
-            positions[first : first + solution.t.size] = solution.y[0]
+        if len(solution.t):
+            positions[first : first + len(solution.t)] = solution.y[0]
         if solution.status != 1:
             return positions
         now, position = float(solution.t_events[0][0]), float(solution.y_events[0][0][0])

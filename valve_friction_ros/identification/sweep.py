@@ -71,8 +71,9 @@ def sweep_thresholds(regression: ForceBalanceRegression, thresholds: NDArray[np.
     estimates, its last diagonal entry the residual norm.
     """
     free = len(regression.names)
-    table = np.column_stack([regression.columns, regression.force])
-    factors, sums, samples = factors_above(table, regression.speed, thresholds)
+    factors, sums, samples = factors_above(
+        regression.columns, regression.force, regression.speed, thresholds
+    )
     regressors, force = factors[:, :free, :free], factors[:, :free, free]
     own = np.abs(np.diagonal(regressors, axis1=1, axis2=2))
     lengths = np.linalg.norm(regressors, axis=1)

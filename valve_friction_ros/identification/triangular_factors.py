@@ -15,9 +15,12 @@ _ROWS_AT_ONCE = 256
 
 @compiled_reductions
 def factors_above(
-    table: NDArray[np.float64], speed: NDArray[np.float64], thresholds: NDArray[np.float64]
+    regressors: NDArray[np.float64],
+    force: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    thresholds: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Factorise the rows of `table` whose speed exceeds each threshold.
+    """Factorise ``[Φ_s F_s]``, the samples faster than each threshold.
 
     From the highest threshold down each step only adds the rows between two thresholds, which
     Householder reflections take into the triangular factor that there is: ``[R; rows] = Q R'``.
@@ -26,8 +29,10 @@ def factors_above(
 
     Parameters
     ----------
-    table : ndarray of float, shape (n, p)
-        Rows to be selected.
+    regressors : ndarray of float, shape (n, p − 1)
+        Regressors Φ.
+    force : ndarray of float, shape (n,)
+        Force F, the last column.
     speed : ndarray of float, shape (n,)
         Speed that decides.
     thresholds : ndarray of float, shape (S,)
@@ -42,44 +47,45 @@ def factors_above(
     counts : ndarray of int, shape (S,)
         Number of selected rows.
     """
-    columns, steps = table.shape[1], thresholds.size
-    bins, ends = _sorted_places(speed, thresholds, columns)
-    rows = np.zeros((columns, columns + speed.size))
+    free, steps = regressors.shape[1], thresholds.size
+    columns = free + 1
+    bins, ends = _sorted_places(speed, thresholds)
+    rows = np.empty((speed.size, columns))
     sums = np.zeros((steps, columns))
     for sample in range(speed.size):
         step = bins[sample]
         if step >= 0:
             place = ends[step]
             ends[step] += 1
-            for column in range(columns):
-                rows[column, place] = table[sample, column]
-                sums[step, column] += table[sample, column]
+            for column in range(free):
+                rows[place, column] = regressors[sample, column]
+                sums[step, column] += regressors[sample, column]
+            rows[place, free] = force[sample]
+            sums[step, free] += force[sample]
     factors = np.empty((steps, columns, columns))
     counts = np.empty(steps, dtype=np.int64)
-    first = columns
+    work = np.zeros((columns, columns + _ROWS_AT_ONCE))
+    taken = 0
     for step in range(steps - 1, -1, -1):
-        while first < ends[step]:
-            last = min(first + _ROWS_AT_ONCE, ends[step])
-            _take_in(rows, first, last)
-            first = last
-        counts[step] = first - columns
+        while taken < ends[step]:
+            last = min(taken + _ROWS_AT_ONCE, ends[step])
+            _take_in(work, rows, taken, last)
+            taken = last
+        counts[step] = taken
         if step < steps - 1:
             sums[step] += sums[step + 1]
-        for row in range(columns):
-            for column in range(columns):
-                above = row <= column
-                factors[step, row, column] = rows[column, first - columns + row] if above else 0.0
+        factors[step] = work[:, :columns].T
     return factors, sums, counts
 
 
 @compiled_reductions
 def _sorted_places(
-    speed: NDArray[np.float64], thresholds: NDArray[np.float64], lead: int
+    speed: NDArray[np.float64], thresholds: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find the last threshold below each speed, and where the rows of each threshold begin.
 
-    Rows of the highest threshold come first, after `lead` free places. A threshold is guessed as
-    if all were evenly spaced, as those of (8) are, and the guess is moved to where it is true.
+    Rows of the highest threshold come first. A threshold is guessed as if all were evenly spaced,
+    as those of (8) are, and the guess is moved to where it is true.
     """
     steps = thresholds.size
     spacing = (thresholds[-1] - thresholds[0]) / max(steps - 1, 1)
@@ -98,7 +104,7 @@ def _sorted_places(
         if step >= 0:
             sizes[step] += 1
     places = np.empty(steps, dtype=np.int64)
-    place = lead
+    place = 0
     for step in range(steps - 1, -1, -1):
         places[step] = place
         place += sizes[step]
@@ -106,34 +112,33 @@ def _sorted_places(
 
 
 @compiled_reductions
-def _take_in(rows: NDArray[np.float64], first: int, last: int) -> None:
-    """Reflect the rows `first` to `last` into the factor that lies just before them.
+def _take_in(work: NDArray[np.float64], rows: NDArray[np.float64], first: int, end: int) -> None:
+    """Reflect the rows from `first` to `end` into the triangular factor.
 
-    The new factor is left just before `last`, over rows that are no longer needed.
+    Column by column: `work` holds in row j the j-th column of the factor, upper triangular, and
+    behind it room for the column of the new rows.
     """
-    columns = rows.shape[0]
-    top = first - columns
+    columns = rows.shape[1]
+    last = columns + end - first
+    for row in range(end - first):
+        for column in range(columns):
+            work[column, columns + row] = rows[first + row, column]
     for column in range(columns):
-        pivot = top + column
-        x = rows[column]
+        x = work[column]
         squares = 0.0
-        for place in range(first, last):
+        for place in range(columns, last):
             squares += x[place] * x[place]
         if squares == 0.0:
             continue
-        norm = math.copysign(math.sqrt(x[pivot] * x[pivot] + squares), x[pivot])
-        head = x[pivot] + norm
+        norm = math.copysign(math.sqrt(x[column] * x[column] + squares), x[column])
+        head = x[column] + norm
         for other in range(column + 1, columns):
-            y = rows[other]
-            product = head * y[pivot]
-            for place in range(first, last):
+            y = work[other]
+            product = head * y[column]
+            for place in range(columns, last):
                 product += x[place] * y[place]
             share = product / (norm * head)
-            y[pivot] -= share * head
-            for place in range(first, last):
+            y[column] -= share * head
+            for place in range(columns, last):
                 y[place] -= share * x[place]
-        x[pivot] = -norm
-    shift = last - first
-    for row in range(columns - 1, -1, -1):
-        for column in range(row, columns):
-            rows[column, top + row + shift] = rows[column, top + row]
+        x[column] = -norm
