@@ -1,5 +1,6 @@
 """Starting with impossible parameters, and stopping by Ctrl-C."""
 
+import failing_identifier
 import numpy as np
 import pytest
 from live_nodes import NAMESPACE, Domain, NodeProcess, buffered, stamps_of
@@ -125,3 +126,17 @@ def test_long_identification_loses_no_sample(live, tmp_path):
     sigma = identify(whole, BENCH_VALVE).sigma
     assert sigma != half.sigma
     assert client.friction("sigma") == {"sigma": sigma}
+
+
+def test_unforeseen_failure_is_told_and_the_next_record_identifies(live, tmp_path):
+    live.start_identifier({"input_timeout": 600.0}, script=failing_identifier.SCRIPT)
+    client = live.client
+    client.send_record(quick_record())
+    client.wait_for_buffered(1000)
+    response = client.trigger("identify")
+    assert not response.success
+    assert response.message.startswith("unexpected ZeroDivisionError: nobody foresaw it (")
+
+    (tmp_path / failing_identifier.MENDED).touch()
+    response = client.trigger("identify")
+    assert response.success, response.message

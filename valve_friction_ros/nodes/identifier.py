@@ -19,6 +19,7 @@ from valve_friction_ros.identification import Assessment, RefusalError
 from valve_friction_ros.model import compile_kernels
 from valve_friction_ros.monitoring import Arrivals, FrictionMonitor, identify_snapshot
 from valve_friction_ros.nodes.friction_status import friction_status, trend_values
+from valve_friction_ros.nodes.guarded_work import guarded
 from valve_friction_ros.nodes.identifier_parameters import (
     CHANGEABLE,
     FIXED_AT_START,
@@ -161,7 +162,7 @@ class Identifier(Node):
     ) -> None:
         """Do some work in the worker; `conclude` takes over in the executor's thread."""
         executor = self.executor
-        submitted = self._worker.submit(work, *arguments)
+        submitted = self._worker.submit(guarded(work), *arguments)
         submitted.add_done_callback(lambda done: executor.create_task(conclude, done))
 
     def _conclude(self, done: "ThreadFuture[Assessment]", job: Job, answer: Future) -> None:
