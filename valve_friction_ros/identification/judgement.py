@@ -53,10 +53,11 @@ def judge_refinement(
 ) -> dict[str, AssessedParameter]:
     """Judge every parameter of a refined model.
 
-    The half width of an interval is the t-quantile of the scatter between strokes. Where a mass
-    is assumed, what an error of it would do is added in squares, the error taken to lie anywhere
-    within the mass's own size. Where the misfit is more than noise, what it can have done at the
-    worst (`worst_case`) is added in full.
+    The half width of an interval is the standard error by the scatter between strokes, times
+    Student's quantile. Where a mass is assumed, what an error of it would do is added in squares,
+    the error taken to lie anywhere within the mass's own size. Where the misfit is more than
+    noise, what it can have done at the worst (`worst_case`) is added in full. No half width is
+    less than 0.05 % of its value, of a spring constant 0.02 %.
     """
     stroke = stroke_length(refinement.simulated)
     covariance = block_covariance(refinement.equation, stroke)

@@ -19,26 +19,26 @@ from valve_friction_ros.identification.uncertainty import (
     stroke_length,
 )
 
-__all__ = ["SIGNIFICANCE", "deviation", "one_step", "suspected", "with_demanded"]
+__all__ = ["with_demanded"]
+
+_SIGNIFICANCE = 5.5
+"""Standard errors by which a part of the model must differ from nothing to be estimated."""
 
 _OFFSET_SIGNIFICANCE = 11.0
 """The same for the clock offset, which on a square wave F_c and F_0 nearly make up for."""
 
-_FRICTIONS = ((1.0, 1.0), (0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
-"""Factors of F_c and F_v to start from."""
-
 _FALL_SIGNIFICANCE = 3.0
 """The same for a falling friction, which has halved the misfit before it is asked."""
-
-_LIKE_PRESLIDING = (OFFSET, "mass")
-"""A stem that creeps before it breaks away, as where friction falls it does, looks like one that
-is early, or heavy."""
 
 _SUSPICION = 1.8
 """Standard errors of the score test from which on a part of the model is tried."""
 
-SIGNIFICANCE = 5.5
-"""Standard errors by which a part of the model must differ from nothing to be estimated."""
+_FRICTIONS = ((1.0, 1.0), (0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
+"""Factors of F_c and F_v to start from."""
+
+_LIKE_PRESLIDING = (OFFSET, "mass")
+"""A stem that creeps before it breaks away, as where friction falls it does, looks like one that
+is early, or heavy."""
 
 _DROPS = (0.15, 0.35)
 """Starts for F_s − F_c, as shares of F_c."""
@@ -67,14 +67,16 @@ _IMPROVEMENT = 0.5
 _LEAST_GAIN = 1e-6
 """Distance, m, that a part of the model must account for: what is less is in no real record."""
 
-_LEAST_MASS = 0.01
+_LIGHTEST_TRIED = 0.01
+"""Mass, kg, to start from at least, where the score test asks for less."""
+
 _LEAST_SLIP = 0.02
 _LEAST_ASYMMETRY = 0.02
 _LEAST_OFFSET = 1e-3
 """Slip force over F_c, asymmetry and clock offset (s) that are worth a parameter."""
 
 
-def deviation(refinement: Refinement, name: str) -> float:
+def _deviation(refinement: Refinement, name: str) -> float:
     """Distance of a free coordinate from zero, in standard errors."""
     block = stroke_length(refinement.simulated)
     gradient = np.eye(len(refinement.names))[refinement.names.index(name)]
@@ -82,7 +84,7 @@ def deviation(refinement: Refinement, name: str) -> float:
     return refinement.coordinates[name] / error if error > 0 else 0.0
 
 
-def one_step(refinement: Refinement, name: str) -> tuple[float, float]:
+def _one_step(refinement: Refinement, name: str) -> tuple[float, float]:
     """Estimate what a coordinate that is not free would become if it were, in one Newton step.
 
     A score test: the model is refined without the coordinate, and the residual that this leaves
@@ -101,7 +103,7 @@ def one_step(refinement: Refinement, name: str) -> tuple[float, float]:
     return at[name] + float(equation.newton_step()[-1]) * units[name], error * units[name]
 
 
-def suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, float]:
+def _suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, float]:
     """Return the candidates that the residual asks for, and the values it asks for.
 
     The misfit that a missing part leaves counts as scatter here and hides some of it, so a
@@ -109,7 +111,7 @@ def suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, fl
     """
     suspects = {}
     for name in candidates:
-        value, error = one_step(refinement, name)
+        value, error = _one_step(refinement, name)
         change = abs(value - refinement.coordinates[name])
         if error > 0 and change > _SUSPICION * error and change > _least(refinement, name):
             suspects[name] = value
@@ -121,9 +123,11 @@ def with_demanded(
 ) -> Refinement:
     """Refine `names`, and beside them what the record demands.
 
-    A slip jump (F_s above F_c) is tried first. If the model still does not describe the record,
-    other starts are, another clock, and a friction that falls from F_s to F_c over a range of
-    speeds. The `candidates` follow one after the other, each only if its score test asks for it.
+    Where the plain model does not describe the record, or its residual leans towards it, a slip
+    jump (F_s above F_c) is tried first. If the record is still not described, other starts are,
+    another clock, and a friction that falls from F_s to F_c over a range of speeds. Of the other
+    `candidates`, those that their score test asks for are tried; the one that surely is there and
+    brings the simulated stem nearest is kept, until none is left.
 
     Parameters
     ----------
@@ -164,7 +168,7 @@ def with_demanded(
 
 def _is_suspected(refinement: Refinement, name: str) -> bool:
     """Tell whether the residual leans towards a part of the model, if only a little."""
-    value, error = one_step(refinement, name)
+    value, error = _one_step(refinement, name)
     return value > error
 
 
@@ -185,7 +189,7 @@ def _from_elsewhere(problem: OutputError, start: Coordinates, names: tuple[str, 
 def _sure_trials(refinement: Refinement, candidates: Sequence[str]) -> list[Refinement]:
     """Refine with each suspected candidate in turn; return those in which it surely is there."""
     sure = []
-    for name, value in suspected(refinement, candidates).items():
+    for name, value in _suspected(refinement, candidates).items():
         at = {**refinement.coordinates, name: _moderate(name, value)}
         trial = _pruned(refine(refinement.problem, at, (*refinement.names, name)), name)
         if _is_nearer(trial, refinement) and _is_sure(trial, name, refinement.coordinates[name]):
@@ -197,8 +201,8 @@ def _is_sure(trial: Refinement, name: str, before: float) -> bool:
     """Tell whether a refined coordinate has surely and noticeably left its former value."""
     value = trial.coordinates[name]
     change = abs(value - before)
-    error = abs(value / deviation(trial, name)) if deviation(trial, name) else math.inf
-    needed = _OFFSET_SIGNIFICANCE if name == OFFSET else SIGNIFICANCE
+    error = abs(value / _deviation(trial, name)) if _deviation(trial, name) else math.inf
+    needed = _OFFSET_SIGNIFICANCE if name == OFFSET else _SIGNIFICANCE
     return change > needed * error and change > _least(trial, name)
 
 
@@ -226,7 +230,7 @@ def _is_nearer(trial: Refinement, before: Refinement) -> bool:
 
 def _is_slip(refinement: Refinement) -> bool:
     enough = refinement.coordinates[SLIP] > _least(refinement, SLIP)
-    return enough and deviation(refinement, SLIP) > SIGNIFICANCE
+    return enough and _deviation(refinement, SLIP) > _SIGNIFICANCE
 
 
 def _least(refinement: Refinement, name: str) -> float:
@@ -240,7 +244,7 @@ def _least(refinement: Refinement, name: str) -> float:
 
 def _moderate(name: str, value: float) -> float:
     """Keep the first step from a test where the simulation can follow."""
-    return max(value, _LEAST_MASS) if name == "mass" else float(np.clip(value, -0.5, 0.5))
+    return max(value, _LIGHTEST_TRIED) if name == "mass" else float(np.clip(value, -0.5, 0.5))
 
 
 def _falling_starts(
@@ -273,7 +277,7 @@ def _nearest(problem: OutputError, candidates: Sequence[Coordinates]) -> list[Co
 
 
 def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
-    """Try clocks that differ; keep the best if it halves the misfit."""
+    """Try clocks that differ; keep the best if it halves the misfit and surely is there."""
     problem = plain.problem
     starts = _nearest(problem, [{**start, SLIP: 0.0, OFFSET: offset} for offset in _OFFSETS])
     names = (*plain.names, OFFSET)
@@ -299,7 +303,10 @@ def _slipping(plain: Refinement, start: Coordinates) -> Refinement:
 
 
 def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
-    """Try a slip jump, then a friction that falls over a range of speeds; keep what describes."""
+    """Try a slip jump; where it does not describe, a friction that falls over a range of speeds.
+
+    The fall is kept if it halves the misfit, and the drop and its range of speeds are told.
+    """
     problem = plain.problem
     best = _slipping(plain, start)
     before = misfit_of(best)
@@ -319,6 +326,6 @@ def _with_slip(plain: Refinement, start: Coordinates) -> Refinement:
     falling = refine(problem, nearest, names)
     improved = misfit_of(falling).systematic < _IMPROVEMENT * before.systematic
     parts = (SLIP, "stribeck_velocity")
-    told = all(deviation(falling, name) > _FALL_SIGNIFICANCE for name in parts)
+    told = all(_deviation(falling, name) > _FALL_SIGNIFICANCE for name in parts)
     worth = falling.coordinates[SLIP] > _least(falling, SLIP)
     return falling if improved and told and worth else best

@@ -22,6 +22,7 @@ CONFIDENCE = 0.95
 """Probability with which an interval is meant to cover the true value."""
 
 _FEWEST_BLOCKS = 8
+"""Blocks that a record is cut into at least: fewer say nothing about their scatter."""
 
 _LARGEST_SHARE = 0.95
 """Share of the information that one block may hold before its residuals tell nothing more."""
@@ -37,7 +38,8 @@ class Covariance:
         Change of the estimate by the residuals of each block, each as large as if that block had
         not been fitted.
     weights : ndarray of float, shape (b, p, p)
-        For each block W with W·g the weight of its scores in the combination gᵀθ.
+        For each block W = (1 − H_b)^(−1/2)·A^(−1/2), with W·g the weight of its scores A^(−1/2)·s_b
+        in the combination gᵀθ (`block_covariance`).
     information : ndarray of float, shape (b, p, p)
         Share of each block in the information; their sum is the unit matrix.
     """
@@ -79,7 +81,7 @@ def block_covariance(equation: EstimatingEquation, block: int) -> Covariance:
     samples. Sums over blocks as long as that memory are, so their scatter measures the
     uncertainty of the whole sum, whatever happens inside a block. The fit has drawn each block's
     residuals to itself by the share H_b of the information that the block holds; (1 − H_b)^(−1/2)
-    undoes that, exactly so if the residuals are white:
+    undoes that, exactly so if the residuals are white and no block holds nearly all there is:
 
         cov = A^(−1/2) · (Σ_b g_b g_bᵀ) · A^(−1/2),    g_b = (1 − H_b)^(−1/2) · A^(−1/2) · s_b,
         H_b = A^(−1/2) · A_b · A^(−1/2) ,

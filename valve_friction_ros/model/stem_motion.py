@@ -253,7 +253,9 @@ def advance_stem(
     upward: Dynamics,
     downward: Dynamics,
 ) -> tuple[float, float]:
-    """Advance the stem by `duration` under a force that is linear in time, exactly.
+    """Advance the stem by `duration` under a force that is linear in time.
+
+    Exactly, but for friction that falls with the speed, which chords stand for (`STRIBECK_STEP`).
 
     Parameters
     ----------

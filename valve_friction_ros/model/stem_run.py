@@ -1,4 +1,4 @@
-"""The stem through all samples: short cuts where nothing happens, exact events in between."""
+"""The stem through all samples: short cuts where nothing happens, located events in between."""
 
 import math
 from typing import NamedTuple
@@ -186,7 +186,7 @@ class _Ladder(NamedTuple):
 
 @compiled
 def _ladder(way: Dynamics, period: float) -> _Ladder:
-    """Set up the chords of one way of motion; none where friction does not depend on Stribeck."""
+    """Set up the chords of one way of motion; none where friction does not fall."""
     spacing = 0.5 * STRIBECK_STEP * way.stribeck_velocity
     rungs = int(_FALLEN * way.stribeck_velocity / spacing) + 1 if spacing > 0.0 else 0
     chords, slides = np.empty((rungs, 2)), np.empty((rungs, 9))
@@ -222,8 +222,8 @@ def _slide_on_falling(
 ) -> int:
     """Fill in samples as `_slide_on` where friction falls with the speed.
 
-    Each sample takes the chord at its speed, if that rises, and the speed must not leave it by
-    more than half its width.
+    Each sample takes the chord at its speed, if that rises. The speed must not have a minimum
+    within the sample, nor leave the chord by more than half its width.
     """
     lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
     position, velocity = positions[sample], velocities[sample]
