@@ -177,7 +177,10 @@ def _information(results: Results, console: Console) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the parts that were asked for; return 1 if a bound is missed."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if not options.output.parent.is_dir():
+        parser.error(f"{options.output}: there is no folder {options.output.parent}")
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
     results = Results()
     if "timing" in options.parts:

@@ -38,7 +38,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the parts that were asked for; return 1 if a goal is missed."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if not options.output.parent.is_dir():
+        parser.error(f"{options.output}: there is no folder {options.output.parent}")
     console = Console()
     console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
     measured: dict[str, list[Row]] = {}

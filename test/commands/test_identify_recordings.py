@@ -302,6 +302,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
         (["--jobs", "0"], "--jobs must be at least 1"),
         (["--fix", "mass=heavy"], "'heavy' is not a number"),
         (["--output", "friction.xlsx"], "must end in .csv or .jsonl"),
+        (["--output", "nowhere/friction.csv"], "there is no folder nowhere"),
         (["--order", "1"], "order must be at least 2"),
         (["--valve", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
         ([], "there are no CSV files and no bags in it"),

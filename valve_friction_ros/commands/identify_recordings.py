@@ -93,6 +93,8 @@ def _require_sense(options: argparse.Namespace) -> None:
     if options.jobs < 1:
         raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
     row_format(options.output)
+    if not options.output.parent.is_dir():
+        raise ValueError(f"{options.output}: there is no folder {options.output.parent}")
     reading_options(options)
     identification_settings(options, dict.fromkeys(FIXABLE, 1.0))
     if options.valve is not None:
