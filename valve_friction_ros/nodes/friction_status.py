@@ -50,7 +50,7 @@ def _assessed_values(assessment: Assessment, monitor: FrictionMonitor) -> dict[s
         values["sigma [N]"] = _number(published.sigma)
         values["r_squared"] = _number(published.r_squared)
     values["fixed"] = ", ".join(monitor.settings.identification.fixed)
-    values["warnings"] = "; ".join(assessment.warnings)
+    values["warnings"] = "; ".join(assessment.all_warnings)
     return values
 
 
