@@ -16,7 +16,16 @@ from valve_friction_ros.identification import (
     assess,
     identify,
 )
-from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SensorNoise,
+    SquareWave,
+    Valve,
+    converter_response,
+    simulate,
+)
 
 CASES = [
     *(Case(plant, "square", "28.6 µm", "1 kHz") for plant in ("low", "high", "graphite")),
@@ -150,3 +159,19 @@ class TestRealMachine:
         assert found.misfit is None
         assert found.refinement is None
         assert found.force_fit > 0.9
+
+
+@pytest.mark.parametrize(("name", "waiting"), [("closed", 41_740.0), ("open", 230_000.0)])
+def test_record_that_begins_at_a_travel_stop(name, waiting):
+    """Noise takes the measured start beyond the stop, where a simulated stem cannot begin."""
+    time = 1e-3 * np.arange(34_000)
+    command = np.where(time < 3, waiting, SquareWave().sample(np.maximum(time - 3, 0)))
+    pressure = converter_response(command, 1e-3)
+    motion = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3)
+    assert motion.position[0] == {"closed": 0.0, "open": BENCH_VALVE.travel}[name]
+    record = Recording(1e-3, pressure, motion.position)
+    for seed in range(4):
+        noisy = SensorNoise(28.6e-6, 165.0, seed).applied_to(record)
+        friction = assess(noisy, BENCH_VALVE).parameters["coulomb_friction"]
+        assert friction.verdict is Verdict.IDENTIFIED
+        assert friction.value == pytest.approx(LOW_FRICTION.coulomb_friction, rel=0.02)

@@ -1,5 +1,7 @@
 """Simulated positions and their sensitivities, against a motion with a closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from problems import FREE, perfect_problem, true_coordinates
@@ -144,3 +146,20 @@ def test_units_are_forces_for_forces_and_the_play_for_the_start(problem, at):
         SLIP: 50.0,
         OFFSET: 1.0,
     }
+
+
+@pytest.mark.parametrize("beyond", [0.0, 50e-6])
+@pytest.mark.parametrize("stop", ["lower", "upper"])
+def test_start_at_a_stop_is_seen_from_inside(stop, beyond):
+    """A stem at rest stays where it started, and it starts no further than at the stop."""
+    valve = replace(VALVE, travel=0.03)
+    force = np.full(TIME.size, PARAMETERS.spring_preload)
+    if stop == "upper":
+        force = force + PARAMETERS.spring_constant * valve.travel
+    pressure = valve.pressure_reference + force / valve.diaphragm_area
+    place = valve.travel if stop == "upper" else 0.0
+    resting = perfect_problem(valve, Recording(PERIOD, pressure, np.full(TIME.size, place)))
+    start = place + beyond if stop == "upper" else place - beyond
+    at = true_coordinates(PARAMETERS, start)
+    (column,) = resting.sensitivity(at, pressure, {START: 1e-4}).T
+    np.testing.assert_allclose(column, 1e-4, rtol=1e-9)

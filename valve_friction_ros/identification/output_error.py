@@ -110,12 +110,19 @@ class OutputError:
         """
         columns = np.empty((self.record.position.size, len(units)))
         for index, (name, unit) in enumerate(units.items()):
-            step = _STEP * unit
-            below = at[name] - step if name in _SIGNED else max(at[name] - step, 0.0)
-            after = self.simulated({**at, name: at[name] + step}, pressure)
+            lowest, highest = self._range(name)
+            place, step = min(max(at[name], lowest), highest), _STEP * unit
+            below, above = max(place - step, lowest), min(place + step, highest)
+            after = self.simulated({**at, name: above}, pressure)
             before = self.simulated({**at, name: below}, pressure)
-            columns[:, index] = (after - before) * (unit / (at[name] + step - below))
+            columns[:, index] = (after - before) * (unit / (above - below))
         return columns
+
+    def _range(self, name: str) -> tuple[float, float]:
+        """Range in which a coordinate changes the motion: beyond it the model stays at its end."""
+        if name == START and np.isfinite(self.valve.travel):
+            return 0.0, self.valve.travel
+        return (-np.inf if name in _SIGNED else 0.0), np.inf
 
     def units(self, names: tuple[str, ...], at: Coordinates) -> dict[str, float]:
         """Return the natural size of a change of each coordinate."""
