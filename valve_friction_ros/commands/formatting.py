@@ -2,9 +2,10 @@
 
 import argparse
 import math
+import sys
 from typing import NoReturn
 
-__all__ = ["OneLineParser", "json_number", "two_digits"]
+__all__ = ["OneLineParser", "complain", "json_number", "two_digits"]
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -13,6 +14,14 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the error and end with exit code 2."""
         self.exit(2, f"{self.prog}: {message}; see --help\n")
+
+
+def complain(command: str, error: Exception) -> None:
+    """Print an error on one line of stderr; of the system's: the file and the cause."""
+    told = str(error)
+    if isinstance(error, OSError) and error.strerror:
+        told = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    print(f"{command}:", *told.splitlines(), file=sys.stderr)
 
 
 def json_number(value: float) -> float | None:
