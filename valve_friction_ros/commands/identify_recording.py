@@ -78,7 +78,7 @@ def _identified(
     try:
         return identify(recording, valve, settings, window)
     except RefusalError as refusal:
-        return RefusalError(f"{recorded.label}: {refusal}")
+        return recorded.refused(refusal)
 
 
 def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:

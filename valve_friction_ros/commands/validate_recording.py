@@ -79,7 +79,7 @@ def _run(options: argparse.Namespace) -> _Result:
     try:
         validation = validate(recording, valve, model.parameters)
     except RefusalError as refusal:
-        raise RefusalError(f"{recorded.label}: {refusal}") from None
+        raise recorded.refused(refusal) from None
     if options.plot is not None:
         drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
         plots.validation_figure(validation, valve, drive).savefig(options.plot)
