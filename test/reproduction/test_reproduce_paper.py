@@ -20,7 +20,6 @@ PICTURES = {
     "figure_4_high",
     "figure_4_graphite",
     "figure_5",
-    "figure_5_graphite",
     "figure_6",
     "figure_7",
     "figure_8",

@@ -5,7 +5,12 @@ import math
 import sys
 from typing import NoReturn
 
-__all__ = ["OneLineParser", "complain", "json_number", "two_digits"]
+from rich.console import Console
+
+__all__ = ["OneLineParser", "complain", "json_number", "plain_console", "two_digits"]
+
+_PRINTED_WIDTH = 120
+"""Columns of what goes into a file or a pipe, which has no width of its own."""
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -22,6 +27,12 @@ def complain(command: str, error: Exception) -> None:
     if isinstance(error, OSError) and error.strerror:
         told = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     print(f"{command}:", *told.splitlines(), file=sys.stderr)
+
+
+def plain_console() -> Console:
+    """Return a console that prints text as it is, as wide as the terminal if there is one."""
+    width = None if sys.stdout.isatty() else _PRINTED_WIDTH
+    return Console(width=width, highlight=False, markup=False)
 
 
 def json_number(value: float) -> float | None:

@@ -56,13 +56,10 @@ def draw_figures(programme: Programme) -> Pictures:
                 f"Fig. 4: σ_s of (17) and R²_s of (18) over δv, {shown}",
             ),
         }
-    figures |= {
-        "figure_5": (
-            force_terms_figure(high),
-            "Fig. 5: contribution of each term of (4), sine, high friction.",
-        ),
-        "figure_5_graphite": (force_terms_figure(graphite), "As Fig. 5, graphite packing."),
-    }
+    figures["figure_5"] = (
+        force_terms_figure(high),
+        "Fig. 5: contribution of each term of (4), sine, high friction.",
+    )
     for (name, excitation), place in FIGURES.items():
         one = programme.results[name]
         is_sine = excitation == "sine"

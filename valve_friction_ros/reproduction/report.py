@@ -224,7 +224,6 @@ def _graphite(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
         pictures["figure_4_graphite"],
         parameter_table(one),
         *map(Paragraph, notes),
-        pictures["figure_5_graphite"],
         validation_table(one.sine, "Sine"),
         pictures["validation_graphite_sine"],
         validation_table(one.isa, "ISA steps"),
