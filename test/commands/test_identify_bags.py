@@ -78,6 +78,16 @@ class TestOneValve:
         _, out, _ = call(bag)
         assert "note: bag.mcap is cut off or damaged" in out
 
+    def test_a_refusal_tells_of_the_damage(self, call, tmp_path, quick_record):
+        bag = write_bag(tmp_path / "bag", messages_of(quick_record), "sqlite3")
+        file = storage_file(bag)
+        file.write_bytes(file.read_bytes()[:40_000])
+        code, out, err = call(bag)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"identify_recording: {bag}, /fv_101: the ")
+        assert "; bag.db3 is cut off or damaged (" in err
+        assert err.count("\n") == 1
+
     def test_without_ros(self, bag, bench_yaml):
         """As a process of its own, where no package of ROS can be imported."""
         blocked = "rclpy", "sensor_msgs", "std_msgs", "builtin_interfaces", "rosbag2_py"

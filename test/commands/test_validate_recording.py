@@ -196,6 +196,7 @@ class TestRefusals:
         [
             ("{", "not JSON"),
             ("[]", "there are no parameters: give what `identify_recording --json` wrote"),
+            ('{"valves": {}}', "is of several valves: identify the one by --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),
             ('{"parameters": {"mass": {"value": "1"}}}', "must be a number or null, got '1'"),
             ('{"parameters": {"weight": {"value": 1}}}', "unknown parameter 'weight'"),
@@ -215,7 +216,7 @@ class TestRefusals:
 
     def test_impossible_value(self, refused, estimate, other_csv, valve_options):
         path = estimate(coulomb_friction=-3.0)
-        assert "coulomb_friction must not be negative" in refused(
+        assert f"{path}: coulomb_friction must not be negative" in refused(
             other_csv, *valve_options, "--estimate", path
         )
 

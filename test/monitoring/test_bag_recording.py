@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 import struct
 from binascii import crc32
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
 from valve_friction_ros.monitoring import RecordBuffer
 from valve_friction_ros.monitoring.bag_topics import TopicChoice
 from valve_friction_ros.monitoring.recordings import ReadingOptions, holds_force, read_recordings
+from valve_friction_ros.monitoring.sqlite_pages import messages_after
 from valve_friction_ros.monitoring.stretch import Stretch
 
 STORAGES = ["mcap", "sqlite3"]
@@ -202,7 +204,8 @@ class TestBadSamples:
         bag = write_bag(tmp_path / "bag", with_pressure((10, again), (20, again[:4] + b"\0" * 40)))
         assert problem(bag) == (
             ", /fv_101: bad samples: actuator_pressure repeats a stamp (1 samples): "
-            "use a stretch of the record without them"
+            "use a stretch of the record without them; 1 messages of /fv_101/actuator_pressure are "
+            "no such messages, and were left out"
         )
 
     def test_not_finite(self, tmp_path):
@@ -319,6 +322,34 @@ class TestDamagedBags:
             (note,) = valve.notes
             assert note.startswith(f"{file.name} is cut off or damaged (")
             assert note.endswith("): it was read as far as it goes")
+
+    @pytest.mark.parametrize("share", [0.05, 0.3])
+    def test_sqlite_without_the_way_to_its_rows(self, tmp_path, share):
+        """So long a table that its inner pages, which lead to the rows, come late in the file."""
+        count = 15_000
+        long = Recording(0.001, 1e5 + np.arange(count), 1e-6 * np.arange(count))
+        bag = write_bag(tmp_path / "long", messages_of(long), "sqlite3")
+        cut(storage_file(bag), share)
+        found = only(bag).recording()
+        assert_equal(found, long, len(found))
+        assert len(found) > 0.6 * share * count
+
+    def test_a_row_longer_than_a_page(self, tmp_path, record):
+        """Between the samples is a message that goes on over several pages of SQLite."""
+        messages = [*messages_of(record)]
+        text = ("/note", STEM, START, bytes(20_000))
+        middle = len(messages) // 2
+        bag = write_bag(
+            tmp_path / "long", [*messages[:middle], text, *messages[middle:]], "sqlite3"
+        )
+        file = storage_file(bag)
+        with closing(sqlite3.connect(file)) as connection:
+            (number,) = connection.execute("SELECT topic_id FROM messages WHERE id = 1").fetchone()
+        found = [*messages_after(file, 0)]
+        assert [one.id for one in found] == [*range(1, len(messages) + 2)]
+        assert found[middle].data == text[-1]
+        assert found[0] == (1, number, messages[0][-1])
+        assert [*messages_after(file, len(messages))] == found[-1:]
 
     def test_a_cut_page_is_not_filled_up_with_zeros(self, bag_of, record):
         """Wherever in a page of SQLite the file ends, every sample is one of the record."""

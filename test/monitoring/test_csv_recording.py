@@ -284,6 +284,12 @@ class TestColumns:
             "rename one or name the right one"
         )
 
+    def test_another_delimiter(self, write):
+        assert refused(write(["time_s;position_m;pressure_pa", "0;0;1e5"])) == (
+            "no column 'pressure_pa' (or 'force_n'), only 'time_s;position_m;pressure_pa': "
+            "name the delimiter of the file"
+        )
+
     def test_missing_under_its_other_name(self, write):
         message = refused(write([HEADER, *GOOD]), form=CsvFormat(CsvColumns(time="t")))
         assert message.startswith("no column 't' among time_s, ")

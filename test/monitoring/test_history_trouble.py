@@ -186,7 +186,9 @@ def test_another_programs_database(tmp_path, statement):
 def test_no_database(tmp_path):
     history = HistoryFile(tmp_path / "history.sqlite")
     history.path.write_bytes(b"nothing of the kind" * 100)
-    expected = "file is not a database: move it away, and a new one is begun"
+    expected = (
+        "file is not a database: name the right file, or move this one away, and a new one is begun"
+    )
     assert told(history) == expected
     assert told(history, HistoryFile.entries) == expected
 

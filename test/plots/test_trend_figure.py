@@ -1,5 +1,7 @@
 """The figure of a history: what is drawn where."""
 
+import warnings
+
 import matplotlib.dates
 import numpy as np
 import pytest
@@ -119,6 +121,11 @@ def test_a_bare_history():
     assert labels == ["identified, 95 % interval"]
     assert axes.get_title(loc="left") == OTHER.name
     assert axes.get_title(loc="right") == ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        axes.figure.draw_without_rendering()
+    begin, end = axes.get_xlim()
+    assert (end - begin, (begin + end) / 2) == pytest.approx((2 / 24, START / DAY), rel=1e-9)
 
 
 def test_one_panel_a_valve_and_one_legend(history):

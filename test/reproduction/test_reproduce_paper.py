@@ -15,13 +15,16 @@ PICTURES = {
     "figure_2_graphite",
     "figure_3_low",
     "figure_3_high",
+    "figure_3_graphite",
     "figure_4_low",
     "figure_4_high",
+    "figure_4_graphite",
     "figure_5",
     "figure_6",
     "figure_7",
     "figure_8",
     "figure_9",
+    "validation_graphite_sine",
     "validation_graphite_isa",
 }
 
@@ -87,9 +90,9 @@ def test_the_noise_of_the_run_is_stated(page):
     ("arguments", "told"),
     [
         (["--seed", "-1"], "--seed must not be negative"),
-        (["--position-noise-um", "-1"], "position"),
-        (["--pressure-noise-pa", "nan"], "pressure"),
-        (["--config", "nowhere"], "bench_low.yaml"),
+        (["--position-noise-um", "-1"], "--position-noise-um must be finite and not negative"),
+        (["--pressure-noise-pa", "nan"], "--pressure-noise-pa must be finite and not negative"),
+        (["--config", "nowhere"], "nowhere/bench_low.yaml: cannot be read"),
     ],
 )
 def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, told):
@@ -105,7 +108,16 @@ def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, ar
 def test_an_output_that_is_a_file_is_refused(tmp_path, capsys):
     (tmp_path / "taken").write_text("")
     assert main(["--output", str(tmp_path / "taken")]) == 2
-    assert "taken" in capsys.readouterr().err
+    told = f"reproduce_paper: {tmp_path / 'taken'}: is no folder: give --output another name\n"
+    assert capsys.readouterr().err == told
+
+
+def test_noise_that_hides_everything_is_refused_with_the_packing(tmp_path, capsys):
+    options = ["--output", str(tmp_path), "--position-noise-um", "1000"]
+    assert main(options) == 2
+    refusal = capsys.readouterr().err.splitlines()[-1]
+    assert refusal.startswith("reproduce_paper: packing low: sampling is too slow for the motion")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_noise_of_the_command_line_replaces_the_configured(monkeypatch, tmp_path):

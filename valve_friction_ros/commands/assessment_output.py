@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import json_number, two_digits
+from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
 from valve_friction_ros.identification import (
     ASSESSED_UNITS,
     AssessedParameter,
@@ -143,7 +142,7 @@ def print_table(
             parameter.verdict.value,
             "" if math.isnan(published) else f"{published:.6g}",
         )
-    console = Console(highlight=False, markup=False)
+    console = plain_console()
     console.print(table)
     console.print()
     for parameter in assessment.parameters.values():

@@ -20,7 +20,7 @@ from valve_friction_ros.commands.bench_processes import (
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.commands.formatting import OneLineParser, two_digits
+from valve_friction_ros.commands.formatting import OneLineParser, complain, two_digits
 from valve_friction_ros.identification import (
     UNITS,
     AssessedParameter,
@@ -256,7 +256,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require_picture_file(options.output)
     except ValueError as error:
-        print(f"demo: {error}", file=sys.stderr)
+        complain("demo", error)
         return 2
     os.environ.update(quick_discovery())
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
@@ -275,7 +275,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         console.print("stopped")
         return 130
     except (BenchError, RefusalError, OSError) as error:
-        print(f"demo: {error}", file=sys.stderr)
+        complain("demo", error)
         return 2
 
 

@@ -41,6 +41,8 @@ def read_estimate(path: Path) -> dict[str, float]:
         raise ValueError(f"{path}: cannot be read: {cause}") from None
     except json.JSONDecodeError as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
+    if isinstance(content, dict) and "valves" in content:
+        raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
     parameters = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(parameters, dict):
         raise ValueError(

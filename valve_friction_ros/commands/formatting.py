@@ -2,9 +2,15 @@
 
 import argparse
 import math
+import sys
 from typing import NoReturn
 
-__all__ = ["OneLineParser", "json_number", "two_digits"]
+from rich.console import Console
+
+__all__ = ["OneLineParser", "complain", "json_number", "plain_console", "two_digits"]
+
+_PRINTED_WIDTH = 120
+"""Columns of what goes into a file or a pipe, which has no width of its own."""
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -13,6 +19,20 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the error and end with exit code 2."""
         self.exit(2, f"{self.prog}: {message}; see --help\n")
+
+
+def complain(command: str, error: Exception) -> None:
+    """Print an error on one line of stderr; of the system's: the file and the cause."""
+    told = str(error)
+    if isinstance(error, OSError) and error.strerror:
+        told = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    print(f"{command}:", *told.splitlines(), file=sys.stderr)
+
+
+def plain_console() -> Console:
+    """Return a console that prints text as it is, as wide as the terminal if there is one."""
+    width = None if sys.stdout.isatty() else _PRINTED_WIDTH
+    return Console(width=width, highlight=False, markup=False)
 
 
 def json_number(value: float) -> float | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.formatting import OneLineParser, complain
 from valve_friction_ros.commands.history_output import as_json, print_table, write_csv
 from valve_friction_ros.monitoring import (
     HistoryError,
@@ -129,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         histories = _run(options)
     except (ValueError, HistoryError, OSError) as error:
-        print("history:", *str(error).splitlines(), file=sys.stderr)
+        complain("history", error)
         return _EXIT_REFUSED
     if options.json:
         print(json.dumps(as_json(histories), ensure_ascii=False, allow_nan=False))

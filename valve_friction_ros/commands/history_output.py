@@ -9,10 +9,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import json_number, two_digits
+from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
 from valve_friction_ros.identification import ASSESSED_UNITS
 from valve_friction_ros.monitoring import HistoryEntry, Trend, ValveHistory
 
@@ -171,7 +170,7 @@ def _told(entry: HistoryEntry) -> str:
 
 def print_table(histories: Sequence[ValveHistory]) -> None:
     """Print a table a valve, and the trend below it."""
-    console = Console(highlight=False, markup=False)
+    console = plain_console()
     for history in histories:
         tag = f"{history.valve.tag} " if history.valve.tag else ""
         table = Table(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from valve_friction_ros.commands.assessment_output import as_json, print_table
-from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.formatting import OneLineParser, complain
 from valve_friction_ros.commands.identification_arguments import (
     add_identification_arguments,
     identification_settings,
@@ -78,7 +78,7 @@ def _identified(
     try:
         return identify(recording, valve, settings, window)
     except RefusalError as refusal:
-        return RefusalError(f"{recorded.label}: {refusal}")
+        return recorded.refused(refusal)
 
 
 def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:
@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         valve, results = _results(options)
     except (ValueError, RefusalError, OSError) as error:
-        print("identify_recording:", *str(error).splitlines(), file=sys.stderr)
+        complain("identify_recording", error)
         return _EXIT_REFUSED
     refusals = [result.outcome for result in results if isinstance(result.outcome, RefusalError)]
     if options.json and (len(results) > 1 or not refusals):
@@ -141,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     elif not options.json:
         _print_tables(results, valve)
     for refusal in refusals:
-        print("identify_recording:", *str(refusal).splitlines(), file=sys.stderr)
+        complain("identify_recording", refusal)
     if not refusals:
         return 0
     return _EXIT_REFUSED if len(refusals) == len(results) else _EXIT_SOME_REFUSED

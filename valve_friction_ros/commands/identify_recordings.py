@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from valve_friction_ros.commands.fleet_plan import Plan, forget_stale, make_plan
-from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.formatting import OneLineParser, complain
 from valve_friction_ros.commands.identification_arguments import (
     add_identification_arguments,
     identification_settings,
@@ -212,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             return _run(options, stop)
         except (ValueError, OSError) as error:
-            print(f"{_NAME}:", *str(error).splitlines(), file=sys.stderr)
+            complain(_NAME, error)
             return _EXIT_NOTHING
 
 

@@ -1,6 +1,7 @@
 """Command `reproduce_paper`: the published programme on the simulated bench, and a report of it."""
 
 import argparse
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from valve_friction_ros.commands.formatting import OneLineParser
+from valve_friction_ros.commands.formatting import OneLineParser, complain
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import SensorNoise
 from valve_friction_ros.reports import render
@@ -78,6 +79,13 @@ def _noise(bench: Bench, options: argparse.Namespace) -> SensorNoise:
     """Return the configured noise, or what the options say instead."""
     if options.seed < 0:
         raise ValueError(f"--seed must not be negative, got {options.seed}")
+    given = {
+        "--position-noise-um": options.position_noise_um,
+        "--pressure-noise-pa": options.pressure_noise_pa,
+    }
+    for name, value in given.items():
+        if value is not None and not 0 <= value < math.inf:
+            raise ValueError(f"{name} must be finite and not negative, got {value:g}")
     position, pressure = bench.noise.position, bench.noise.pressure
     if options.position_noise_um is not None:
         position = 1e-6 * options.position_noise_um
@@ -112,6 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(stderr=True)
     try:
         benches = _benches(options)
+        if options.output.exists() and not options.output.is_dir():
+            raise ValueError(f"{options.output}: is no folder: give --output another name")
         options.output.mkdir(parents=True, exist_ok=True)
         with Progress(
             TextColumn("{task.description}"),
@@ -128,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             )
             bar.update(task, description="done", advance=1)
     except (ValueError, RefusalError, OSError) as error:
-        print("reproduce_paper:", *str(error).splitlines(), file=sys.stderr)
+        complain("reproduce_paper", error)
         return _EXIT_REFUSED
     print(f"{options.output / _PAGE} is written.")
     print(matched)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from valve_friction_ros.commands.estimate_file import read_estimate
-from valve_friction_ros.commands.formatting import OneLineParser, json_number
+from valve_friction_ros.commands.formatting import OneLineParser, complain, json_number
 from valve_friction_ros.commands.recording_arguments import (
     DIRECT_DRIVE,
     add_recording_arguments,
@@ -65,10 +65,11 @@ def _run(options: argparse.Namespace) -> _Result:
     reading = reading_options(options)
     description = described_valve(options, reading)
     valve = description.valve
+    estimate = read_estimate(options.estimate)
     try:
-        model = identified_model(read_estimate(options.estimate), description.known)
-    except RefusalError as refusal:
-        raise RefusalError(f"{options.estimate}: {refusal}") from None
+        model = identified_model(estimate, description.known)
+    except (RefusalError, ValueError) as error:
+        raise type(error)(f"{options.estimate}: {error}") from None
     if options.plot is not None:
         from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
 
@@ -78,7 +79,7 @@ def _run(options: argparse.Namespace) -> _Result:
     try:
         validation = validate(recording, valve, model.parameters)
     except RefusalError as refusal:
-        raise RefusalError(f"{recorded.label}: {refusal}") from None
+        raise recorded.refused(refusal) from None
     if options.plot is not None:
         drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
         plots.validation_figure(validation, valve, drive).savefig(options.plot)
@@ -116,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         result = _run(options)
     except (ValueError, RefusalError, OSError) as error:
-        print("validate_recording:", *str(error).splitlines(), file=sys.stderr)
+        complain("validate_recording", error)
         return _EXIT_REFUSED
     if options.json:
         print(json.dumps(_as_json(result), ensure_ascii=False, allow_nan=False))

@@ -12,6 +12,7 @@ from backports import zstd
 from lz4.frame import LZ4FrameDecompressor
 
 from valve_friction_ros.monitoring.bag_topics import Topic
+from valve_friction_ros.monitoring.sqlite_pages import messages_after
 
 __all__ = ["SalvagedMcap", "SalvagedSqlite", "Storage", "write_ahead_log"]
 
@@ -126,9 +127,10 @@ def write_ahead_log(path: Path) -> Path:
 
 
 class SalvagedSqlite:
-    """A SQLite3 file read row by row until a page of it is missing or damaged.
+    """A SQLite3 file read row by row until a row of it is missing or damaged.
 
-    Rows that are still in a write-ahead log beside the file are read as well.
+    Rows that are still in a write-ahead log beside the file are read as well, and rows that the
+    file still holds but no longer leads to.
 
     Parameters
     ----------
@@ -137,6 +139,7 @@ class SalvagedSqlite:
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = path
         mode = "mode=ro" if write_ahead_log(path).exists() else "immutable=1"
         self._uri = f"{path.absolute().as_uri()}?{mode}"
         self._numbers: dict[int, Topic] = {}
@@ -158,7 +161,12 @@ class SalvagedSqlite:
     def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
         """Go through the messages of some topics in the order of their recording."""
         wanted = {number: topic for number, topic in self._numbers.items() if topic in topics}
-        query = "SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id"
-        for number, _, data in self._rows(query):
+        query = "SELECT id, topic_id, data FROM messages NOT INDEXED ORDER BY id"
+        last = 0
+        for row, number, data in self._rows(query):
+            last = row
             if number in wanted and isinstance(data, bytes):
                 yield wanted[number], data
+        for message in messages_after(self._path, last):
+            if message.topic in wanted:
+                yield wanted[message.topic], message.data

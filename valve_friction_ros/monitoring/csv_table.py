@@ -172,6 +172,9 @@ class CsvTable:
 
 def no_column(path: Path, wanted: str, header: Sequence[str]) -> str:
     """Word the refusal of a file without a column."""
+    if len(header) == 1:
+        only = _shortened(header[0])
+        return f"{path}: no column {wanted}, only {only!r}: name the delimiter of the file"
     return f"{path}: no column {wanted} among {', '.join(header)}: rename one or name the right one"
 
 

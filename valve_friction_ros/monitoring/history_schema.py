@@ -101,7 +101,7 @@ _REMEDIES = (
     ),
     ("disk I/O error", "check the disk, its free space and the process's limits"),
     ("locked", "find the process that holds it"),
-    ("not a database", "move it away, and a new one is begun"),
+    ("not a database", "name the right file, or move this one away, and a new one is begun"),
     ("malformed", "move it away, and a new one is begun; `sqlite3 FILE .recover` may save rows"),
 )
 

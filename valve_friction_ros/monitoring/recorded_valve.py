@@ -41,8 +41,12 @@ class RecordedValve:
         Raises
         ------
         RefusalError
-            If there is none: file, valve and cause.
+            If there is none: file, valve, cause and notes.
         """
         if isinstance(self.outcome, RefusalError):
-            raise RefusalError(f"{self.label}: {self.outcome}")
+            raise self.refused(self.outcome)
         return self.outcome
+
+    def refused(self, cause: RefusalError) -> RefusalError:
+        """Return a refusal with file and valve, and the notes, which may hold the reason for it."""
+        return RefusalError("; ".join((f"{self.label}: {cause}", *self.notes)))

@@ -22,6 +22,8 @@ _ESTIMATE, _TREND = COLOURS[:2]
 _LIMITS = {"warn_ratio": "#E69F00", "error_ratio": "#B2182B", "low_ratio": "#762A83"}
 _NAMES = {"warn_ratio": "worth maintenance", "error_ratio": "excess", "low_ratio": "may leak"}
 _MARGIN = 0.03
+_SHORTEST = np.timedelta64(2, "h")
+"""Time that a panel shows at least; matplotlib would show years about a single time."""
 
 
 def _dates(times: ArrayLike) -> NDArray[np.datetime64]:
@@ -94,6 +96,11 @@ def _draw(axes: Axes, history: ValveHistory) -> None:
         )
     if history.trend is not None and history.trend.is_significant:
         _draw_trend(axes, history.trend)
+    times = _dates([history.entries[0].time, history.entries[-1].time])
+    first, last = times.astype("datetime64[D]")
+    if times[1] - times[0] < _SHORTEST:
+        middle = times[0] + (times[1] - times[0]) // 2
+        axes.set_xlim(middle - _SHORTEST // 2, middle + _SHORTEST // 2)
     locator = AutoDateLocator(maxticks=9)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(
@@ -104,9 +111,6 @@ def _draw(axes: Axes, history: ValveHistory) -> None:
     if history.trend is not None and history.trend.is_significant:
         axes.set_title(_told(history.trend), loc="right", fontsize="medium", color=_TREND)
     axes.set_ylabel("coulomb friction $F_c$ [N]")
-    first, last = _dates([history.entries[0].time, history.entries[-1].time]).astype(
-        "datetime64[D]"
-    )
     axes.set_xlabel(f"time [UTC]; identified from {first} to {last}")
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)

@@ -4,6 +4,7 @@ from valve_friction_ros.reproduction.bench import BENCH_NAMES, Bench, find_bench
 from valve_friction_ros.reproduction.check import Check, summary
 from valve_friction_ros.reproduction.checks import all_checks
 from valve_friction_ros.reproduction.experiments import Experiment, Experiments, Plan, run, run_all
+from valve_friction_ros.reproduction.figures import draw_figures
 from valve_friction_ros.reproduction.programme import (
     BenchResult,
     Comparison,
@@ -12,7 +13,7 @@ from valve_friction_ros.reproduction.programme import (
     progress_steps,
     run_programme,
 )
-from valve_friction_ros.reproduction.report import draw_figures, report_page
+from valve_friction_ros.reproduction.report import report_page
 
 __all__ = [
     "BENCH_NAMES",

@@ -1,6 +1,7 @@
 """The paper's programme: experiments, identification by each method, validation."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from valve_friction_ros.identification import (
     Estimate,
     ForceBalanceAssessment,
     IdentificationSettings,
+    RefusalError,
     StepTest,
     SweepAssessment,
     Validation,
@@ -237,6 +239,15 @@ def progress_steps(benches: Mapping[str, Bench]) -> int:
     return 2 * len(benches) + 1 + 2 * len(paper.PACKINGS)
 
 
+@contextmanager
+def _named(bench: str) -> Iterator[None]:
+    """Name the bench whose record is refused."""
+    try:
+        yield
+    except RefusalError as refusal:
+        raise RefusalError(f"packing {bench}: {refusal}") from None
+
+
 def run_programme(
     benches: Mapping[str, Bench],
     plan: Plan,
@@ -271,17 +282,19 @@ def run_programme(
         progress(f"{name}: experiments and valve signature")
         experiments[name] = run_all(bench, plan)
         settings = IdentificationSettings(assumed_mass=bench.assumed_mass)
-        balances[name] = assess_force_balance(
-            experiments[name].triangle.measured, bench.valve, settings
-        )
+        with _named(name):
+            balances[name] = assess_force_balance(
+                experiments[name].triangle.measured, bench.valve, settings
+            )
     biases = {name: each.signature.position_bias for name, each in balances.items()}
     shared = rounded_bias(*(biases[name] for name in paper.PACKINGS))
     results = {}
     for name, bench in benches.items():
         progress(f"{name}: models and validation")
         bias = shared if name in paper.PACKINGS else rounded_bias(biases[name])
-        found = identified(bench, experiments[name], balances[name], bias)
-        results[name] = _result(bench, experiments[name], found)
+        with _named(name):
+            found = identified(bench, experiments[name], balances[name], bias)
+            results[name] = _result(bench, experiments[name], found)
     published = [benches[name] for name in paper.PACKINGS]
     progress("without noise")
     without_noise = {

@@ -1,25 +1,12 @@
-"""The report: figures and sections in the order of the paper."""
+"""The report: sections in the order of the paper."""
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
-from matplotlib.figure import Figure
-
-from valve_friction_ros.reports import Block, Page, Paragraph, Picture, Section
+from valve_friction_ros.reports import Block, Page, Paragraph, Section
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.check import Check, summary, written
-from valve_friction_ros.reproduction.model_figures import (
-    estimates_figure,
-    quality_figure,
-    validation_figure,
-)
+from valve_friction_ros.reproduction.figures import Pictures
 from valve_friction_ros.reproduction.programme import Programme
-from valve_friction_ros.reproduction.record_figures import (
-    excitations_figure,
-    force_terms_figure,
-    input_output_figure,
-    signatures_figure,
-)
 from valve_friction_ros.reproduction.tables import (
     check_table,
     noise_table,
@@ -32,64 +19,7 @@ from valve_friction_ros.reproduction.tables import (
 )
 from valve_friction_ros.reproduction.validation_checks import FIGURES
 
-__all__ = ["draw_figures", "report_page"]
-
-Pictures = Mapping[str, Picture]
-
-
-def draw_figures(programme: Programme) -> Pictures:
-    """Draw every figure, with captions, by the name of its file."""
-    low, high, graphite = (programme.results[name] for name in (*paper.PACKINGS, "graphite"))
-    figures: dict[str, tuple[Figure, str]] = {
-        "excitations": (
-            excitations_figure(low),
-            "The four excitations as commanded, and behind the V/P converter.",
-        ),
-        "figure_1": (input_output_figure(low, high), "Fig. 1: input and stem, low and high."),
-        "figure_2": (
-            signatures_figure(low, high),
-            "Fig. 2: valve signatures with the breakaway points P1 (up) and P2 (down) and the "
-            "dead zones (arrows).",
-        ),
-        "figure_2_graphite": (
-            signatures_figure(graphite),
-            "As Fig. 2, graphite packing: the stem jumps as it breaks away.",
-        ),
-    }
-    for one in (low, high):
-        name = one.bench.name
-        figures |= {
-            f"figure_3_{name}": (
-                estimates_figure(one),
-                f"Fig. 3: estimates over δv, {name} friction"
-                + ("." if name == "low" else " (not in the paper)."),
-            ),
-            f"figure_4_{name}": (
-                quality_figure(one),
-                f"Fig. 4: σ_s of (17) and R²_s of (18) over δv, {name} friction"
-                + ("." if name == "low" else " (not in the paper)."),
-            ),
-        }
-    figures["figure_5"] = (
-        force_terms_figure(high),
-        "Fig. 5: contribution of each term of (4), sine, high friction.",
-    )
-    for (name, excitation), place in FIGURES.items():
-        one = programme.results[name]
-        is_sine = excitation == "sine"
-        experiment = one.experiments.sine if is_sine else one.experiments.isa
-        figures[place.lower().replace("fig. ", "figure_")] = (
-            validation_figure(one, experiment, dict(one.sine if is_sine else one.isa)),
-            f"{place}: validation, {name} friction, {excitation}; errors against the stem "
-            "without sensor noise.",
-        )
-    figures["validation_graphite_isa"] = (
-        validation_figure(graphite, graphite.experiments.isa, dict(graphite.isa)),
-        "As Figs. 8 and 9, graphite packing.",
-    )
-    return MappingProxyType(
-        {name: Picture(figure, text, text) for name, (figure, text) in figures.items()}
-    )
+__all__ = ["report_page"]
 
 
 def report_page(programme: Programme, checks: Sequence[Check], pictures: Pictures) -> Page:
@@ -269,8 +199,9 @@ def _noise(programme: Programme) -> tuple[Block, ...]:
 
 
 def _graphite(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
-    one = programme.results["graphite"]
+    low, one = (programme.results[name] for name in ("low", "graphite"))
     found = one.identified
+    preloads = one.bench.truth.spring_preload / low.bench.truth.spring_preload
     notes = [
         *(f"Model 1: {note}." for note in found.published.warnings),
         *(f"Refined, with x̄ of (14): {note}." for note in found.refined.warnings),
@@ -280,19 +211,22 @@ def _graphite(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
             "The paper's future work, F_s above F_c. The stem leaves with a jump, and the loop of "
             "the signature is narrower than the breakaway points lie apart; that is how the force "
             "balance tells F_c from F_s, while the sweep takes F_s from (9). "
-            f"F_0 is {one.bench.truth.spring_preload:.0f} N, eleven times that of "
-            "the Teflon packing, so "
-            "that an error of k in (15) weighs eleven times as much in x̄ of (14), which model 1 is "
-            "given; the refinement then explains the rest by a clock offset that the bench has "
-            "not. With F_0 identified instead, and the mass given, it needs none. "
+            f"F_0 is {one.bench.truth.spring_preload:.0f} N, {preloads:.0f} times that of the "
+            "Teflon packing, and an error of k in (15) weighs as much more in x̄ of (14), which "
+            "model 1 is given; the refinement then explains the rest by a clock offset that the "
+            "bench has not. With F_0 identified instead, and the mass given, it needs none. "
             f"On the sine model 1 is off by {1e6 * one.sine['model 1'].true_rms:.2g} µm rms, "
             f"model 2 by {1e6 * one.sine['model 2'].true_rms:.2g} µm."
         ),
         pictures["figure_2_graphite"],
         signature_table((one,)),
+        pictures["figure_3_graphite"],
+        pictures["figure_4_graphite"],
         parameter_table(one),
+        *map(Paragraph, notes),
         validation_table(one.sine, "Sine"),
+        pictures["validation_graphite_sine"],
         validation_table(one.isa, "ISA steps"),
         pictures["validation_graphite_isa"],
-        *map(Paragraph, notes),
+        step_table(one),
     )
