@@ -38,6 +38,13 @@ def test_a_zero_is_not_identifiable():
     assert judged("viscous_friction", 0.0, 1.0, 2.0).verdict is Verdict.NOT_IDENTIFIABLE
 
 
+def test_a_withheld_value_leaves_the_largest_that_it_can_be():
+    """−3 ± 4 N is 7 N at the most; of what the record does not hold nothing is known."""
+    assert judged("coulomb_friction", -3.0, 2.0, 4.0).magnitude_bound == 7.0
+    assert math.isnan(judged("coulomb_friction", 3.0, 0.1, 0.2).magnitude_bound)
+    assert math.isnan(not_identifiable("coulomb_friction", "why").magnitude_bound)
+
+
 def test_doubt_makes_a_narrow_interval_weak_and_explains_a_wide_one():
     narrow = judged("mass", 100.0, 0.1, 0.2, "a doubt")
     assert (narrow.verdict, narrow.reason, narrow.value) == (Verdict.WEAK, "a doubt", 100.0)

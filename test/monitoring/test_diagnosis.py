@@ -175,6 +175,26 @@ class TestUnknownFriction:
             "coulomb friction is not identifiable: the record does not tell it"
         )
 
+    @pytest.mark.parametrize(("bound", "collapsed"), [(1.5, True), (57.0, True), (57.1, False)])
+    def test_too_small_to_be_told_has_collapsed(self, with_values, unknown, bound, collapsed):
+        """Half of the least that the baseline can be, 128 − 14 N, is 57 N."""
+        vanished = dataclasses.replace(unknown(), magnitude_bound=bound)
+        assessment = with_values(coulomb_friction=vanished)
+        found = diagnose(assessment, BENCH_VALVE, Baseline(128.0, 14.0))
+        assert found.ratio is None
+        if collapsed:
+            assert (found.level, found.status_signal) == (
+                Level.ERROR,
+                StatusSignal.OUT_OF_SPECIFICATION,
+            )
+            assert found.message == (
+                "friction collapsed, the packing may leak: coulomb friction is too small to be "
+                f"told, {bound:.2g} N at the most; its baseline is 128 N"
+            )
+        else:
+            assert found.level == Level.OK
+        assert diagnose(assessment, BENCH_VALVE).level == Level.OK
+
     @pytest.mark.parametrize("baseline", [None, BASELINE])
     def test_below_zero_is_a_fault_of_the_signals(self, with_values, friction, baseline):
         """As of a drive whose sign is turned; no packing has it, so nothing is compared."""

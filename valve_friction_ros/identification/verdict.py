@@ -1,7 +1,7 @@
 """How far an identified number can be trusted."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 __all__ = ["WEAK_SHARE", "AssessedParameter", "Verdict", "fixed", "judged", "not_identifiable"]
@@ -37,6 +37,9 @@ class AssessedParameter:
         What the value is worth.
     reason : str
         Why it is weak or not identifiable; else empty.
+    magnitude_bound : float
+        Of a value that is withheld for its wide interval the largest magnitude in that interval,
+        SI unit; else nan.
     """
 
     name: str
@@ -45,6 +48,7 @@ class AssessedParameter:
     half_width: float
     verdict: Verdict
     reason: str = ""
+    magnitude_bound: float = math.nan
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -76,7 +80,8 @@ def judged(
     if share < 1:
         reason = doubt or f"its interval is ±{100 * share:.2g} % of its value"
         return AssessedParameter(name, value, standard_error, half_width, Verdict.WEAK, reason)
-    return not_identifiable(name, doubt or "its interval is wider than its value")
+    reason = doubt or "its interval is wider than its value"
+    return replace(not_identifiable(name, reason), magnitude_bound=abs(value) + half_width)
 
 
 def not_identifiable(name: str, reason: str) -> AssessedParameter:

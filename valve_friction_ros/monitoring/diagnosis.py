@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
-from valve_friction_ros.identification import Assessment
+from valve_friction_ros.identification import AssessedParameter, Assessment
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.monitoring.baseline import Baseline, Ratio
 
@@ -155,13 +155,23 @@ def diagnose(
     Diagnosis
         A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
         uncertain estimate raises no alarm: an unchanged valve would have to be misjudged by the
-        whole distance to the bound. A valve that the model does not describe is WARN at least.
+        whole distance to the bound. A friction too small to be told has collapsed where even the
+        largest that it can be lies below the low bound. A valve that the model does not describe
+        is WARN at least.
     """
     limits = limits or FrictionLimits()
     friction = assessment.parameters["coulomb_friction"]
     if math.isnan(friction.value):
         message = f"coulomb friction is not identifiable: {friction.reason}"
-        return _with_model_doubt(Diagnosis(Level.OK, StatusSignal.GOOD, message, None), assessment)
+        verdict = Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
+        if baseline is not None and _has_vanished(friction, baseline, limits):
+            message = (
+                "friction collapsed, the packing may leak: coulomb friction is too small to be "
+                f"told, {friction.magnitude_bound:.2g} N at the most; its baseline is "
+                f"{baseline.coulomb_friction:.4g} N"
+            )
+            verdict = Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, message, None)
+        return _with_model_doubt(verdict, assessment)
     if friction.value < 0:
         message = (
             f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, which cannot "
@@ -174,6 +184,12 @@ def diagnose(
     else:
         verdict = _against(baseline.compared_with(friction), limits, effect)
     return _with_model_doubt(verdict, assessment)
+
+
+def _has_vanished(friction: AssessedParameter, baseline: Baseline, limits: FrictionLimits) -> bool:
+    """Tell whether a friction too small for a number of its own is surely below the low limit."""
+    least = baseline.coulomb_friction - baseline.half_width
+    return friction.magnitude_bound <= limits.low_ratio * least
 
 
 def _with_model_doubt(verdict: Diagnosis, assessment: Assessment) -> Diagnosis:

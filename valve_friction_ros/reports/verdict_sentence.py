@@ -38,7 +38,11 @@ def verdict_sentence(record: IdentifiedRecord) -> str:
     It says in plain words what the diagnosis of the monitor says.
     """
     friction = record.assessment.parameters["coulomb_friction"]
-    if math.isnan(friction.value):
+    alarm = _ALARMS.get(record.diagnosis.status_signal)
+    if math.isnan(friction.value) and alarm is not None:
+        size = f"{friction.magnitude_bound:.2g} N at the most, too small to be told"
+        finding = _Finding(alarm.what.format(ratio=size), alarm.advice)
+    elif math.isnan(friction.value):
         finding = _Finding(
             f"this record does not tell the friction ({friction.reason})",
             "move the valve through several fast strokes both ways and identify it again",
