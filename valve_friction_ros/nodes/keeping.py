@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeVar
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.monitoring import (
     Baseline,
     FrictionMonitor,
@@ -27,6 +28,7 @@ from valve_friction_ros.monitoring import (
     entry_of,
 )
 from valve_friction_ros.nodes.data_folder import history_file
+from valve_friction_ros.nodes.guarded_work import guarded
 from valve_friction_ros.nodes.parameters import ParameterSpec
 
 __all__ = ["HISTORY_DAYS", "HISTORY_FILE", "Job", "Keeping"]
@@ -179,7 +181,7 @@ class Keeping:
             return
         self._waiting.append(change)
         executor = self._node.executor
-        done = self._writer.submit(self._write, self._file, self._trend_job())
+        done = self._writer.submit(guarded(self._write), self._file, self._trend_job())
         done.add_done_callback(lambda result: executor.create_task(self._take, result, then))
 
     def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
@@ -203,11 +205,11 @@ class Keeping:
     def _take(self, result: "ThreadFuture[Trend | None]", then: Callable[[], None]) -> None:
         try:
             self._trend, self._problem = result.result(), None
-        except HistoryError as error:
+        except (HistoryError, RefusalError) as error:
             self._complain(error)
         then()
 
-    def _complain(self, error: HistoryError) -> None:
+    def _complain(self, error: HistoryError | RefusalError) -> None:
         problem = f"the history is not written: {error}"
         if problem != self._problem:
             self._node.get_logger().warning(problem)
