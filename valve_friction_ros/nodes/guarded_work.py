@@ -13,18 +13,22 @@ _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
 
-def guarded(work: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+def guarded(
+    work: Callable[_Arguments, _Result], *foreseen: type[Exception]
+) -> Callable[_Arguments, _Result]:
     """Return the same work, which turns a failure that nobody foresaw into a RefusalError.
 
-    The error tells its kind, its words and the line that raised it. Raised in the executor's
-    thread instead, it would end the node, with all valves of its process, and leave who asked
-    without an answer.
+    Refusals, and errors of the kinds `foreseen`, pass as they are. Of any other the refusal tells
+    the kind, the words and the line that raised it. Raised in the executor's thread instead, it
+    would end the node, with all valves of its process, and leave who asked without an answer.
     """
+
+    passed: tuple[type[Exception], ...] = (RefusalError, *foreseen)
 
     def work_or_refuse(*arguments: _Arguments.args, **named: _Arguments.kwargs) -> _Result:
         try:
             return work(*arguments, **named)
-        except RefusalError:
+        except passed:
             raise
         except Exception as error:
             place = traceback.extract_tb(error.__traceback__)[-1]

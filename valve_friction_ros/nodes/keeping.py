@@ -181,7 +181,9 @@ class Keeping:
             return
         self._waiting.append(change)
         executor = self._node.executor
-        done = self._writer.submit(guarded(self._write), self._file, self._trend_job())
+        done = self._writer.submit(
+            guarded(self._write, HistoryError), self._file, self._trend_job()
+        )
         done.add_done_callback(lambda result: executor.create_task(self._take, result, then))
 
     def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
