@@ -22,7 +22,6 @@ def guarded(
     the kind, the words and the line that raised it. Raised in the executor's thread instead, it
     would end the node, with all valves of its process, and leave who asked without an answer.
     """
-
     passed: tuple[type[Exception], ...] = (RefusalError, *foreseen)
 
     def work_or_refuse(*arguments: _Arguments.args, **named: _Arguments.kwargs) -> _Result:
