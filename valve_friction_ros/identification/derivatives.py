@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import savgol_coeffs
 
 __all__ = ["Derivatives", "differentiate"]
 
@@ -69,7 +69,9 @@ def differentiate(
         raise ValueError(f"{position.size} samples are fewer than the window of {window}")
     velocity, acceleration = (
         np.convolve(
-            position, savgol_coeffs(window, order, deriv=degree, delta=sample_period), "valid"
+            position,
+            scipy.signal.savgol_coeffs(window, order, deriv=degree, delta=sample_period),
+            "valid",
         )
         for degree in (1, 2)
     )

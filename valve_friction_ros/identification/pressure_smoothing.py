@@ -11,8 +11,8 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import find_peaks, oaconvolve, savgol_coeffs
 
 __all__ = ["find_corners", "independent_halves", "longest_faithful_window", "smooth_between"]
 
@@ -43,7 +43,7 @@ def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDAr
     place = np.arange(window) - (window - 1) / 2
     slopes = _window_slopes(signal, window)
     jump = np.abs(slopes[window:] - slopes[:-window]) / (noise * np.sqrt(2 / (place @ place)))
-    peaks, _ = find_peaks(jump, height=_CORNER_GATE, distance=window)
+    peaks, _ = scipy.signal.find_peaks(jump, height=_CORNER_GATE, distance=window)
     before = jump[np.maximum(peaks - window, 0)]
     after = jump[np.minimum(peaks + window, jump.size - 1)]
     background = np.maximum(np.maximum(before, after), _CORNER_GATE / _CORNER_SHARPNESS)
@@ -133,7 +133,7 @@ def _local_cubics(stretch: NDArray[np.float64], window: int) -> NDArray[np.float
     shifted = stretch - level
     first = cubics[:half] @ (cubics.T @ shifted[:window])
     last = cubics[window - half :] @ (cubics.T @ shifted[-window:])
-    middle = oaconvolve(shifted, (cubics @ cubics[half])[::-1], mode="valid")
+    middle = scipy.signal.oaconvolve(shifted, (cubics @ cubics[half])[::-1], mode="valid")
     return np.asarray(np.concatenate((first, middle, last)) + level, dtype=np.float64)
 
 
@@ -179,7 +179,7 @@ def _is_noise(residual: NDArray[np.float64], noise: float, window: int) -> bool:
     length = max(window // 4, 1)
     blocks = residual.size // length
     means = residual[: blocks * length].reshape(blocks, length).mean(axis=1)
-    taken = -savgol_coeffs(window, _ORDER)
+    taken = -scipy.signal.savgol_coeffs(window, _ORDER)
     taken[window // 2] += 1.0
     expected = noise * float(np.linalg.norm(np.convolve(taken, np.full(length, 1 / length))))
     highest = expected**2 * (1 + _DEVIATIONS * math.sqrt(2 / blocks))

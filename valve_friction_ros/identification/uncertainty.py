@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from valve_friction_ros.identification.estimating_equation import EstimatingEquation
 
@@ -153,7 +153,7 @@ def _unknown(free: int) -> Covariance:
 
 def half_width(standard_error: float, freedom: float) -> float:
     """Half the width of the interval that covers the true value with `CONFIDENCE`."""
-    return float(student.ppf(0.5 + CONFIDENCE / 2, freedom)) * standard_error
+    return float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * standard_error
 
 
 def stroke_length(simulated: NDArray[np.float64]) -> int:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.model.recording import Recording
@@ -46,7 +46,9 @@ def converter_response(
     start = float(command[0]) if initial is None else initial
     held = np.concatenate(([0.0], command[:-1]))
     pressure: NDArray[np.float64]
-    pressure, _ = lfilter([1.0 - decay], [1.0, -decay], held[1:], zi=np.array([decay * start]))
+    pressure, _ = scipy.signal.lfilter(
+        [1.0 - decay], [1.0, -decay], held[1:], zi=np.array([decay * start])
+    )
     return np.concatenate(([start], pressure))
 
 

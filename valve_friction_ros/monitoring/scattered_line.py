@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 __all__ = ["LEAST_ESTIMATES", "ScatteredLine", "fit_line"]
 
@@ -42,7 +42,7 @@ class ScatteredLine(NamedTuple):
     @property
     def quantile(self) -> float:
         """Half width of a 95 % interval in standard errors."""
-        return float(student.ppf(0.975, self.freedom))
+        return float(stdtrit(self.freedom, 0.975))
 
     @property
     def slope_half_width(self) -> float:

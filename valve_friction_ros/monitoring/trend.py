@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from valve_friction_ros.model.checks import require_non_negative
 from valve_friction_ros.monitoring.baseline import Baseline
@@ -147,7 +147,7 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
         time, error = days.times[worst], np.hypot(days.errors[worst], others.scatter)
         predicted = np.hypot(error, others.half_width(time) / others.quantile)
         surprise = abs(days.values[worst] - others.at(time)) / predicted
-        if surprise <= student.ppf(1 - _OUTLIER / (2 * days.times.size), others.freedom):
+        if surprise <= stdtrit(others.freedom, 1 - _OUTLIER / (2 * days.times.size)):
             break
         days, line, outliers = rest, others, outliers + 1
     return line, outliers
