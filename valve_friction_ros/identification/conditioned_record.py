@@ -68,15 +68,17 @@ def condition(recording: Recording) -> ConditionedRecord:
     corners, window = _smoothing(recording)
     stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / period)), 1)
     if window == 1:
-        whole, halves = pressure, (pressure, pressure)
+        whole = pressure[::stride]
+        halves = whole, whole  # one object: there are no two looks to cross
     else:
-        whole = smooth_between(pressure, corners, window)
-        halves = independent_halves(pressure, corners, window)
+        whole = smooth_between(pressure, corners, window)[::stride]
+        one, two = independent_halves(pressure, corners, window)
+        halves = one[::stride], two[::stride]
     position, kept = _averaged(recording.position, stride)
     return ConditionedRecord(
         stride * period,
-        whole[::stride],
-        (halves[0][::stride], halves[1][::stride]),
+        whole,
+        halves,
         position,
         kept * sensor_noise(recording.position),
         window,

@@ -1,6 +1,7 @@
 """The equation whose root an estimate is, sample by sample."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class EstimatingEquation:
         (one, two), (first, second) = self.slopes, self.residuals
         return one * second[:, None] + two * first[:, None]
 
-    @property
+    @cached_property
     def curvature(self) -> NDArray[np.float64]:
         """Derivative of the sum by the coordinates, shape (p, p), symmetric."""
         one, two = self.slopes

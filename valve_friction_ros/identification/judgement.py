@@ -14,8 +14,6 @@ from valve_friction_ros.identification.regression_uncertainty import RegressionU
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.uncertainty import (
     CONFIDENCE,
-    block_covariance,
-    stroke_length,
     worst_case,
 )
 from valve_friction_ros.identification.verdict import (
@@ -59,8 +57,7 @@ def judge_refinement(
     noise, what it can have done at the worst (`worst_case`) is added in full. No half width is
     less than 0.05 % of its value, of a spring constant 0.02 %.
     """
-    stroke = stroke_length(refinement.simulated)
-    covariance = block_covariance(refinement.equation, stroke)
+    covariance = refinement.covariance
     samples = refinement.simulated.size
     systematic = worst_case(refinement.equation.curvature, samples, misfit.excess)
     by_mass = _shift_by_assumed_mass(refinement, settings)
@@ -68,7 +65,7 @@ def judge_refinement(
         **vars(refinement.problem.model(refinement.coordinates)),
         OFFSET: refinement.coordinates[OFFSET],
     }
-    few = _too_few(samples // max(stroke, 1))
+    few = _too_few(samples // max(refinement.stroke, 1))
     doubt = _doubt(refinement, misfit)
     extras = (name for name in refinement.names if name not in (*UNITS, SLIP, START))
     judgements = {}

@@ -10,14 +10,11 @@ from valve_friction_ros.identification.output_error import OFFSET, SLIP, Coordin
 from valve_friction_ros.identification.refinement import (
     Refinement,
     estimating_equation,
+    extended,
     least_squares_fit,
     refine,
 )
-from valve_friction_ros.identification.uncertainty import (
-    block_covariance,
-    plain_sandwich,
-    stroke_length,
-)
+from valve_friction_ros.identification.uncertainty import plain_sandwich
 
 __all__ = ["with_demanded"]
 
@@ -78,29 +75,33 @@ _LEAST_OFFSET = 1e-3
 
 def _deviation(refinement: Refinement, name: str) -> float:
     """Distance of a free coordinate from zero, in standard errors."""
-    block = stroke_length(refinement.simulated)
     gradient = np.eye(len(refinement.names))[refinement.names.index(name)]
-    error = block_covariance(refinement.equation, block).standard_error(gradient)
+    error = refinement.covariance.standard_error(gradient)
     return refinement.coordinates[name] / error if error > 0 else 0.0
 
 
-def _one_step(refinement: Refinement, name: str) -> tuple[float, float]:
-    """Estimate what a coordinate that is not free would become if it were, in one Newton step.
+def _score_tests(
+    refinement: Refinement, candidates: Sequence[str]
+) -> dict[str, tuple[float, float]]:
+    """Estimate what each coordinate that is not free would become if it were, in a Newton step.
 
     A score test: the model is refined without the coordinate, and the residual that this leaves
     is asked whether it is correlated with the motion that the coordinate would add.
 
     Returns
     -------
-    value, standard_error : float
+    dict of str to tuple of float
         Estimate of the coordinate, and its standard error, in its own unit.
     """
     problem, at = refinement.problem, refinement.coordinates
-    units = problem.units((*refinement.names, name), {**at, name: at[name] or 0.0})
-    equation = estimating_equation(problem, at, units)
-    covariance = plain_sandwich(equation, stroke_length(refinement.simulated))
-    error = math.sqrt(float(covariance[-1, -1]))
-    return at[name] + float(equation.newton_step()[-1]) * units[name], error * units[name]
+    own = estimating_equation(problem, at, problem.units(refinement.names, at))
+    steps = {}
+    for name, unit in problem.units(tuple(candidates), at).items():
+        equation = extended(own, problem, at, {name: unit})
+        covariance = plain_sandwich(equation, refinement.stroke)
+        error = math.sqrt(float(covariance[-1, -1]))
+        steps[name] = at[name] + float(equation.newton_step()[-1]) * unit, error * unit
+    return steps
 
 
 def _suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, float]:
@@ -110,8 +111,7 @@ def _suspected(refinement: Refinement, candidates: Sequence[str]) -> dict[str, f
     suspicion is enough; whether the part is there is judged when it has been refined.
     """
     suspects = {}
-    for name in candidates:
-        value, error = _one_step(refinement, name)
+    for name, (value, error) in _score_tests(refinement, candidates).items():
         change = abs(value - refinement.coordinates[name])
         if error > 0 and change > _SUSPICION * error and change > _least(refinement, name):
             suspects[name] = value
@@ -168,7 +168,7 @@ def with_demanded(
 
 def _is_suspected(refinement: Refinement, name: str) -> bool:
     """Tell whether the residual leans towards a part of the model, if only a little."""
-    value, error = _one_step(refinement, name)
+    value, error = _score_tests(refinement, (name,))[name]
     return value > error
 
 
@@ -201,7 +201,8 @@ def _is_sure(trial: Refinement, name: str, before: float) -> bool:
     """Tell whether a refined coordinate has surely and noticeably left its former value."""
     value = trial.coordinates[name]
     change = abs(value - before)
-    error = abs(value / _deviation(trial, name)) if _deviation(trial, name) else math.inf
+    deviation = _deviation(trial, name)
+    error = abs(value / deviation) if deviation else math.inf
     needed = _OFFSET_SIGNIFICANCE if name == OFFSET else _SIGNIFICANCE
     return change > needed * error and change > _least(trial, name)
 

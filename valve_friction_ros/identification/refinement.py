@@ -10,6 +10,7 @@ sensitivities under the other half, whose noise is independent of it.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,13 @@ from scipy import optimize
 
 from valve_friction_ros.identification.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.output_error import Coordinates, OutputError
+from valve_friction_ros.identification.uncertainty import (
+    Covariance,
+    block_covariance,
+    stroke_length,
+)
 
-__all__ = ["Refinement", "estimating_equation", "least_squares_fit", "refine"]
+__all__ = ["Refinement", "estimating_equation", "extended", "least_squares_fit", "refine"]
 
 _INSTRUMENT_STEPS = 12
 _CONVERGED = 1e-5
@@ -71,6 +77,16 @@ class Refinement:
         """Root mean square of the residual, m."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
+    @property
+    def stroke(self) -> int:
+        """Mean number of samples of a stroke."""
+        return stroke_length(self.simulated)
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Covariance of the free coordinates, by the scatter between strokes."""
+        return block_covariance(self.equation, self.stroke)
+
 
 def estimating_equation(
     problem: OutputError, at: Coordinates, units: Mapping[str, float]
@@ -84,6 +100,23 @@ def estimating_equation(
         (problem.sensitivity(at, one, units), problem.sensitivity(at, two, units)),
         (problem.residual(at, one), problem.residual(at, two)),
     )
+
+
+def extended(
+    equation: EstimatingEquation,
+    problem: OutputError,
+    at: Coordinates,
+    units: Mapping[str, float],
+) -> EstimatingEquation:
+    """Put further coordinates, named in `units`, beside those of an `estimating_equation` at `at`.
+
+    Those that it has are not differentiated again.
+    """
+    one, two = (
+        np.hstack((slope, problem.sensitivity(at, half, units)))
+        for slope, half in zip(equation.slopes, problem.record.halves, strict=True)
+    )
+    return EstimatingEquation((one, two), equation.residuals)
 
 
 def _plain_equation(
