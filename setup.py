@@ -22,7 +22,7 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.10",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "*/*.xml", "*/*.html"]},
+    package_data={NAME: ["py.typed", "**/*.xml", "**/*.html"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -50,7 +50,7 @@ setup(
             "identifiers = valve_friction_ros.nodes.start:identifiers",
             "simulator = valve_friction_ros.nodes.start:simulator",
             "pressure_source = valve_friction_ros.nodes.start:pressure_source",
-            "demo = valve_friction_ros.commands.demo:main",
+            "demo = valve_friction_ros.commands.demo.command:main",
             "validate_recording = valve_friction_ros.commands.validate_recording:main",
             "history = valve_friction_ros.commands.history:main",
             "reproduce_paper = valve_friction_ros.commands.reproduce_paper:main",

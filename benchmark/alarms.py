@@ -7,6 +7,7 @@ import numpy as np
 
 from benchmark.cases import EXCITATIONS, NOISES, PERIOD
 from benchmark.runs import SETTINGS
+from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
 from valve_friction_ros.identification import Assessment, RefusalError, assess
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -16,7 +17,6 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
-from valve_friction_ros.monitoring import Baseline, FrictionLimits, diagnose
 
 __all__ = ["GROWTH", "AlarmCounts", "Judged", "judge"]
 

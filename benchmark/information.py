@@ -6,8 +6,8 @@ import numpy as np
 
 from benchmark.cases import NOISES, PERIOD, clean_record
 from benchmark.plants import PLANTS
-from valve_friction_ros.identification.conditioned_record import ConditionedRecord
-from valve_friction_ros.identification.output_error import OFFSET, SLIP, START, OutputError
+from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START, OutputError
+from valve_friction_ros.signals.conditioned_record import ConditionedRecord
 
 __all__ = ["Information", "information"]
 

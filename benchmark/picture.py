@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from benchmark.alarms import AlarmCounts
 from benchmark.bounds import COVERAGE, FORCE_BOUND, by_case, coverage_of
 from benchmark.runs import Outcome
-from valve_friction_ros.monitoring import FrictionLimits
+from valve_friction_ros.health import FrictionLimits
 
 __all__ = ["draw"]
 

@@ -1,11 +1,13 @@
 """Shared by all tests: the bench valves and their simulated records."""
 
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from records import sine_record
 
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -76,3 +78,15 @@ def bench_record(bench_trajectory):
         return noise.applied_to(recording) if noise else recording
 
     return record
+
+
+@pytest.fixture(scope="session")
+def bench_yaml():
+    """The valve file that the package brings."""
+    return Path(__file__).resolve().parents[1] / "config" / "valve_bench.yaml"
+
+
+@pytest.fixture(scope="session")
+def loose_record():
+    """The bench valve with its packing lightly tightened."""
+    return sine_record(LOW_FRICTION)

@@ -5,6 +5,7 @@ import importlib
 import inspect
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -12,19 +13,42 @@ import pytest
 PACKAGE = "valve_friction_ros"
 SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 
-# What each room may import of the others.
+# What each room may import of the others; each holds what the rooms below it may import too.
+_CORE = {"model", "signals", "identification"}
+_FILES = {*_CORE, "streams", "records"}
+_VALVES = {*_CORE, "streams", "health"}
+_PAGES = {*_VALVES, "history"}
 MAY_IMPORT = {
     "model": set(),
-    "identification": {"model"},
-    "monitoring": {"identification", "model"},
-    "reproduction": {"reports", "plots", "monitoring", "identification", "model"},
-    "reports": {"plots", "monitoring", "identification", "model"},
-    "plots": {"monitoring", "identification", "model"},
-    "fleet": {"monitoring", "identification", "model"},
-    "nodes": {"reports", "monitoring", "identification", "model"},
+    "signals": {"model"},
+    "identification": {"model", "signals"},
+    "streams": _CORE,
+    "records": {*_CORE, "streams"},
+    "health": {*_CORE, "streams"},
+    "history": _VALVES,
+    "figures": _PAGES,
+    "reports": {*_PAGES, "figures"},
+    "fleet": _FILES,
+    "reproduction": {*_PAGES, "figures", "reports"},
+    "nodes": {*_FILES, *_PAGES, "reports"},
+}
+# What each inner room may import of its siblings. The files beside inner rooms hold their shared
+# words and what joins them, so both may import each other; no two files do, directly or around.
+INNER = {
+    "identification.trust": set(),
+    "identification.published": {"trust"},
+    "identification.steps": {"trust"},
+    "identification.refined": {"trust", "published"},
+    "identification.signature": {"trust", "published", "steps"},
+    "records.bags": set(),
+    "reproduction.checks": set(),
+    "reproduction.figures": {"checks"},
+    "nodes.plumbing": set(),
+    "nodes.identifier": {"plumbing"},
+    "commands.demo": set(),
 }
 ROS_ROOMS = {"nodes", "commands"}
-CORE = ["model", "identification", "monitoring", "fleet"]
+CORE = ["model", "signals", "identification", "streams", "records", "health", "history", "fleet"]
 
 
 def rooms():
@@ -58,8 +82,36 @@ def is_ros(module):
     )
 
 
+def inner_rooms():
+    return {".".join(path.parent.parts[-2:]) for path in SOURCES.glob("*/*/__init__.py")}
+
+
+def name_of(path):
+    parts = path.relative_to(SOURCES.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
 def test_the_rooms_are_known():
     assert set(rooms()) == {*MAY_IMPORT, "commands"}
+    assert inner_rooms() == set(INNER)
+
+
+@pytest.mark.parametrize("room", INNER)
+def test_arrows_between_inner_rooms_run_one_way(room):
+    outer, inner = room.split(".")
+    siblings = {each.split(".")[1] for each in INNER if each.startswith(f"{outer}.")}
+    for path in sorted((SOURCES / outer / inner).glob("*.py")):
+        parts = [name.split(".") for name in imported(path)]
+        used = {part[2] for part in parts if part[:2] == [PACKAGE, outer] and len(part) > 2}
+        strangers = used & siblings - INNER[room] - {inner}
+        assert not strangers, f"{path.relative_to(SOURCES)} imports {strangers}"
+
+
+def test_no_two_files_need_each_other():
+    sources = {name_of(path): path for path in SOURCES.rglob("*.py") if path.stem != "__init__"}
+    needed = {name: set(imported(path)) & set(sources) for name, path in sources.items()}
+    assert any(needed.values())
+    TopologicalSorter(needed).prepare()  # raises CycleError
 
 
 @pytest.mark.parametrize("room", MAY_IMPORT)
@@ -73,7 +125,7 @@ def test_arrows_run_one_way(room):
 
 def test_imports_are_seen():
     """The check above has eyes: what is known to be imported is found, relative or not."""
-    assert imported_rooms(SOURCES / "identification" / "identify.py") == {
+    assert imported_rooms(SOURCES / "identification" / "published" / "identify.py") == {
         "identification",
         "model",
     }

@@ -2,7 +2,8 @@
 
 The layers, arrows only downwards::
 
-    nodes, commands  →  monitoring  →  identification  →  model
+    nodes, commands  →  reports, figures, fleet, reproduction  →  history, health, streams, records
+        →  identification  →  signals, model
 
 Everything below ``nodes`` works without ROS: import it from a notebook.
 All quantities are in SI units unless a name says otherwise.

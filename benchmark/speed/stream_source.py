@@ -19,7 +19,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 
 from valve_friction_ros import model
-from valve_friction_ros.monitoring import COLUMNS
+from valve_friction_ros.streams import COLUMNS
 
 _SECOND = 1_000_000_000
 _START = 1_700_000_000

@@ -8,12 +8,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.monitoring import RecordBuffer
-from valve_friction_ros.nodes import identifier
-from valve_friction_ros.nodes.inputs import InputWatch
-from valve_friction_ros.nodes.messages import position_of, stamp_of
-from valve_friction_ros.nodes.running import run_nodes
-from valve_friction_ros.nodes.streams import qos_overrides, stream
+from valve_friction_ros.nodes.identifier import node as identifier
+from valve_friction_ros.nodes.plumbing.inputs import InputWatch
+from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
+from valve_friction_ros.nodes.plumbing.running import run_nodes
+from valve_friction_ros.streams import RecordBuffer
 
 
 class TypedInputs:

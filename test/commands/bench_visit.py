@@ -6,14 +6,15 @@ import sys
 
 import rclpy
 
-from valve_friction_ros.commands.bench_client import BenchClient, BenchError
-from valve_friction_ros.commands.bench_processes import (
+from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
+from valve_friction_ros.commands.demo.bench_processes import (
     NodeProcess,
     quick_discovery,
     running_nodes,
 )
+from valve_friction_ros.health import Level
 from valve_friction_ros.model import BENCH_VALVE
-from valve_friction_ros.monitoring import Level, RecordBuffer
+from valve_friction_ros.streams import RecordBuffer
 
 NODES = [NodeProcess("identifier", {"input_timeout": 0.5}), NodeProcess("simulator", {})]
 

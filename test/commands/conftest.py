@@ -14,12 +14,6 @@ PROJECT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="session")
-def bench_yaml():
-    """The valve file that the package brings."""
-    return PROJECT / "config" / "valve_bench.yaml"
-
-
-@pytest.fixture(scope="session")
 def square_record(bench_record):
     """Two periods of the paper's square wave at 1 kHz, low friction."""
     return bench_record("low", SquareWave(), 20.8)

@@ -5,7 +5,7 @@ At 100 Hz only a derivative window of 50 ms follows the stem, and no such window
 
 import sys
 
-from valve_friction_ros.commands import demo
+from valve_friction_ros.commands.demo import command as demo
 
 QUICKER = {
     "identifier": {"derivative_window": 5, "fixed.mass": 1.64},

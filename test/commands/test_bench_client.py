@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from valve_friction_ros.commands.bench_processes import (
+from valve_friction_ros.commands.demo.bench_processes import (
     NodeProcess,
     quick_discovery,
     running_nodes,

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from valve_friction_ros.commands import demo
-from valve_friction_ros.commands.bench_client import BenchError
+from valve_friction_ros.commands.demo import command as demo
+from valve_friction_ros.commands.demo.bench_client import BenchError
+from valve_friction_ros.figures import Case
+from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
     UNITS,
     AssessedParameter,
@@ -22,8 +24,6 @@ from valve_friction_ros.identification import (
     assess,
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION
-from valve_friction_ros.monitoring import Level
-from valve_friction_ros.plots import Case
 
 PNG = b"\x89PNG\r\n\x1a\n"
 ASKED = {

@@ -10,14 +10,9 @@ import pytest
 from histories import DAY, OTHER, START, VALVE, refused, success
 
 from valve_friction_ros.commands import history as command
+from valve_friction_ros.health import Baseline, FrictionLimits
+from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.monitoring import (
-    MONTH,
-    Baseline,
-    FrictionLimits,
-    HistoryFile,
-    KeptBaseline,
-)
 
 BASELINE = Baseline(141.0, 1.0)
 DRIFT = 3.0

@@ -17,7 +17,6 @@ import pytest
 from bags import messages_of, write_bag
 
 from valve_friction_ros.commands.identify_recordings import main
-from valve_friction_ros.commands.valve_file import read_valve_file
 from valve_friction_ros.identification import IdentificationSettings, assess
 from valve_friction_ros.model import (
     Recording,
@@ -26,7 +25,8 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
-from valve_friction_ros.monitoring.recordings import read_recordings
+from valve_friction_ros.records.recordings import read_recordings
+from valve_friction_ros.records.valve_file import read_valve_file
 
 PERIOD = 0.01
 PATIENCE = 60.0  # s, for one thing to happen on a loaded machine

@@ -13,8 +13,8 @@ SLOW = "slow"
 FINISH = "finish"
 
 if __name__ == "__main__":
-    from valve_friction_ros.monitoring import bag_writing
-    from valve_friction_ros.nodes import identifier
+    from valve_friction_ros.nodes.identifier import node as identifier
+    from valve_friction_ros.records.bags import writing as bag_writing
 
     write_bag = bag_writing.write_bag
 

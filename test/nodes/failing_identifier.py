@@ -8,7 +8,7 @@ MENDED = "mended"
 """Name of the file, in the node's working directory, that takes the fault away."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes import identifier
+    from valve_friction_ros.nodes.identifier import node as identifier
 
     identify = identifier.identify_snapshot
 

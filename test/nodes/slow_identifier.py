@@ -8,7 +8,7 @@ FINISH = "finish"
 """Name of the file, in the node's working directory, that lets an identification end."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes import identifier
+    from valve_friction_ros.nodes.identifier import node as identifier
 
     identify_once = identifier.identify_snapshot
 

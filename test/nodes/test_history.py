@@ -7,17 +7,11 @@ from histories import DAY, START, VALVE, success
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.history import MONTH, FrictionPoint, HistoryFile, KeptBaseline, trend_of
 from valve_friction_ros.identification import assess
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
-from valve_friction_ros.monitoring import (
-    MONTH,
-    Baseline,
-    FrictionPoint,
-    HistoryFile,
-    KeptBaseline,
-    trend_of,
-)
-from valve_friction_ros.nodes.friction_status import trend_values
+from valve_friction_ros.nodes.identifier.status import trend_values
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"

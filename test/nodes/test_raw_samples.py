@@ -9,10 +9,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Header
 
-from valve_friction_ros.monitoring import Kind
-from valve_friction_ros.nodes import raw_samples
-from valve_friction_ros.nodes.messages import position_of, stamp_of
-from valve_friction_ros.nodes.raw_samples import RawSamples, positions_in, pressures_in
+from valve_friction_ros.nodes.plumbing import raw_samples
+from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing.raw_samples import RawSamples, positions_in, pressures_in
+from valve_friction_ros.streams import Kind
 
 NUMBERS = st.floats(width=64)
 TIMES = st.builds(Time, sec=st.integers(-(2**31), 2**31 - 1), nanosec=st.integers(0, 999_999_999))

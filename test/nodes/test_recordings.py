@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import UNITS
 from valve_friction_ros.model import BENCH_VALVE
-from valve_friction_ros.monitoring import RecordBuffer
+from valve_friction_ros.streams import RecordBuffer
 
 WINDOW = 4.0
 IDENTIFIER = f"{NAMESPACE}/identifier"

@@ -99,7 +99,7 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(bench, tmp_path, na
 
 
 def test_a_node_that_reports_nothing_loads_nothing_for_it():
-    code = "import sys, valve_friction_ros.nodes.identifier; print(*sys.modules, sep='\\n')"
+    code = "import sys, valve_friction_ros.nodes.identifier.node; print(*sys.modules, sep='\\n')"
     loaded = subprocess.run(
         [sys.executable, "-c", code],
         cwd=PROJECT,
@@ -108,5 +108,5 @@ def test_a_node_that_reports_nothing_loads_nothing_for_it():
         check=True,
         timeout=60,
     ).stdout.split()
-    assert "valve_friction_ros.nodes.reporting" in loaded
+    assert "valve_friction_ros.nodes.identifier.reporting" in loaded
     assert not {"matplotlib", "jinja2", "valve_friction_ros.reports"} & set(loaded)

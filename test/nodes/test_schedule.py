@@ -6,9 +6,9 @@ from live_nodes import NAMESPACE, SECOND, START, values_of
 from records import quick_record
 from rosgraph_msgs.msg import Clock
 
+from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.identification import assess
 from valve_friction_ros.model import BENCH_VALVE, Recording
-from valve_friction_ros.monitoring import HistoryFile
 
 NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from valve_friction_ros.figures.comparison import Comparison
+from valve_friction_ros.figures.report_figures import chosen_region
+from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.monitoring import Baseline
-from valve_friction_ros.plots.comparison import Comparison
-from valve_friction_ros.plots.report_figures import chosen_region
 from valve_friction_ros.reports import (
     Page,
     identification_report,

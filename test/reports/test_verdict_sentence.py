@@ -5,8 +5,8 @@ import math
 
 import pytest
 
+from valve_friction_ros.health import Baseline, FrictionLimits, Level
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.monitoring import Baseline, FrictionLimits, Level
 from valve_friction_ros.reports import verdict_sentence
 
 BASELINE = Baseline(100.0)

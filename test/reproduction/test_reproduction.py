@@ -26,7 +26,7 @@ from valve_friction_ros.reproduction import (
     run,
     summary,
 )
-from valve_friction_ros.reproduction.check import within, written
+from valve_friction_ros.reproduction.checks.check import within, written
 from valve_friction_ros.reproduction.experiments import TRIANGLE
 from valve_friction_ros.reproduction.force_terms import force_terms
 from valve_friction_ros.reproduction.programme import rounded_bias

@@ -8,6 +8,7 @@ from typing import Any
 from rich.table import Table
 
 from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
+from valve_friction_ros.health import Diagnosis, percentage
 from valve_friction_ros.identification import (
     ASSESSED_UNITS,
     AssessedParameter,
@@ -17,7 +18,6 @@ from valve_friction_ros.identification import (
     Verdict,
 )
 from valve_friction_ros.model import Valve
-from valve_friction_ros.monitoring import Diagnosis, percentage
 
 __all__ = ["as_json", "print_table"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from valve_friction_ros.commands.identification_arguments import identification_settings
 from valve_friction_ros.commands.recording_arguments import reading_options, valve_of
 from valve_friction_ros.fleet import Entry, Findings, FoundRecording, Job, Options, ResultsFile
-from valve_friction_ros.monitoring.recordings import ReadingOptions
+from valve_friction_ros.records.recordings import ReadingOptions
 
 __all__ = ["Plan", "forget_stale", "make_plan"]
 

@@ -9,15 +9,15 @@ from pathlib import Path
 
 from valve_friction_ros.commands.formatting import OneLineParser, complain
 from valve_friction_ros.commands.history_output import as_json, print_table, write_csv
-from valve_friction_ros.monitoring import (
+from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
     KeptValve,
     ValveHistory,
-    nanoseconds,
     valve_histories,
 )
-from valve_friction_ros.nodes.data_folder import history_file
+from valve_friction_ros.records.data_folder import history_file
+from valve_friction_ros.streams import nanoseconds
 
 __all__ = ["main"]
 
@@ -102,9 +102,9 @@ def _chosen(valves: Sequence[KeptValve], names: Sequence[str] | None) -> tuple[K
 def _run(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
     file = HistoryFile(options.file)
     if options.plot is not None:
-        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
-        plots.require_picture_file(options.plot)
+        figures.require_picture_file(options.plot)
     histories = valve_histories(
         file,
         _chosen(file.valves(), options.valve),
@@ -116,7 +116,7 @@ def _run(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
         write_csv(options.csv, histories)
     if options.plot is not None:
         try:
-            figure = plots.trend_figure(histories)
+            figure = figures.trend_figure(histories)
         except ValueError as error:
             raise ValueError(f"--plot: {error} by --valve") from None
         figure.savefig(options.plot)

@@ -12,8 +12,8 @@ from typing import Any
 from rich.table import Table
 
 from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
+from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
 from valve_friction_ros.identification import ASSESSED_UNITS
-from valve_friction_ros.monitoring import HistoryEntry, Trend, ValveHistory
 
 __all__ = ["as_json", "print_table", "write_csv"]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from valve_friction_ros.commands.recording_arguments import DIRECT_DRIVE, require_one
-from valve_friction_ros.commands.valve_file import ValveFile
+from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Assessment, IdentificationSettings
-from valve_friction_ros.monitoring import Baseline
-from valve_friction_ros.monitoring.recorded_valve import RecordedValve
+from valve_friction_ros.records.recorded_valve import RecordedValve
+from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["IdentificationFiles", "add_file_arguments", "baseline_from", "identification_files"]
 
@@ -80,12 +80,13 @@ class IdentificationFiles(NamedTuple):
         """Write them; raises OSError where that fails."""
         if self == (None, None):
             return
-        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
+
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
         recording = recorded.recording()
-        drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
+        drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
         if self.plot is not None:
-            figure = plots.identification_figure(recording, description.valve, assessment, drive)
+            figure = figures.identification_figure(recording, description.valve, assessment, drive)
             figure.savefig(self.plot)
         if self.report is not None:
             from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
@@ -114,7 +115,7 @@ def identification_files(options: argparse.Namespace) -> IdentificationFiles:
         One line that names the file and the cause.
     """
     if options.plot is not None:
-        from valve_friction_ros.plots import require_picture_file  # noqa: PLC0415 - slow to import
+        from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import
 
         require_picture_file(options.plot)
     if options.report is not None:

@@ -23,6 +23,7 @@ from valve_friction_ros.commands.recording_arguments import (
     reading_options,
     require_one,
 )
+from valve_friction_ros.health import Diagnosis, diagnose
 from valve_friction_ros.identification import (
     METHODS,
     Assessment,
@@ -31,9 +32,8 @@ from valve_friction_ros.identification import (
     RefusalError,
 )
 from valve_friction_ros.model import Valve
-from valve_friction_ros.monitoring import Diagnosis, diagnose
-from valve_friction_ros.monitoring.recorded_valve import RecordedValve
-from valve_friction_ros.monitoring.recordings import read_recordings
+from valve_friction_ros.records.recorded_valve import RecordedValve
+from valve_friction_ros.records.recordings import read_recordings
 
 __all__ = ["main"]
 

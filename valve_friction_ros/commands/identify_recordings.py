@@ -17,7 +17,6 @@ from valve_friction_ros.commands.identification_arguments import (
 )
 from valve_friction_ros.commands.recording_arguments import add_reading_arguments, reading_options
 from valve_friction_ros.commands.stop_signals import StopSignals
-from valve_friction_ros.commands.valve_file import read_valve_file
 from valve_friction_ros.fleet import (
     REFUSED,
     DeadWorker,
@@ -35,6 +34,7 @@ from valve_friction_ros.fleet import (
 )
 from valve_friction_ros.fleet.row import Cell
 from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.records.valve_file import read_valve_file
 
 __all__ = ["main"]
 

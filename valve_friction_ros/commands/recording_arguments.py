@@ -6,21 +6,21 @@ from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
 
-from valve_friction_ros.commands.valve_file import ValveFile, read_valve_file
 from valve_friction_ros.model import Valve
-from valve_friction_ros.monitoring.bag_topics import TopicChoice
-from valve_friction_ros.monitoring.csv_recording import CsvColumns, CsvFormat, CsvUnits
-from valve_friction_ros.monitoring.csv_table import CsvLayout
-from valve_friction_ros.monitoring.recorded_valve import RecordedValve
-from valve_friction_ros.monitoring.recordings import ReadingOptions, holds_force, read_recordings
-from valve_friction_ros.monitoring.stretch import Stretch
-from valve_friction_ros.monitoring.units import (
+from valve_friction_ros.records.bags.topics import TopicChoice
+from valve_friction_ros.records.csv_recording import CsvColumns, CsvFormat, CsvUnits
+from valve_friction_ros.records.csv_table import CsvLayout
+from valve_friction_ros.records.recorded_valve import RecordedValve
+from valve_friction_ros.records.recordings import ReadingOptions, holds_force, read_recordings
+from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.records.units import (
     FORCE_UNITS,
     NANOSECONDS,
     PERCENT,
     POSITION_UNITS,
     PRESSURE_UNITS,
 )
+from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 
 __all__ = [
     "DIRECT_DRIVE",

@@ -17,6 +17,7 @@ from valve_friction_ros.commands.recording_arguments import (
     read_one,
     reading_options,
 )
+from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import (
     IdentifiedModel,
     RefusalError,
@@ -25,7 +26,6 @@ from valve_friction_ros.identification import (
     validate,
 )
 from valve_friction_ros.model import Valve
-from valve_friction_ros.monitoring import percentage
 
 __all__ = ["main"]
 
@@ -71,9 +71,9 @@ def _run(options: argparse.Namespace) -> _Result:
     except (RefusalError, ValueError) as error:
         raise type(error)(f"{options.estimate}: {error}") from None
     if options.plot is not None:
-        from valve_friction_ros import plots  # noqa: PLC0415 - slow to import
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
-        plots.require_picture_file(options.plot)
+        figures.require_picture_file(options.plot)
     recorded = read_one(options.file, valve, reading)
     recording = recorded.recording()
     try:
@@ -81,8 +81,8 @@ def _run(options: argparse.Namespace) -> _Result:
     except RefusalError as refusal:
         raise recorded.refused(refusal) from None
     if options.plot is not None:
-        drive = plots.FORCE if description is DIRECT_DRIVE else plots.PRESSURE
-        plots.validation_figure(validation, valve, drive).savefig(options.plot)
+        drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
+        figures.validation_figure(validation, valve, drive).savefig(options.plot)
     return _Result(validation, model, valve, (*recorded.notes, *model.notes))
 
 

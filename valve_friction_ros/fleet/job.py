@@ -9,8 +9,8 @@ from valve_friction_ros import __version__
 from valve_friction_ros.fleet.row import Cell, error_cells, result_cells
 from valve_friction_ros.identification import IdentificationSettings, RefusalError, method_named
 from valve_friction_ros.model import Valve
-from valve_friction_ros.monitoring.recorded_valve import RecordedValve
-from valve_friction_ros.monitoring.recordings import ReadingOptions, read_recordings
+from valve_friction_ros.records.recorded_valve import RecordedValve
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 
 __all__ = ["Job", "Options", "identify_job"]
 

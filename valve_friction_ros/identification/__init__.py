@@ -1,30 +1,33 @@
 """Identification of the Karnopp model from recordings; no ROS."""
 
 from valve_friction_ros.identification.assessment import ASSESSED_UNITS, Assessment
-from valve_friction_ros.identification.derivatives import Derivatives, differentiate
-from valve_friction_ros.identification.estimate import UNITS, Estimate
-from valve_friction_ros.identification.force_balance import (
+from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
+from valve_friction_ros.identification.methods import DEFAULT_METHOD, METHODS, Method, method_named
+from valve_friction_ros.identification.published.derivatives import Derivatives, differentiate
+from valve_friction_ros.identification.published.estimate import UNITS, Estimate
+from valve_friction_ros.identification.published.identify import identify
+from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
+from valve_friction_ros.identification.refined.method import SweepAssessment, assess
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
+from valve_friction_ros.identification.signature.force_balance import (
     ForceBalanceAssessment,
     assess_force_balance,
 )
-from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
-from valve_friction_ros.identification.identify import identify
-from valve_friction_ros.identification.methods import DEFAULT_METHOD, METHODS, Method, method_named
-from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
-from valve_friction_ros.identification.signature_strokes import BreakawayPoint, SignatureStroke
-from valve_friction_ros.identification.step_detection import find_steps
-from valve_friction_ros.identification.step_response import (
+from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
+from valve_friction_ros.identification.signature.valve_signature import (
+    ValveSignature,
+    valve_signature,
+)
+from valve_friction_ros.identification.steps.step_detection import find_steps
+from valve_friction_ros.identification.steps.step_response import (
     Bracket,
     StepMetrics,
     StepTest,
     step_test,
 )
-from valve_friction_ros.identification.sweep import Sweep, sweep_thresholds
-from valve_friction_ros.identification.sweep_assessment import SweepAssessment, assess
-from valve_friction_ros.identification.validation import Validation, validate
-from valve_friction_ros.identification.valve_signature import ValveSignature, valve_signature
-from valve_friction_ros.identification.verdict import AssessedParameter, Verdict
+from valve_friction_ros.identification.steps.validation import Validation, validate
+from valve_friction_ros.identification.trust.verdict import AssessedParameter, Verdict
 
 __all__ = [
     "ASSESSED_UNITS",

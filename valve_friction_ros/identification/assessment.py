@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.estimate import UNITS, Estimate
-from valve_friction_ros.identification.model_honesty import Misfit
-from valve_friction_ros.identification.output_error import OFFSET
-from valve_friction_ros.identification.sweep import Sweep
-from valve_friction_ros.identification.verdict import AssessedParameter
+from valve_friction_ros.identification.published.estimate import UNITS, Estimate
+from valve_friction_ros.identification.published.sweep import Sweep
+from valve_friction_ros.identification.refined.model_test import Misfit
+from valve_friction_ros.identification.refined.output_error import OFFSET
+from valve_friction_ros.identification.trust.verdict import AssessedParameter
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 
 __all__ = ["ASSESSED_UNITS", "Assessment"]

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import NamedTuple
 
-from valve_friction_ros.identification.estimate import UNITS
-from valve_friction_ros.identification.output_error import OFFSET
+from valve_friction_ros.identification.published.estimate import UNITS
+from valve_friction_ros.identification.refined.output_error import OFFSET
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters

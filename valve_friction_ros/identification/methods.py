@@ -5,12 +5,12 @@ from types import MappingProxyType
 from typing import Protocol
 
 from valve_friction_ros.identification.assessment import Assessment
-from valve_friction_ros.identification.force_balance import (
+from valve_friction_ros.identification.refined.method import SweepAssessment, assess
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.signature.force_balance import (
     ForceBalanceAssessment,
     assess_force_balance,
 )
-from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.sweep_assessment import SweepAssessment, assess
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
-from valve_friction_ros.nodes.identifier import PAUSE, Identifier, identification_worker
-from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters
-from valve_friction_ros.nodes.running import run_nodes
+from valve_friction_ros.nodes.identifier.node import PAUSE, Identifier, identification_worker
+from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
+from valve_friction_ros.nodes.plumbing.running import run_nodes
 
 __all__ = ["identifiers_of_valves", "main"]
 

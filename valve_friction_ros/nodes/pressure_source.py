@@ -18,11 +18,15 @@ from valve_friction_ros.model import (
     TriangleWave,
     converter_response,
 )
-from valve_friction_ros.monitoring.csv_table import read_columns
-from valve_friction_ros.nodes.messages import time_message
-from valve_friction_ros.nodes.parameters import ParameterSpec, declare_parameters, values_of
-from valve_friction_ros.nodes.running import run_node
-from valve_friction_ros.nodes.streams import qos_overrides, stream
+from valve_friction_ros.nodes.plumbing.messages import time_message
+from valve_friction_ros.nodes.plumbing.parameters import (
+    ParameterSpec,
+    declare_parameters,
+    values_of,
+)
+from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
+from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.records.csv_table import read_columns
 
 __all__ = ["PressureSource", "main"]
 

@@ -17,16 +17,16 @@ from valve_friction_ros.model import (
     compile_kernels,
 )
 from valve_friction_ros.model.checks import require_non_negative
-from valve_friction_ros.nodes.messages import stamp_of
-from valve_friction_ros.nodes.parameters import (
+from valve_friction_ros.nodes.plumbing.messages import stamp_of
+from valve_friction_ros.nodes.plumbing.parameters import (
     ParameterSpec,
     declare_parameters,
     reject_invalid,
     values_of,
 )
-from valve_friction_ros.nodes.running import run_node
-from valve_friction_ros.nodes.streams import qos_overrides, stream
-from valve_friction_ros.nodes.valve_parameters import (
+from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
+from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.valve_parameters import (
     JOINT,
     KARNOPP_PARAMETERS,
     VALVE_PARAMETERS,

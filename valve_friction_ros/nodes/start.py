@@ -17,7 +17,7 @@ def _start(node: str) -> int:
 
 def identifier() -> int:
     """Run the node `identifier`."""
-    return _start("identifier")
+    return _start("identifier.node")
 
 
 def identifiers() -> int:

@@ -3,10 +3,8 @@
 import math
 from collections.abc import Iterator
 
-from valve_friction_ros.identification import ForceBalanceAssessment, SweepAssessment
-from valve_friction_ros.monitoring import percentage
-from valve_friction_ros.plots.comparison import Comparison, comparison_of
-from valve_friction_ros.plots.report_figures import (
+from valve_friction_ros.figures.comparison import Comparison, comparison_of
+from valve_friction_ros.figures.report_figures import (
     SETTLED_SHARE,
     chosen_region,
     comparison_figure,
@@ -15,6 +13,8 @@ from valve_friction_ros.plots.report_figures import (
     signature_loop_figure,
     sweep_figure,
 )
+from valve_friction_ros.health import percentage
+from valve_friction_ros.identification import ForceBalanceAssessment, SweepAssessment
 from valve_friction_ros.reports.identification_tables import (
     friction_table,
     parameter_table,

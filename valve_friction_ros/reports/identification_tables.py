@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 
 import valve_friction_ros
+from valve_friction_ros.health import Baseline, dead_band, percentage
 from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Verdict
-from valve_friction_ros.monitoring import Baseline, dead_band, percentage
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
 

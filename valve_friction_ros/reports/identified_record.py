@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 
+from valve_friction_ros.figures import PRESSURE, DriveScale
+from valve_friction_ros.health import Baseline, Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.identification import Assessment, IdentificationSettings
 from valve_friction_ros.model import Recording, Valve
-from valve_friction_ros.monitoring import Baseline, Diagnosis, FrictionLimits, diagnose
-from valve_friction_ros.plots import PRESSURE, DriveScale
 
 __all__ = ["IdentifiedRecord"]
 

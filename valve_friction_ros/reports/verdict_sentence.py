@@ -3,8 +3,8 @@
 import math
 from typing import NamedTuple
 
+from valve_friction_ros.health import StatusSignal, dead_band, percentage
 from valve_friction_ros.identification import AssessedParameter, Verdict
-from valve_friction_ros.monitoring import StatusSignal, dead_band, percentage
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
 __all__ = ["verdict_sentence"]

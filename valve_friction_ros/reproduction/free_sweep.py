@@ -10,8 +10,8 @@ from valve_friction_ros.identification import (
     differentiate,
     sweep_thresholds,
 )
-from valve_friction_ros.identification.force_balance_regression import force_balance_regression
-from valve_friction_ros.identification.threshold import choose_threshold
+from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.model import Recording, Valve
 
 __all__ = ["FreeSweep", "free_sweep"]

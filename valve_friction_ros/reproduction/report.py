@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from valve_friction_ros.reports import Block, Page, Paragraph, Section
 from valve_friction_ros.reproduction import paper
-from valve_friction_ros.reproduction.check import Check, summary, written
-from valve_friction_ros.reproduction.figures import Pictures
+from valve_friction_ros.reproduction.checks.check import Check, summary, written
+from valve_friction_ros.reproduction.checks.validation_checks import FIGURES
+from valve_friction_ros.reproduction.figures.figures import Pictures
 from valve_friction_ros.reproduction.programme import Programme
 from valve_friction_ros.reproduction.tables import (
     check_table,
@@ -17,7 +18,6 @@ from valve_friction_ros.reproduction.tables import (
     step_table,
     validation_table,
 )
-from valve_friction_ros.reproduction.validation_checks import FIGURES
 
 __all__ = ["report_page"]
 

@@ -7,11 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from valve_friction_ros.identification import (
-    IdentificationSettings,
-    assess_force_balance,
-    identify,
-)
+from valve_friction_ros.identification import IdentificationSettings, assess_force_balance, identify
 from valve_friction_ros.model import KarnoppParameters, SensorNoise, StemState, simulate
 from valve_friction_ros.reproduction.bench import Bench
 from valve_friction_ros.reproduction.experiments import SINE, TRIANGLE, Experiment, Plan, run

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from valve_friction_ros.identification import AssessedParameter, StepMetrics
 from valve_friction_ros.reports import Column, Table
 from valve_friction_ros.reproduction import paper
-from valve_friction_ros.reproduction.check import Check, written
-from valve_friction_ros.reproduction.parameter_checks import NOTATION
+from valve_friction_ros.reproduction.checks.check import Check, written
+from valve_friction_ros.reproduction.checks.parameter_checks import NOTATION
+from valve_friction_ros.reproduction.figures.record_figures import packing_name
 from valve_friction_ros.reproduction.programme import BenchResult, Comparison, Programme
-from valve_friction_ros.reproduction.record_figures import packing_name
 
 __all__ = [
     "check_table",

@@ -28,7 +28,7 @@ from valve_friction_ros.fleet import (
 )
 from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSettings
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise
-from valve_friction_ros.monitoring.recordings import ReadingOptions
+from valve_friction_ros.records.recordings import ReadingOptions
 
 __all__ = ["measure"]
 

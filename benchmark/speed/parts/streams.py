@@ -14,11 +14,11 @@ import numpy as np
 from benchmark.speed.node_processes import Observer, Process, observer
 from benchmark.speed.rows import Row, Settings
 from valve_friction_ros.model import BENCH_VALVE
-from valve_friction_ros.monitoring import RecordBuffer, rows_arrived
+from valve_friction_ros.streams import RecordBuffer, rows_arrived
 
 __all__ = ["measure"]
 
-_OURS = "valve_friction_ros.nodes.identifier"
+_OURS = "valve_friction_ros.nodes.identifier.node"
 _PEER = "benchmark.speed.typed_identifier"
 _PEER_NAME = "typed, default executor"
 _VALVE = "fv_1"

@@ -14,7 +14,7 @@ from valve_friction_ros.identification import (
     differentiate,
     sweep_thresholds,
 )
-from valve_friction_ros.identification.force_balance_regression import (
+from valve_friction_ros.identification.published.regression import (
     ForceBalanceRegression,
     force_balance_regression,
 )

@@ -1,0 +1,142 @@
+"""The figure of a history: what is drawn where."""
+
+import warnings
+
+import matplotlib.dates
+import numpy as np
+import pytest
+from histories import DAY, OTHER, START, VALVE, refused, success
+from matplotlib.container import ErrorbarContainer
+
+from valve_friction_ros.figures import trend_figure
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.history import (
+    MONTH,
+    HistoryFile,
+    KeptBaseline,
+    ValveHistory,
+    valve_histories,
+)
+from valve_friction_ros.identification import Verdict
+
+BASELINE = Baseline(141.0, 1.0)
+WEEKS = 20
+
+
+@pytest.fixture(scope="module")
+def history(tmp_path_factory):
+    """Drifting by 3 N a month; every fifth weak, and one refusal."""
+    file = HistoryFile(tmp_path_factory.mktemp("history") / "history.sqlite")
+    file.set_baseline(VALVE, KeptBaseline(BASELINE, START + 1, START))
+    for week in range(WEEKS):
+        friction = 150.0 + 3.0 * week * 7 * DAY / MONTH
+        verdict = Verdict.WEAK if week % 5 == 0 else Verdict.IDENTIFIED
+        entry = success(START + week * 7 * DAY, friction, 2.0, baseline=BASELINE, verdict=verdict)
+        file.add(entry)
+    file.add(refused(START + DAY, baseline=BASELINE))
+    (found,) = valve_histories(file, file.valves(), 0, START + 1000 * DAY)
+    return found
+
+
+@pytest.fixture(scope="module")
+def axes(history):
+    (axes,) = trend_figure([history]).axes
+    return axes
+
+
+def labelled(axes, label):
+    """Handle of the legend's entry of this name."""
+    handles, labels = axes.get_legend_handles_labels()
+    return handles[labels.index(label)]
+
+
+def days(line):
+    """Days since the start."""
+    dates = matplotlib.dates.date2num(line.get_xdata())
+    return dates - START / DAY
+
+
+def test_units_and_dates(axes):
+    axes.figure.draw_without_rendering()
+    assert axes.get_ylabel() == "coulomb friction $F_c$ [N]"
+    assert axes.get_xlabel() == "time [UTC]; identified from 2026-09-21 to 2027-02-01"
+    assert axes.get_title(loc="left") == "FV-101 (/fv_101/identifier)"
+    told = axes.get_title(loc="right")
+    assert told.startswith("+3 ± ")
+    assert "worth maintenance expected 2027-06-1" in told
+    ticks = [label.get_text() for label in axes.get_xticklabels()]
+    assert "2027" in ticks
+
+
+@pytest.mark.parametrize("verdict", [Verdict.IDENTIFIED, Verdict.WEAK])
+def test_estimates_with_their_intervals(axes, history, verdict):
+    drawn = labelled(axes, f"{verdict.value}, 95 % interval")
+    assert isinstance(drawn, ErrorbarContainer)
+    points, _, (bars,) = drawn
+    expected = [one for one in history.entries if one.friction and one.friction.verdict is verdict]
+    assert len(expected) == (4 if verdict is Verdict.WEAK else 16)
+    values = [one.friction.value for one in expected]
+    np.testing.assert_array_equal(points.get_ydata(), values)
+    np.testing.assert_allclose(days(points), [(one.time - START) / DAY for one in expected])
+    reach = [segment[:, 1] for segment in bars.get_segments()]
+    np.testing.assert_allclose(reach, [(value - 2, value + 2) for value in values])
+    is_hollow = points.get_markerfacecolor() == "white"
+    assert is_hollow == (verdict is Verdict.WEAK)
+
+
+@pytest.mark.parametrize(
+    ("label", "level"),
+    [
+        ("baseline", 141.0),
+        ("worth maintenance (warn_ratio)", 176.25),
+        ("excess (error_ratio)", 282.0),
+        ("may leak (low_ratio)", 70.5),
+    ],
+)
+def test_limits(axes, label, level):
+    assert set(labelled(axes, label).get_ydata()) == {level}
+
+
+def test_trend_up_to_where_the_limit_is_surely_crossed(axes, history):
+    trend, line = history.trend, labelled(axes, "trend, 95 % band")
+    assert days(line)[0] == pytest.approx(0.0, abs=1e-6)
+    assert days(line)[-1] == pytest.approx((trend.crossing.latest - START) / DAY)
+    assert line.get_ydata()[0] == pytest.approx(150.0)
+    mark = labelled(axes, "limit expected")
+    assert mark.get_ydata() == [176.25]
+    assert days(mark) == pytest.approx([8.75 * MONTH / DAY])
+
+
+def test_refusal_and_baseline_are_marked(axes):
+    assert days(labelled(axes, "refused")) == pytest.approx([1.0])
+    assert labelled(axes, "baseline set").get_linestyle() == ":"
+
+
+def test_a_bare_history():
+    """One identification without baseline, tag or trend."""
+    entry = success(valve=OTHER._replace(tag=""))
+    bare = ValveHistory(entry.valve, (entry,), None, None)
+    (axes,) = trend_figure([bare]).axes
+    _, labels = axes.get_legend_handles_labels()
+    assert labels == ["identified, 95 % interval"]
+    assert axes.get_title(loc="left") == OTHER.name
+    assert axes.get_title(loc="right") == ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        axes.figure.draw_without_rendering()
+    begin, end = axes.get_xlim()
+    assert (end - begin, (begin + end) / 2) == pytest.approx((2 / 24, START / DAY), rel=1e-9)
+
+
+def test_one_panel_a_valve_and_one_legend(history):
+    figure = trend_figure([history] * 3)
+    assert len(figure.axes) == 3
+    (legend,) = figure.legends
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert len(labels) == len(set(labels))
+
+
+@pytest.mark.parametrize("count", [0, 13])
+def test_none_or_too_many(history, count):
+    with pytest.raises(ValueError, match=f"one to 12 valves can be drawn, got {count}"):
+        trend_figure([history] * count)

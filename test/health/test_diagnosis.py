@@ -1,0 +1,327 @@
+"""Verdicts at their limits, and what they say."""
+
+import dataclasses
+import math
+
+import pytest
+
+from valve_friction_ros.health import (
+    Baseline,
+    FrictionLimits,
+    Level,
+    StatusSignal,
+    dead_band,
+    diagnose,
+    percentage,
+)
+from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.identification.refined.model_test import Misfit
+from valve_friction_ros.model import BENCH_VALVE, Valve
+
+BASELINE = Baseline(128.0)
+
+
+class TestDeadBand:
+    def test_is_the_smallest_answered_reversal_over_the_travel(self, with_values):
+        """(100 + 156 N)/2048 N/m is 0.125 m, a quarter of 0.5 m: exact in binary."""
+        found = with_values(coulomb_friction=100.0, static_friction=156.0, spring_constant=2048.0)
+        assert dead_band(found, Valve(1.0, travel=0.5)) == 0.25
+
+    def test_without_a_slip_jump_the_static_friction_is_the_coulomb_friction(
+        self, with_values, unknown
+    ):
+        """2·128 N/2048 N/m."""
+        found = with_values(
+            coulomb_friction=128.0,
+            static_friction=unknown("static_friction"),
+            spring_constant=2048.0,
+        )
+        assert dead_band(found, Valve(1.0, travel=0.5)) == 0.25
+
+    @pytest.mark.parametrize("spring", [0.0, -1.0])
+    def test_there_is_none_without_a_spring(self, with_values, spring):
+        assert math.isnan(dead_band(with_values(spring_constant=spring), BENCH_VALVE))
+
+    @pytest.mark.parametrize("name", ["coulomb_friction", "spring_constant"])
+    def test_there_is_none_without_what_it_is_made_of(self, with_values, unknown, name):
+        found = with_values(static_friction=942.0, **{name: unknown(name)})
+        assert math.isnan(dead_band(found, BENCH_VALVE))
+
+    def test_there_is_no_share_without_stops(self, assessment):
+        assert math.isnan(dead_band(assessment, Valve(1.0)))
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "0 %"),
+        (0.00123, "0.12 %"),
+        (0.052131, "5.2 %"),
+        (0.2069, "21 %"),
+        (0.994, "99 %"),
+        (0.996, "100 %"),
+        (1.25, "125 %"),
+        (12.0, "1200 %"),
+    ],
+)
+def test_percentage(share, text):
+    assert percentage(share) == text
+
+
+FAILURE = (Level.ERROR, StatusSignal.FAILURE, "excess friction")
+MAINTENANCE = (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+NORMAL = (Level.OK, StatusSignal.GOOD, "friction normal")
+PERHAPS_GROWN = (Level.OK, StatusSignal.GOOD, "friction perhaps grown")
+PERHAPS_COLLAPSED = (Level.OK, StatusSignal.GOOD, "friction perhaps collapsed")
+COLLAPSED = (
+    Level.ERROR,
+    StatusSignal.OUT_OF_SPECIFICATION,
+    "friction collapsed, the packing may leak",
+)
+SHARE = 2.0**-5
+"""Half width over the value in these tests: the ratio's interval reaches e^(1/32), 3.17 %."""
+
+
+class TestLevels:
+    @pytest.mark.parametrize(
+        ("ratio", "verdict"),
+        [
+            (50.0, FAILURE),
+            (2.0, FAILURE),
+            (math.nextafter(2.0, 0), MAINTENANCE),
+            (1.25, MAINTENANCE),
+            (math.nextafter(1.25, 0), NORMAL),
+            (1.0, NORMAL),
+            (math.nextafter(0.5, 1), NORMAL),
+            (0.5, COLLAPSED),
+            (2.0**-20, COLLAPSED),
+        ],
+    )
+    def test_a_certain_ratio_at_and_beside_the_limits(self, with_values, ratio, verdict):
+        """The baseline is a power of two, so the ratio comes back as it was."""
+        found = diagnose(
+            with_values(coulomb_friction=ratio * BASELINE.coulomb_friction), BENCH_VALVE, BASELINE
+        )
+        level, signal, words = verdict
+        assert (found.level, found.status_signal) == (level, signal)
+        assert found.ratio == (ratio, ratio, ratio)
+        compared = (
+            f"{words}: coulomb friction is {ratio:.2f} ({ratio:.2f} to {ratio:.2f}) "
+            "times its baseline; "
+        )
+        assert found.message.startswith(compared)
+
+    @pytest.mark.parametrize(
+        ("ratio", "verdict"),
+        [
+            (2.0 * math.exp(SHARE) * (1 + 1e-9), FAILURE),
+            (2.0 * math.exp(SHARE) * (1 - 1e-9), MAINTENANCE),
+            (2.0, MAINTENANCE),
+            (1.25 * math.exp(SHARE) * (1 + 1e-9), MAINTENANCE),
+            (1.25 * math.exp(SHARE) * (1 - 1e-9), PERHAPS_GROWN),
+            (1.25 * (1 + 1e-9), PERHAPS_GROWN),
+            (1.25 * (1 - 1e-9), NORMAL),
+            (0.5 * (1 + 1e-9), NORMAL),
+            (0.5 * (1 - 1e-9), PERHAPS_COLLAPSED),
+            (0.5 * math.exp(-SHARE) * (1 + 1e-9), PERHAPS_COLLAPSED),
+            (0.5 * math.exp(-SHARE) * (1 - 1e-9), COLLAPSED),
+        ],
+    )
+    @pytest.mark.parametrize("of_the_baseline", [False, True])
+    def test_only_a_whole_interval_passes_a_limit(
+        self, with_values, friction, ratio, verdict, of_the_baseline
+    ):
+        """Doubt about the baseline holds an alarm back as doubt about the friction does."""
+        healthy = BASELINE.coulomb_friction
+        now = friction(ratio * healthy, 0.0 if of_the_baseline else SHARE * ratio * healthy)
+        baseline = Baseline(healthy, SHARE * healthy if of_the_baseline else 0.0)
+        found = diagnose(with_values(coulomb_friction=now), BENCH_VALVE, baseline)
+        level, signal, words = verdict
+        assert (found.level, found.status_signal) == (level, signal)
+        assert found.message.startswith(f"{words}: ")
+        assert found.ratio.low == pytest.approx(ratio * math.exp(-SHARE), rel=1e-12)
+        assert found.ratio.high == pytest.approx(ratio * math.exp(SHARE), rel=1e-12)
+
+    def test_a_vague_estimate_raises_no_alarm(self, with_values, friction):
+        """±69.4 % reaches e^-0.694 = 0.4996 of the value; 2.5 times may be 1.249 times."""
+        vague = friction(2.5 * 128.0, 0.694 * 2.5 * 128.0)
+        found = diagnose(with_values(coulomb_friction=vague), BENCH_VALVE, BASELINE)
+        assert found.level == Level.OK
+        assert "is 2.50 (1.25 to 5.00) times its baseline" in found.message
+
+    def test_limits_of_the_user(self, with_values):
+        limits = FrictionLimits(warn_ratio=1.125, error_ratio=1.25, low_ratio=0.875)
+        found = [
+            diagnose(
+                with_values(coulomb_friction=ratio * 128.0), BENCH_VALVE, BASELINE, limits
+            ).level
+            for ratio in (0.875, 1.0, 1.125, 1.25)
+        ]
+        assert found == [Level.ERROR, Level.OK, Level.WARN, Level.ERROR]
+
+    def test_numbers_and_letters_of_the_standards(self):
+        """diagnostic_msgs counts OK, WARN, ERROR from 0; NE 107 has F, C, S, M."""
+        assert [level.value for level in (Level.OK, Level.WARN, Level.ERROR)] == [0, 1, 2]
+        assert [signal.value for signal in StatusSignal] == ["", "F", "C", "S", "M"]
+
+
+class TestUnknownFriction:
+    @pytest.mark.parametrize("baseline", [None, BASELINE, Baseline(1e-6), Baseline(1e6)])
+    def test_never_alarms(self, with_values, unknown, baseline):
+        found = diagnose(with_values(coulomb_friction=unknown()), BENCH_VALVE, baseline)
+        assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
+        assert found.ratio is None
+        assert found.message == (
+            "coulomb friction is not identifiable: the record does not tell it"
+        )
+
+    @pytest.mark.parametrize(("bound", "collapsed"), [(1.5, True), (57.0, True), (57.1, False)])
+    def test_too_small_to_be_told_has_collapsed(self, with_values, unknown, bound, collapsed):
+        """Half of the least that the baseline can be, 128 − 14 N, is 57 N."""
+        vanished = dataclasses.replace(unknown(), magnitude_bound=bound)
+        assessment = with_values(coulomb_friction=vanished)
+        found = diagnose(assessment, BENCH_VALVE, Baseline(128.0, 14.0))
+        assert found.ratio is None
+        if collapsed:
+            assert (found.level, found.status_signal) == (
+                Level.ERROR,
+                StatusSignal.OUT_OF_SPECIFICATION,
+            )
+            assert found.message == (
+                "friction collapsed, the packing may leak: coulomb friction is too small to be "
+                f"told, {bound:.2g} N at the most; its baseline is 128 N"
+            )
+        else:
+            assert found.level == Level.OK
+        assert diagnose(assessment, BENCH_VALVE).level == Level.OK
+
+    @pytest.mark.parametrize("baseline", [None, BASELINE])
+    def test_below_zero_is_a_fault_of_the_signals(self, with_values, friction, baseline):
+        """As of a drive whose sign is turned; no packing has it, so nothing is compared."""
+        found = diagnose(with_values(coulomb_friction=friction(-20.0, 3.0)), BENCH_VALVE, baseline)
+        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
+        assert found.ratio is None
+        assert found.message == (
+            "coulomb friction is -20 ± 3 N, which cannot be: check the direction of both signals"
+        )
+
+
+class TestModelDoubt:
+    DOUBT = "the Karnopp model does not describe this valve (98 µm of misfit); "
+
+    @pytest.fixture
+    def doubted(self, with_values):
+        """Function of a Coulomb friction: an assessment whose model misses the stem by 98 µm."""
+
+        def build(coulomb_friction, systematic=98e-6):
+            misfit = Misfit(0.98, 99e-6, systematic, 98e-6 - 1e-12)
+            return dataclasses.replace(
+                with_values(coulomb_friction=coulomb_friction), misfit=misfit
+            )
+
+        return build
+
+    @pytest.mark.parametrize(
+        ("ratio", "level", "signal"),
+        [
+            (1.0, Level.WARN, StatusSignal.CHECK_FUNCTION),
+            (1.5, Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
+            (3.0, Level.ERROR, StatusSignal.FAILURE),
+            (0.25, Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
+        ],
+    )
+    def test_raises_to_a_warning_and_never_lowers(self, with_values, doubted, ratio, level, signal):
+        found = diagnose(doubted(ratio * 128.0), BENCH_VALVE, BASELINE)
+        assert (found.level, found.status_signal) == (level, signal)
+        sure = diagnose(with_values(coulomb_friction=ratio * 128.0), BENCH_VALVE, BASELINE)
+        assert found.message == self.DOUBT + sure.message
+        assert found.ratio == sure.ratio
+
+    def test_without_a_baseline(self, doubted):
+        found = diagnose(doubted(152.7), BENCH_VALVE)
+        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
+        assert found.message.startswith(self.DOUBT + "no baseline yet; ")
+
+    def test_without_a_friction(self, doubted, unknown):
+        found = diagnose(doubted(unknown()), BENCH_VALVE, BASELINE)
+        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
+        assert found.message.startswith(self.DOUBT + "coulomb friction is not identifiable")
+
+    def test_a_tolerated_misfit_is_no_doubt(self, doubted):
+        found = diagnose(doubted(128.0, systematic=97e-6), BENCH_VALVE, BASELINE)
+        assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
+        assert found.message.startswith("friction normal: ")
+
+    def test_a_machine_without_a_spring_has_none(self, with_values):
+        found = dataclasses.replace(with_values(coulomb_friction=128.0), misfit=None)
+        assert diagnose(found, BENCH_VALVE, BASELINE).level == Level.OK
+
+
+class TestWords:
+    def test_the_consequence_is_the_dead_band(self, with_values, unknown):
+        """2·606 N over 2.05e5 N/m and 28.575 mm is 20.69 %; 3.9686·e^∓0.01 is 3.93 to 4.01."""
+        found = diagnose(
+            with_values(
+                coulomb_friction=AssessedParameter(
+                    "coulomb_friction", 606.0, 3.0, 6.06, Verdict.IDENTIFIED
+                ),
+                static_friction=unknown("static_friction"),
+                spring_constant=2.05e5,
+            ),
+            BENCH_VALVE,
+            Baseline(152.7),
+        )
+        assert found.message == (
+            "excess friction: coulomb friction is 3.97 (3.93 to 4.01) times its baseline; "
+            "the stem ignores reversals smaller than 21 % of its travel"
+        )
+
+    def test_without_a_baseline(self, with_values, unknown):
+        found = diagnose(
+            with_values(
+                coulomb_friction=152.7,
+                static_friction=unknown("static_friction"),
+                spring_constant=2.05e5,
+            ),
+            BENCH_VALVE,
+        )
+        assert (found.level, found.status_signal, found.ratio) == (
+            Level.OK,
+            StatusSignal.GOOD,
+            None,
+        )
+        assert found.message == (
+            "no baseline yet; the stem ignores reversals smaller than 5.2 % of its travel"
+        )
+
+    def test_without_a_travel_the_friction_itself_is_told(self, with_values, friction):
+        found = diagnose(
+            with_values(coulomb_friction=friction(20.3935, 0.4)), Valve(1.0), Baseline(20.0)
+        )
+        assert found.message == (
+            "friction normal: coulomb friction is 1.02 (1.00 to 1.04) times its baseline; "
+            "coulomb friction 20.39 ± 0.4 N"
+        )
+
+
+class TestLimits:
+    def test_defaults(self):
+        limits = FrictionLimits()
+        assert (limits.warn_ratio, limits.error_ratio, limits.low_ratio) == (1.25, 2.0, 0.5)
+
+    @pytest.mark.parametrize(
+        "limits",
+        [
+            {"low_ratio": 0.0},
+            {"low_ratio": 1.0},
+            {"warn_ratio": 1.0},
+            {"warn_ratio": 2.0},
+            {"error_ratio": 1.25},
+            {"warn_ratio": math.nan},
+            {"error_ratio": math.nan},
+            {"low_ratio": math.nan},
+        ],
+    )
+    def test_out_of_order(self, limits):
+        with pytest.raises(ValueError, match=r"^limits must obey 0 < low_ratio < 1 < warn_ratio <"):
+            FrictionLimits(**limits)

@@ -1,0 +1,250 @@
+"""The monitor of one valve: what it remembers, and what a change of settings leaves."""
+
+import dataclasses
+import math
+
+import pytest
+
+from valve_friction_ros.health import (
+    Baseline,
+    FrictionLimits,
+    FrictionMonitor,
+    Level,
+    MonitorSettings,
+    StatusSignal,
+    diagnose,
+    identify_snapshot,
+)
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, assess
+from valve_friction_ros.model import BENCH_VALVE
+
+SETTINGS = MonitorSettings(BENCH_VALVE)
+START = 1_700_000_000_000_000_000
+
+
+def replaced(**changes):
+    return dataclasses.replace(SETTINGS, **changes)
+
+
+def coulomb_friction(assessment):
+    return assessment.parameters["coulomb_friction"]
+
+
+def feed(monitor, record):
+    period = round(record.sample_period * 1e9)
+    pairs = zip(record.pressure.tolist(), record.position.tolist(), strict=True)
+    for step, (pressure, position) in enumerate(pairs):
+        assert monitor.buffer.add_pressure(START + step * period, pressure) is None
+        assert monitor.buffer.add_position(START + step * period, position) is None
+
+
+class TestSettings:
+    @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+    def test_impossible_windows_are_named(self, value):
+        with pytest.raises(ValueError, match=r"^window must be"):
+            replaced(window=value)
+
+    @pytest.mark.parametrize("value", [0, -5, 3, 30])
+    def test_impossible_derivative_windows_are_named(self, value):
+        """Before a record is gathered for it, not when that record is identified."""
+        with pytest.raises(ValueError, match=r"^window must be odd and at least order \+ 2 = 5"):
+            replaced(derivative_window=value)
+
+    def test_no_baseline_and_no_derivative_window_at_first(self):
+        assert (SETTINGS.baseline, SETTINGS.derivative_window) == (None, None)
+
+
+class TestIdentification:
+    def test_a_full_buffer_gives_what_the_record_gives(self, loose_record):
+        monitor = FrictionMonitor(SETTINGS)
+        feed(monitor, loose_record)
+        found = identify_snapshot(monitor.buffer.snapshot(), SETTINGS)
+        expected = assess(loose_record, BENCH_VALVE)
+        assert str(found.parameters) == str(expected.parameters)  # nan is not nan
+        assert found.published.values == expected.published.values
+
+    def test_by_the_settings(self, loose_record):
+        settings = replaced(
+            identification=IdentificationSettings(fixed={"mass": 1.25}, window=21),
+            derivative_window=15,
+        )
+        monitor = FrictionMonitor(settings)
+        feed(monitor, loose_record)
+        found = identify_snapshot(monitor.buffer.snapshot(), settings)
+        assert found.values["mass"] == 1.25
+        assert found.published.settings.window == 21
+        assert found.start.settings.window == 15
+
+    def test_a_refusal_has_its_cause(self):
+        snapshot = FrictionMonitor(SETTINGS).buffer.snapshot()
+        with pytest.raises(RefusalError) as refusal:
+            identify_snapshot(snapshot, SETTINGS)
+        assert str(refusal.value).startswith("no samples of actuator_pressure")
+        assert "cleared" not in str(refusal.value)
+
+    def test_and_why_the_buffer_was_emptied(self):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.buffer.clear("time went back")
+        with pytest.raises(RefusalError) as refusal:
+            identify_snapshot(monitor.buffer.snapshot(), SETTINGS)
+        assert str(refusal.value).startswith("no samples of actuator_pressure")
+        assert str(refusal.value).endswith(" (the buffer was cleared: time went back)")
+
+
+class TestMemory:
+    def test_at_first(self):
+        monitor = FrictionMonitor(SETTINGS)
+        remembered = (monitor.assessment, monitor.stamp, monitor.refusal, monitor.baseline)
+        assert remembered == (None, None, None, None)
+        diagnosis = monitor.diagnosis()
+        assert (diagnosis.level, diagnosis.status_signal) == (Level.OK, StatusSignal.GOOD)
+        assert diagnosis.ratio is None
+        assert diagnosis.message == "no estimate: nothing has been identified yet"
+
+    def test_a_refusal_before_any_estimate(self):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.refuse(RefusalError("the stem did not move"))
+        assert monitor.refusal == "the stem did not move"
+        assert monitor.diagnosis().level == Level.OK
+        assert monitor.diagnosis().message == "no estimate: the stem did not move"
+
+    def test_an_estimate_ends_the_refusal(self, assessment):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.refuse(RefusalError("the stem did not move"))
+        monitor.accept(assessment, START)
+        assert (monitor.assessment, monitor.stamp) == (assessment, START)
+        assert monitor.refusal is None
+        assert monitor.diagnosis() == diagnose(assessment, BENCH_VALVE)
+
+    def test_a_refusal_leaves_the_estimate(self, assessment):
+        monitor = FrictionMonitor(
+            replaced(baseline=Baseline(coulomb_friction(assessment).value / 3))
+        )
+        monitor.accept(assessment, START)
+        monitor.refuse(RefusalError("the stem did not move"))
+        assert (monitor.assessment, monitor.stamp) == (assessment, START)
+        assert monitor.refusal == "the stem did not move"
+        assert monitor.diagnosis().level == Level.ERROR
+
+
+class TestBaseline:
+    def test_of_the_settings(self, assessment):
+        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+        assert monitor.baseline == Baseline(100.0, 0.0)
+        monitor.accept(assessment, START)
+        ratio = monitor.diagnosis().ratio
+        assert ratio.value == coulomb_friction(assessment).value / 100.0
+
+    def test_of_the_latest_assessment_with_its_interval(self, assessment, with_values, friction):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.accept(assessment, START)
+        healthy = coulomb_friction(assessment)
+        expected = Baseline(healthy.value, healthy.half_width)
+        assert monitor.set_baseline() == monitor.baseline == expected
+        assert monitor.diagnosis().ratio.value == 1.0
+        tight = friction(2.5 * healthy.value, 7.0)
+        monitor.accept(with_values(coulomb_friction=tight), START + 1)
+        assert monitor.diagnosis().ratio == expected.compared_with(tight)
+        assert monitor.diagnosis().level == Level.ERROR
+        assert monitor.set_baseline() == Baseline(tight.value, 7.0)
+        assert monitor.diagnosis().level == Level.OK
+
+    def test_needs_an_estimate(self):
+        monitor = FrictionMonitor(SETTINGS)
+        with pytest.raises(RefusalError, match="identify first"):
+            monitor.set_baseline()
+        assert monitor.baseline is None
+
+    @pytest.mark.parametrize("coulomb", [0.0, -3.0])
+    def test_needs_a_friction(self, with_values, coulomb):
+        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+        monitor.accept(with_values(coulomb_friction=coulomb), START)
+        with pytest.raises(
+            RefusalError, match=f"^a coulomb friction of {coulomb:.4g} N is no base"
+        ):
+            monitor.set_baseline()
+        assert monitor.baseline == Baseline(100.0)
+
+    @pytest.mark.parametrize("before", [None, Baseline(100.0)])
+    def test_needs_an_identifiable_friction(self, with_values, unknown, before):
+        monitor = FrictionMonitor(replaced(baseline=before))
+        monitor.accept(with_values(coulomb_friction=unknown()), START)
+        with pytest.raises(RefusalError) as refusal:
+            monitor.set_baseline()
+        assert str(refusal.value) == (
+            "coulomb friction is not identifiable, so it is no baseline: "
+            "the record does not tell it"
+        )
+        assert monitor.baseline == before
+        assert monitor.diagnosis().level == Level.OK
+
+
+class TestChangeOfSettings:
+    def filled(self, assessment, settings=SETTINGS):
+        monitor = FrictionMonitor(settings)
+        monitor.accept(assessment, START)
+        monitor.buffer.add_pressure(START, 1e5)
+        return monitor
+
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {"window": 30.0},
+            {"valve": dataclasses.replace(BENCH_VALVE, pressure_maximum=2e5)},
+        ],
+        ids=["window", "valve"],
+    )
+    def test_another_window_or_valve_empties_the_buffer(self, assessment, changes):
+        monitor = self.filled(assessment)
+        monitor.change_settings(replaced(**changes))
+        assert len(monitor.buffer) == 0
+        cause = "valve or window parameters were changed"
+        assert monitor.buffer.snapshot().cleared_because == cause
+        assert monitor.assessment is assessment
+
+    def test_the_new_range_holds(self, assessment):
+        monitor = self.filled(assessment)
+        monitor.change_settings(
+            replaced(valve=dataclasses.replace(BENCH_VALVE, pressure_maximum=2e5))
+        )
+        assert "0 to 200000 Pa" in monitor.buffer.add_pressure(START, 2.1e5)
+
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {"baseline": Baseline(3.0)},
+            {"derivative_window": 15},
+            {"limits": FrictionLimits(warn_ratio=1.2)},
+            {"identification": IdentificationSettings(window=51)},
+        ],
+        ids=["baseline", "derivative window", "limits", "identification"],
+    )
+    def test_other_changes_keep_it(self, assessment, changes):
+        monitor = self.filled(assessment)
+        changed = replaced(**changes)
+        monitor.change_settings(changed)
+        assert len(monitor.buffer) == 1
+        assert monitor.buffer.snapshot().cleared_because is None
+        assert monitor.settings == changed
+
+    def test_a_baseline_that_was_set_survives_other_changes(self, assessment):
+        monitor = self.filled(assessment)
+        monitor.set_baseline()
+        monitor.change_settings(replaced(limits=FrictionLimits(warn_ratio=1.2)))
+        healthy = coulomb_friction(assessment)
+        assert monitor.baseline == Baseline(healthy.value, healthy.half_width)
+
+    def test_but_not_a_baseline_of_the_settings(self, assessment):
+        monitor = self.filled(assessment, replaced(baseline=Baseline(100.0)))
+        monitor.set_baseline()
+        monitor.change_settings(replaced(baseline=Baseline(120.0)))
+        assert monitor.baseline == Baseline(120.0)
+        monitor.change_settings(SETTINGS)
+        assert monitor.baseline is None
+
+    def test_new_limits_judge_the_old_estimate(self, assessment):
+        healthy = Baseline(coulomb_friction(assessment).value / 1.2)
+        monitor = self.filled(assessment, replaced(baseline=healthy))
+        assert monitor.diagnosis().level == Level.OK
+        monitor.change_settings(dataclasses.replace(monitor.settings, limits=FrictionLimits(1.15)))
+        assert monitor.diagnosis().level == Level.WARN

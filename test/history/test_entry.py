@@ -1,0 +1,99 @@
+"""What an identification becomes in the history."""
+
+import json
+
+import numpy as np
+import pytest
+from histories import START, VALVE, parameter, refused, success
+
+from valve_friction_ros import __version__
+from valve_friction_ros.health import FrictionMonitor, MonitorSettings, identify_snapshot
+from valve_friction_ros.history import FrictionPoint, entry_of
+from valve_friction_ros.history.entry import settings_text
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, Verdict
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SineWave, Valve, simulate
+
+PERIOD = 10_000_000
+
+
+@pytest.fixture
+def monitor():
+    """A monitor that has gathered five seconds; the pressure begins a sample later."""
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE))
+    pressure = SineWave(period=5.0).sample(np.arange(500) / 100)
+    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.01).position
+    for k in range(500):
+        if k:
+            monitor.buffer.add_pressure(k * PERIOD, pressure[k])
+        monitor.buffer.add_position(k * PERIOD, position[k])
+    return monitor
+
+
+def test_a_success(monitor):
+    snapshot = monitor.buffer.snapshot()
+    assessment = identify_snapshot(snapshot, monitor.settings)
+    monitor.accept(assessment, START)
+    baseline = monitor.set_baseline()
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
+    assert entry.parameters == dict(assessment.parameters)
+    assert entry.span == (0, 499 * PERIOD)
+    assert entry.fit == (
+        assessment.fit,
+        assessment.rms,
+        assessment.misfit.systematic,
+    )
+    assert entry.diagnosis == monitor.diagnosis()
+    assert entry.diagnosis.ratio.value == 1.0
+    assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)
+    assert entry.warnings == assessment.warnings
+    assert (entry.time, entry.valve, entry.refusal) == (START, VALVE, "")
+    assert entry.version == __version__
+
+
+def test_a_refusal(monitor):
+    """It keeps why, and nothing of the estimate before it."""
+    snapshot = monitor.buffer.snapshot()
+    monitor.accept(identify_snapshot(snapshot, monitor.settings), START)
+    monitor.refuse(RefusalError("too little travel"))
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
+    assert entry.refusal == "too little travel"
+    assert not entry.parameters
+    assert entry.friction is None
+    assert entry.point() is None
+    assert entry.span == (0, 499 * PERIOD)
+
+
+def test_a_refusal_of_nothing(monitor):
+    monitor.buffer.clear("on request")
+    monitor.refuse(RefusalError("no samples"))
+    assert entry_of(monitor, VALVE, monitor.buffer.snapshot(), monitor.settings, START).span is None
+
+
+def test_neither_a_success_nor_a_refusal_or_both():
+    for changes in ({"parameters": {}}, {"refusal": "why"}):
+        with pytest.raises(ValueError, match="either parameters or the reason"):
+            success(**changes)
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_only_what_was_measured_makes_a_trend(verdict):
+    expected = FrictionPoint(START, 150.0, 3.0)
+    measured = verdict in (Verdict.IDENTIFIED, Verdict.WEAK)
+    assert success(verdict=verdict).point() == (expected if measured else None)
+    assert refused().point() is None
+
+
+def test_settings_are_the_same_text_for_the_same_settings():
+    one = MonitorSettings(BENCH_VALVE, IdentificationSettings(fixed={"mass": 1.6}))
+    assert settings_text(one) == settings_text(MonitorSettings(BENCH_VALVE, one.identification))
+    told = json.loads(settings_text(one))
+    assert told["identification"]["fixed"] == {"mass": 1.6}
+    assert told["valve"]["diaphragm_area"] == BENCH_VALVE.diaphragm_area
+    assert told["window"] == 60.0
+    endless = MonitorSettings(Valve(0.0445, 0.0))
+    assert json.loads(settings_text(endless))["valve"]["travel"] is None
+
+
+def test_parameters_cannot_be_changed():
+    with pytest.raises(TypeError):
+        success().parameters["mass"] = parameter("mass", 2.0)

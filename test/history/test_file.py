@@ -1,0 +1,216 @@
+"""The history's file: what goes in comes out, and what plain SQL finds in it."""
+
+import sqlite3
+
+import pytest
+from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, success
+from hypothesis import given
+from hypothesis import strategies as st
+
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.history import FrictionPoint, HistoryFile, KeptBaseline, KeptValve, schema
+from valve_friction_ros.identification import Verdict
+
+
+@pytest.fixture
+def history(tmp_path):
+    return HistoryFile(tmp_path / "folder" / "a file ?#%.sqlite")
+
+
+def select(history, query):
+    connection = sqlite3.connect(history.path)
+    try:
+        return connection.execute(query).fetchall()
+    finally:
+        connection.close()
+
+
+def same(found, expected):
+    """Equal, with nan equal to nan: two entries are written alike."""
+    return repr(found) == repr(expected)
+
+
+def test_what_goes_in_comes_out(history):
+    entries = [
+        success(START, 150.123456789, 1 / 3, warnings=("one", "two")),
+        success(START + 1, verdict=Verdict.WEAK, baseline=Baseline(140.0, 2.0)),
+        refused(START + 2),
+    ]
+    for entry in entries:
+        history.add(entry)
+    found = history.entries()
+    assert len(found) == 3
+    for one, other in zip(found, entries, strict=True):
+        assert same(one, other)
+
+
+@given(
+    friction=st.floats(1e-300, 1e300),
+    half_width=st.floats(0, 1e300),
+    time=st.integers(0, 2**63 - 1 - 60 * SECOND),
+    text=st.text(st.characters(exclude_categories=["Cs"]), min_size=1),
+)
+def test_numbers_and_texts_come_back_to_the_last_bit(
+    tmp_path_factory, friction, half_width, time, text
+):
+    history = HistoryFile(tmp_path_factory.mktemp("history") / "history.sqlite")
+    entry = success(
+        time, friction, half_width, KeptValve(text, text), warnings=(text.strip() or "-",)
+    )
+    history.add(entry)
+    (found,) = history.entries([text])
+    assert found.friction == entry.friction
+    assert (found.time, found.valve) == (time, entry.valve)
+
+
+def test_entries_are_sorted_by_time_and_chosen(history):
+    times = [START + 3, START, START + 2]
+    for time in times:
+        history.add(success(time))
+    history.add(success(START + 1, valve=OTHER))
+    assert [one.time - START for one in history.entries()] == [0, 1, 2, 3]
+    chosen = history.entries([VALVE.name], START + 2, START + 3)
+    assert [one.time - START for one in chosen] == [2]
+    assert history.entries(["/nobody"]) == ()
+    assert history.valves() == (OTHER, VALVE)
+
+
+def test_a_valve_takes_its_new_tag(history):
+    history.add(success())
+    history.add(success(START + 1, valve=VALVE._replace(tag="FV-101A")))
+    assert history.valves() == (VALVE._replace(tag="FV-101A"),)
+
+
+def test_points_are_those_of_the_entries(history):
+    entries = [
+        success(START + k, 150.0 + k, 1.0 + k, verdict=verdict) for k, verdict in enumerate(Verdict)
+    ]
+    others = (
+        refused(START + 9),
+        success(START, valve=OTHER),
+        success(START, method="force_balance"),
+    )
+    for entry in (*entries, *others):
+        history.add(entry)
+    expected = [point for one in entries if (point := one.point()) is not None]
+    assert expected
+    assert history.points(VALVE.name, "sweep") == tuple(expected)
+    later = expected[0].time + 1
+    assert history.points(VALVE.name, "sweep", later) == tuple(
+        p for p in expected if p.time >= later
+    )
+    assert history.points(OTHER.name, "sweep") == (FrictionPoint(START, 150.0, 3.0),)
+
+
+class TestBaseline:
+    def test_the_last_one_counts(self, history):
+        first, last = (
+            KeptBaseline(Baseline(friction, 0.5), START + 10 * k, START + k)
+            for k, friction in enumerate((150.0, 140.0))
+        )
+        history.prepare()
+        assert history.baseline(VALVE.name) is None
+        for kept in (first, last):
+            history.set_baseline(VALVE, kept)
+        assert history.baseline(VALVE.name) == last
+        assert history.baseline(VALVE.name, until=START + 10) == first
+        assert history.baseline(OTHER.name) is None
+
+    def test_it_outlives_the_retention(self, history):
+        for k in range(2):
+            history.set_baseline(VALVE, KeptBaseline(Baseline(150.0 + k), START + k, START))
+        history.add(success(START + 100 * DAY), days=10)
+        assert history.baseline(VALVE.name).baseline == Baseline(151.0)
+        assert select(history, "SELECT count(*) FROM baseline") == [(1,)]
+
+
+class TestRetention:
+    def test_what_is_older_goes_with_all_its_rows(self, history):
+        for day in range(5):
+            history.add(success(START + day * DAY))
+        history.add(success(START, valve=OTHER))
+        history.add(success(START + 5 * DAY), days=2)
+        kept = [(one.time - START) / DAY for one in history.entries([VALVE.name])]
+        assert kept == [3, 4, 5]
+        assert len(history.entries([OTHER.name])) == 1
+        assert select(history, "SELECT count(*) FROM parameter") == [(4 * 3,)]
+
+    def test_zero_keeps_all(self, history):
+        history.add(success(0))
+        history.add(success(START), days=0)
+        assert len(history.entries()) == 2
+
+    def test_the_file_does_not_grow_any_more(self, history):
+        """Pages of what was forgotten are used again."""
+        sizes = []
+        for day in range(200):
+            history.add(success(START + day * DAY), days=20)
+            sizes.append(history.path.stat().st_size)
+        assert len(history.entries()) == 21
+        assert sizes[-1] == sizes[60]
+
+    def test_settings_are_kept_once_and_as_long_as_needed(self, history):
+        history.add(success(START, settings='{"window": 1.0}'))
+        for day in (1, 2):
+            history.add(success(START + day * DAY))
+        assert select(history, "SELECT count(*) FROM settings") == [(2,)]
+        history.add(success(START + 3 * DAY), days=2.5)
+        assert select(history, "SELECT count(*) FROM settings") == [(1,)]
+
+
+class TestSql:
+    """What the reliability engineer's own query finds."""
+
+    def test_the_view(self, history):
+        history.add(success(START, 150.0, 3.0, baseline=Baseline(100.0)))
+        history.add(refused(START + SECOND, "no motion"))
+        rows = select(
+            history,
+            "SELECT time, valve, tag, coulomb_friction, half_width, verdict, ratio, level, refusal "
+            "FROM friction ORDER BY time",
+        )
+        name, tag = VALVE
+        assert rows == [
+            ("2026-09-21T14:13:20Z", name, tag, 150.0, 3.0, "identified", 1.5, 0, None),
+            ("2026-09-21T14:13:21Z", name, tag, None, None, None, None, 0, "no motion"),
+        ]
+
+    def test_what_is_not_known_is_null(self, history):
+        history.add(success())
+        query = "SELECT value, verdict FROM parameter WHERE name = 'static_friction'"
+        assert select(history, query) == [(None, "not identifiable")]
+
+    def test_settings_are_json(self, history):
+        history.add(success())
+        query = "SELECT json_extract(content, '$.valve.diaphragm_area') FROM settings"
+        assert select(history, query) == [(0.0445,)]
+
+    def test_versions(self, history):
+        history.prepare()
+        assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+        assert select(history, "PRAGMA journal_mode") == [("wal",)]
+
+    def test_no_row_without_its_valve(self, history):
+        history.add(success())
+        assert select(history, "PRAGMA foreign_key_check") == []
+
+
+def test_a_file_system_without_shared_memory(history, monkeypatch):
+    """There SQLite writes its older journal; the file is as good."""
+    connect = sqlite3.connect
+
+    def elsewhere(where, **options):
+        return connect(f"{where}&vfs=unix-dotfile", **options)
+
+    monkeypatch.setattr(schema.sqlite3, "connect", elsewhere)
+    history.add(success())
+    assert len(history.entries()) == 1
+    monkeypatch.undo()
+    assert select(history, "PRAGMA journal_mode") == [("delete",)]
+    assert same(history.entries(), (success(),))
+
+
+def test_parameters_come_back_in_their_order(history):
+    names = ["mass", "viscous_friction", "coulomb_friction", "stribeck_velocity", "novelty"]
+    history.add(success(parameters={name: parameter(name, 1.0) for name in reversed(names)}))
+    assert [*history.entries()[0].parameters] == names

@@ -1,0 +1,188 @@
+"""Drift of the Coulomb friction: coverage on simulated histories, days, outliers, limits."""
+
+import math
+
+import numpy as np
+import pytest
+from histories import DAY, SECOND, START
+from scipy.stats import binom
+
+from valve_friction_ros.health import Baseline, FrictionLimits
+from valve_friction_ros.history import MONTH, FrictionPoint, Limit, trend_of
+
+NOON = START // DAY * DAY + DAY // 2
+RUNS = 400
+
+
+def points(drift=0.0, count=20, scatter=0.0, half_width=3.0, rng=None, every=7):
+    """One identification every so many days, N a month of drift from 150 N on."""
+    rng = rng or np.random.default_rng(0)
+    found = []
+    for k in range(count):
+        day = k * every
+        width = half_width * rng.uniform(0.5, 2.0)
+        friction = 150.0 + drift * day * DAY / MONTH
+        friction += rng.normal(0, scatter) + rng.normal(0, width / 1.959964)
+        found.append(FrictionPoint(NOON + day * DAY, friction, width))
+    return found
+
+
+def straight(drift=3.0, count=20, every=7):
+    """Frictions on a line, each ± 1 N."""
+    return [
+        FrictionPoint(NOON + k * every * DAY, 150.0 + drift * k * every * DAY / MONTH, 1.0)
+        for k in range(count)
+    ]
+
+
+HISTORIES = {
+    "intervals alone": {"scatter": 0.0},
+    "both": {"scatter": 3.0},
+    "scatter alone": {"scatter": 3.0, "half_width": 1e-6},
+    "five exact-looking": {"scatter": 3.0, "half_width": 1e-6, "count": 5},
+    "four": {"scatter": 3.0, "half_width": 1.0, "count": 4},
+    "a year of weeks": {"scatter": 3.0, "half_width": 1.0, "count": 52},
+}
+
+
+@pytest.mark.parametrize("name", HISTORIES)
+def test_the_interval_covers_the_drift(name):
+    """At least as often as it says, by the chance of so many runs (1 in 1000)."""
+    rng = np.random.default_rng(20)
+    trends = [trend_of(points(2.0, rng=rng, **HISTORIES[name])) for _ in range(RUNS)]
+    covered = sum(abs(trend.drift - 2.0) <= trend.half_width for trend in trends)
+    assert covered >= binom.ppf(0.001, RUNS, 0.95)
+
+
+@pytest.mark.parametrize("name", HISTORIES)
+def test_a_stationary_valve_shows_no_drift(name):
+    """In 5 % of the histories at most."""
+    rng = np.random.default_rng(21)
+    trends = [trend_of(points(0.0, rng=rng, **HISTORIES[name])) for _ in range(RUNS)]
+    shown = sum(trend.is_significant for trend in trends)
+    assert shown <= binom.ppf(0.999, RUNS, 0.05)
+
+
+def test_five_exact_looking_estimates_that_scatter_give_no_confidence():
+    """0.8 N a day, and 16.4 N² of residual with three degrees of freedom."""
+    values = [150.0, 154.0, 151.0, 156.0, 153.0]
+    trend = trend_of([FrictionPoint(NOON + k * DAY, value, 1e-3) for k, value in enumerate(values)])
+    assert not trend.is_significant
+    assert trend.drift == pytest.approx(0.8 * MONTH / DAY, rel=1e-6)
+    assert trend.line.scatter == pytest.approx(math.sqrt(16.4 / 3), rel=1e-6)
+
+
+def test_a_straight_drift():
+    trend = trend_of(straight(3.0))
+    assert trend.drift == pytest.approx(3.0)
+    assert trend.is_significant
+    assert (trend.days, trend.outliers) == (20, 0)
+    assert (trend.begin, trend.end) == (NOON, NOON + 19 * 7 * DAY)
+
+
+def test_order_does_not_matter():
+    some = points(2.0, scatter=2.0)
+    shuffled = trend_of([*reversed(some)])
+    assert shuffled.drift == pytest.approx(trend_of(some).drift, rel=1e-9)
+
+
+class TestDays:
+    def test_all_of_a_day_count_as_one(self):
+        """Their weighted mean: here of 150 ± 1 and 156 ± 2, a fifth of the weight."""
+        some = straight(0.0, count=6)
+        double = [*some, some[2]._replace(time=some[2].time + SECOND, value=156.0, half_width=2.0)]
+        single = [*some]
+        single[2] = FrictionPoint(some[2].time, 151.2, math.sqrt(0.8))
+        found, expected = trend_of(double), trend_of(single)
+        assert found.days == 6
+        assert found.drift == pytest.approx(expected.drift, rel=1e-6)
+        assert found.half_width == pytest.approx(expected.half_width, rel=1e-6)
+
+    def test_many_of_three_days_are_no_trend(self):
+        some = [FrictionPoint(NOON + k * DAY // 20, 150.0 + k, 1.0) for k in range(49)]
+        assert trend_of(some) is None
+        assert trend_of([*some, some[-1]._replace(time=some[-1].time + DAY)]).days == 4
+
+    def test_nothing(self):
+        assert trend_of([]) is None
+
+
+class TestOutliers:
+    def test_one_is_left_out(self):
+        rng = np.random.default_rng(4)
+        some = points(2.0, scatter=1.0, rng=rng)
+        spoilt = [*some]
+        spoilt[7] = some[7]._replace(value=400.0)
+        expected = trend_of(some[:7] + some[8:])
+        found = trend_of(spoilt)
+        assert (found.outliers, found.days) == (1, 19)
+        assert found.drift == pytest.approx(expected.drift, rel=1e-6)
+
+    def test_a_tenth_at_most(self):
+        some = straight(count=19)
+        for k, friction in ((3, 400.0), (9, 20.0)):
+            some[k] = some[k]._replace(value=friction)
+        assert trend_of(some).outliers <= 1
+
+    def test_a_few_have_none(self):
+        some = straight(0.0, count=9)
+        some[4] = some[4]._replace(value=400.0)
+        assert trend_of(some).outliers == 0
+
+
+class TestCrossing:
+    """150 N at the beginning, 20 weeks less one: 13.1 N more or less at the end."""
+
+    def crossing(self, baseline, drift=3.0, limits=None):
+        return trend_of(straight(drift), baseline, limits).crossing
+
+    def test_the_next_limit(self):
+        """176.25 N = 1.25 · 141 N is 8.75 months after the beginning."""
+        found = self.crossing(Baseline(141.0))
+        assert found.limit is Limit.WARN
+        assert found.level == 176.25
+        assert found.time == pytest.approx(NOON + 8.75 * MONTH, abs=1e-3 * DAY)
+        assert found.earliest < found.time < found.latest
+
+    def test_beyond_the_first_limit_the_second_is_next(self):
+        found = self.crossing(Baseline(88.0))
+        assert (found.limit, found.level) == (Limit.ERROR, 176.0)
+
+    def test_falling(self):
+        found = self.crossing(Baseline(200.0), drift=-3.0, limits=FrictionLimits(low_ratio=0.625))
+        assert (found.limit, found.level) == (Limit.LOW, 125.0)
+        assert found.time == pytest.approx(NOON + 25 / 3 * MONTH, abs=1e-3 * DAY)
+
+    @pytest.mark.parametrize(
+        ("baseline", "drift"),
+        [(70.0, 3.0), (300.0, -3.0), (400.0, -3.0)],
+        ids=["beyond all", "falls to a limit it has reached", "long ago"],
+    )
+    def test_what_is_passed_is_not_expected(self, baseline, drift):
+        assert self.crossing(Baseline(baseline), drift) is None
+
+    @pytest.mark.parametrize(("months", "is_told"), [(13.0, True), (13.2, False)])
+    def test_no_further_ahead_than_twice_the_span(self, months, is_told):
+        """The span is 133 days, 4.37 months; three times that is 13.1."""
+        baseline = Baseline((150.0 + 3.0 * months) / 1.25)
+        assert (self.crossing(baseline) is not None) == is_told
+
+    def test_an_uncertain_baseline_widens_the_interval(self):
+        sure, unsure = (self.crossing(Baseline(141.0, width)) for width in (0.0, 10.0))
+        assert unsure.time == sure.time
+        assert unsure.earliest < sure.earliest < sure.latest < unsure.latest
+
+    def test_none_without_a_significant_drift_or_a_baseline(self):
+        assert self.crossing(None) is None
+        rng = np.random.default_rng(5)
+        trend = trend_of(points(0.1, scatter=20.0, rng=rng), Baseline(120.0))
+        assert not trend.is_significant
+        assert trend.crossing is None
+
+
+@pytest.mark.parametrize("half_width", [-1.0, math.nan, math.inf])
+def test_an_interval_that_cannot_be(half_width):
+    some = straight()
+    some[3] = some[3]._replace(half_width=half_width)
+    with pytest.raises(ValueError, match="half_width"):
+        trend_of(some)

@@ -1,0 +1,250 @@
+"""A history that cannot be written or read: the cause, and what to do, in one line."""
+
+import sqlite3
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from histories import START, success
+
+from valve_friction_ros.history import HistoryError, HistoryFile, schema
+
+PROJECT = Path(__file__).resolve().parents[2]
+FOLDERS = (PROJECT / "test" / "support", PROJECT)
+
+
+@pytest.fixture
+def history(tmp_path):
+    history = HistoryFile(tmp_path / "history.sqlite")
+    history.add(success())
+    return history
+
+
+def change(history, statement):
+    connection = sqlite3.connect(history.path)
+    connection.execute(statement)
+    connection.commit()
+    connection.close()
+
+
+def told(history, action=lambda history: history.add(success(START + 1))):
+    """Return the message of the error; it is one line that begins with the path."""
+    with pytest.raises(HistoryError) as error:
+        action(history)
+    message = str(error.value)
+    assert message.startswith(f"{history.path}: ")
+    assert "\n" not in message
+    return message.removeprefix(f"{history.path}: ")
+
+
+def is_whole(history, count=1):
+    connection = sqlite3.connect(history.path)
+    (state,) = connection.execute("PRAGMA integrity_check").fetchone()
+    connection.close()
+    return state == "ok" and len(history.entries()) == count
+
+
+def fill(monkeypatch, pages):
+    """Let the file hold no more than some pages, as on a disk that is full."""
+
+    class Full(sqlite3.Connection):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            self.execute(f"PRAGMA max_page_count = {pages}")
+
+    connect = sqlite3.connect
+    monkeypatch.setattr(
+        schema.sqlite3, "connect", lambda *some, **more: connect(*some, factory=Full, **more)
+    )
+
+
+def test_full_disk_and_room_again(history, monkeypatch):
+    fill(monkeypatch, pages=1)
+    long = success(START + 1, warnings=("a" * 100_000,))
+    message = told(history, lambda one: one.add(long))
+    assert message == "database or disk is full: make room on its disk"
+    assert is_whole(history)
+    monkeypatch.undo()
+    history.add(long)
+    assert is_whole(history, 2)
+
+
+LIMITED = """
+import resource, sys
+from pathlib import Path
+sys.path[:0] = sys.argv[2:]
+from histories import START, success
+from valve_friction_ros.history import HistoryError, HistoryFile
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
+history = HistoryFile(Path(sys.argv[1]))
+written = 0
+try:
+    while True:
+        history.add(success(START + 1 + written, warnings=("a" * 5_000,)))
+        written += 1
+except HistoryError as error:
+    print(error)
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
+assert len(history.entries()) == 1 + written
+history.add(success(START))
+"""
+
+
+def test_a_file_that_may_not_grow(history):
+    """The operating system itself refuses to write."""
+    run = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(history.path), *map(str, FOLDERS)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith(f"{history.path}: ")
+    assert run.stdout.endswith("check the disk, its free space and the process's limits\n")
+    assert is_whole(history, len(history.entries()))
+    assert len(history.entries()) > 10
+
+
+def test_no_folder_can_be_made(tmp_path):
+    (tmp_path / "file").touch()
+    history = HistoryFile(tmp_path / "file" / "history.sqlite")
+    message = told(history)
+    assert message == "its folder is a file: check the folder, or name another history_file"
+    assert "there is no such file" in told(history, HistoryFile.entries)
+
+
+READ_ONLY = """
+import os, sys
+from pathlib import Path
+sys.path[:0] = sys.argv[2:]
+from histories import START, success
+from valve_friction_ros.history import HistoryError, HistoryFile
+if os.geteuid() == 0:  # who may write anywhere
+    os.seteuid(65534)
+folder = Path(sys.argv[1])
+print(len(HistoryFile(folder / "history.sqlite").entries()))
+for name in ("history.sqlite", "new.sqlite"):
+    try:
+        HistoryFile(folder / name).add(success(START + 1))
+    except HistoryError as error:
+        print(error)
+"""
+
+
+def test_read_only_folder():
+    """The history can still be read; the folder lies where every user may look."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        HistoryFile(folder / "history.sqlite").add(success())
+        (folder / "history.sqlite").chmod(0o444)
+        folder.chmod(0o555)
+        run = subprocess.run(
+            [sys.executable, "-c", READ_ONLY, name, *map(str, FOLDERS)],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        folder.chmod(0o755)
+    assert run.returncode == 0, run.stderr
+    count, old, new = run.stdout.splitlines()
+    assert count == "1"
+    assert "readonly database: make the file and its folder writable, or name another" in old
+    assert "unable to open database file: check that the folder is there and writable" in new
+
+
+def test_a_folder_in_place_of_the_file(tmp_path):
+    assert "unable to open" in told(HistoryFile(tmp_path))
+
+
+def test_newer_schema(history):
+    change(history, f"PRAGMA user_version = {schema.SCHEMA_VERSION + 1}")
+    expected = (
+        f"written by a newer version of this package (schema {schema.SCHEMA_VERSION + 1}, this one "
+        f"knows {schema.SCHEMA_VERSION}): update the package, or name another history_file"
+    )
+    for action in (HistoryFile.prepare, HistoryFile.entries):
+        assert told(history, action) == expected
+    change(history, f"PRAGMA user_version = {schema.SCHEMA_VERSION}")
+    assert is_whole(history)
+
+
+@pytest.mark.parametrize(
+    "statement", ["CREATE TABLE theirs (a)", "PRAGMA user_version = 1", "PRAGMA application_id = 7"]
+)
+def test_another_programs_database(tmp_path, statement):
+    history = HistoryFile(tmp_path / "theirs.sqlite")
+    change(history, statement)
+    before = history.path.read_bytes()
+    assert told(history) == "another program's database: name another history_file"
+    assert history.path.read_bytes() == before
+
+
+def test_no_database(tmp_path):
+    history = HistoryFile(tmp_path / "history.sqlite")
+    history.path.write_bytes(b"nothing of the kind" * 100)
+    expected = (
+        "file is not a database: name the right file, or move this one away, and a new one is begun"
+    )
+    assert told(history) == expected
+    assert told(history, HistoryFile.entries) == expected
+
+
+def test_damaged_pages(history):
+    for k in range(200):
+        history.add(success(START + 1 + k))
+    content = bytearray(history.path.read_bytes())
+    content[4096 : len(content) // 2] = b"\xa5" * (len(content) // 2 - 4096)
+    history.path.write_bytes(content)
+    assert "malformed: move it away" in told(history, HistoryFile.entries)
+    assert "malformed: move it away" in told(history)
+
+
+def test_an_empty_file_is_a_new_history(tmp_path):
+    history = HistoryFile(tmp_path / "history.sqlite")
+    history.path.touch()
+    assert told(history, HistoryFile.entries) == "there is nothing in it"
+    history.add(success())
+    assert is_whole(history)
+
+
+def test_held_by_another(history, monkeypatch):
+    monkeypatch.setattr(schema, "_PATIENCE", 0.05)
+    holder = sqlite3.connect(history.path, isolation_level=None)
+    holder.execute("BEGIN IMMEDIATE")
+    assert told(history) == "database is locked: find the process that holds it"
+    assert len(history.entries()) == 1  # reading is not held up
+    holder.execute("ROLLBACK")
+    holder.close()
+    history.add(success(START + 1))
+    assert is_whole(history, 2)
+
+
+def test_a_row_that_holds_no_result(history):
+    change(history, "UPDATE parameter SET verdict = 'perhaps'")
+    assert "a row holds no result: 'perhaps' is not a valid Verdict" in told(
+        history, HistoryFile.entries
+    )
+
+
+@pytest.mark.parametrize("half_width", ["NULL", "-1.0", "9e999"])
+def test_a_row_that_somebody_has_spoilt_makes_no_trend(history, half_width):
+    history.add(success(START + 1))
+    change(history, f"UPDATE parameter SET half_width = {half_width} WHERE identification_id = 1")
+    assert [point.time for point in history.points("/fv_101/identifier", "sweep")] == [START + 1]
+
+
+def test_nothing_of_a_failed_change_stays(history, monkeypatch):
+    """The identification is written, its forgetting fails: neither has happened."""
+    from valve_friction_ros.history import file as history_file
+
+    def fail(connection, *_):
+        connection.execute("SELECT * FROM no_such_table")
+
+    monkeypatch.setattr(history_file, "_forget", fail)
+    with pytest.raises(HistoryError, match="no such table"):
+        history.add(success(START + 1), days=1)
+    assert is_whole(history)

@@ -1,0 +1,224 @@
+"""The sweep (8) against its definitions, threshold by threshold."""
+
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    differentiate,
+    sweep_thresholds,
+)
+from valve_friction_ros.identification.published.regression import (
+    ForceBalanceRegression,
+    force_balance_regression,
+)
+from valve_friction_ros.identification.settings import REGRESSED
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, SquareWave
+
+BIAS = 1.13e-3
+ENOUGH = 200  # samples, above which the comparison is not about the noise of a near-singular fit
+
+
+@pytest.fixture(scope="module")
+def record(bench_record):
+    return bench_record("high", SquareWave(), 20.8, SensorNoise(10e-6, 100.0, seed=1))
+
+
+@pytest.fixture(scope="module")
+def derivatives(record):
+    return differentiate(record.position, record.sample_period)
+
+
+def swept(record, derivatives, settings):
+    force = BENCH_VALVE.actuator_force(record.pressure)
+    regression = force_balance_regression(force, record.position, derivatives, settings)
+    thresholds = derivatives_top(derivatives) / 350 * np.arange(1, 331)
+    return sweep_thresholds(regression, thresholds)
+
+
+def derivatives_top(derivatives):
+    return np.abs(derivatives.velocity).max()
+
+
+def columns_of(record, derivatives, bias=None):
+    """(5) and the preload beside it, by name."""
+    place = record.position[15:-15]
+    columns = {
+        "mass": derivatives.acceleration,
+        "coulomb_friction": np.sign(derivatives.velocity),
+        "viscous_friction": derivatives.velocity,
+        "spring_constant": place if bias is None else place + bias,
+    }
+    return columns if bias is not None else columns | {"spring_preload": np.ones(place.size)}
+
+
+def refined_least_squares(table, force):
+    """`lstsq`, whose columns differ by nine orders, and a correction by its residual in 80 bits.
+
+    By itself `lstsq` errs by 6e-11 kg in the mass; where the mass passes through zero, that is
+    more than the 1e-7 of it to be compared.
+    """
+    first, *_ = np.linalg.lstsq(table, force, rcond=None)
+    long = table.astype(np.longdouble)
+    residual = (force - long @ first).astype(float)
+    return first + np.linalg.lstsq(table, residual, rcond=None)[0]
+
+
+FORMS = {
+    "five columns": {},
+    "four columns": {"position_bias": BIAS},
+    "four columns, mass fixed": {"position_bias": BIAS, "fixed": {"mass": 1.75}},
+    "four columns, spring fixed": {"position_bias": BIAS, "fixed": {"spring_constant": 2.05e5}},
+    **{f"{name} fixed": {"fixed": {name: getattr(HIGH_FRICTION, name)}} for name in REGRESSED},
+    "two fixed": {"fixed": {"mass": 1.0, "spring_preload": 200.0}},
+}
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS.keys())
+def test_against_least_squares_at_each_threshold(record, derivatives, form):
+    """(6) by `lstsq` on the samples faster than each threshold, (17) and (18) as they are written.
+
+    The force left by fixed parameters is regressed on the others.
+    """
+    settings = IdentificationSettings(**form)
+    found = swept(record, derivatives, settings)
+    force = BENCH_VALVE.actuator_force(record.pressure)[15:-15]
+    columns = columns_of(record, derivatives, settings.position_bias)
+    for name, value in settings.fixed.items():
+        force = force - value * columns.pop(name)
+    table = np.column_stack(list(columns.values()))
+    speed = np.abs(derivatives.velocity)
+    told_apart = {"coulomb_friction", "spring_preload"} <= columns.keys()
+    compared = 0
+    for step, threshold in enumerate(found.thresholds):
+        moving = speed > threshold
+        assert found.samples[step] == np.count_nonzero(moving)
+        if found.samples[step] < ENOUGH:
+            continue
+        if told_apart and abs(np.sign(derivatives.velocity[moving]).sum()) == moving.sum():
+            assert np.isnan(found.sigma[step])  # all go one way: F_c and F_0 are one number
+            continue
+        compared += 1
+        expected = refined_least_squares(table[moving], force[moving])
+        for name, value in zip(columns, expected, strict=True):
+            assert found.estimates[name][step] == pytest.approx(value, rel=1e-7, abs=0)
+        explained = table[moving] @ expected
+        sigma = np.sqrt(
+            np.sum((force[moving] - explained) ** 2) / (np.count_nonzero(moving) - len(columns))
+        )
+        assert found.sigma[step] == pytest.approx(sigma, rel=1e-7)
+        mean = force[moving].mean()
+        r_squared = np.sum((explained - mean) ** 2) / np.sum((force[moving] - mean) ** 2)
+        assert found.r_squared[step] == pytest.approx(r_squared, rel=1e-7)
+        _, log_determinant = np.linalg.slogdet(table[moving].T @ table[moving])
+        # Normal equations lose twice the digits of the condition, 1e9 at the most here.
+        assert found.log_information[step] == pytest.approx(log_determinant, abs=1e-4)
+    assert compared > 150
+    assert found.free == len(columns)
+    for name, value in settings.fixed.items():
+        np.testing.assert_array_equal(found.estimates[name], value)
+
+
+def test_four_columns_give_the_preload_by_the_bias(record, derivatives):
+    found = swept(record, derivatives, IdentificationSettings(position_bias=BIAS))
+    expected = found.estimates["spring_constant"] * BIAS
+    np.testing.assert_array_equal(found.estimates["spring_preload"], expected)
+
+
+def test_everything_fixed_leaves_only_the_residual(record, derivatives):
+    fixed = {name: getattr(HIGH_FRICTION, name) for name in REGRESSED}
+    found = swept(record, derivatives, IdentificationSettings(fixed=fixed))
+    assert found.free == 0
+    columns = columns_of(record, derivatives)
+    residual = BENCH_VALVE.actuator_force(record.pressure)[15:-15] - sum(
+        fixed[name] * columns[name] for name in REGRESSED
+    )
+    for step in (0, 100, 250):
+        moving = np.abs(derivatives.velocity) > found.thresholds[step]
+        expected = np.sqrt(np.mean(residual[moving] ** 2))
+        assert found.sigma[step] == pytest.approx(expected, rel=1e-9)
+
+
+def synthetic(columns, force, speed):
+    columns = np.asarray(columns, dtype=float)
+    names = REGRESSED[: columns.shape[1]]
+    rest = dict.fromkeys(REGRESSED[columns.shape[1] :], 0.0)
+    return ForceBalanceRegression(
+        names,
+        columns,
+        np.asarray(force, float),
+        np.asarray(speed, float),
+        MappingProxyType(rest),
+        None,
+    )
+
+
+def is_unknown(sweep, step):
+    return (
+        np.isnan([sweep.sigma[step], sweep.r_squared[step], sweep.log_information[step]]).all()
+        and np.isnan(sweep.estimates["mass"][step])
+        and np.isnan(sweep.estimates["coulomb_friction"][step])
+    )
+
+
+class TestUndetermined:
+    THRESHOLDS = np.array([0.5, 1.5, 2.5])
+
+    def test_as_few_samples_as_parameters(self):
+        """2 samples determine 2 parameters, but no residual: n_s − n_P = 0 in (17)."""
+        generator = np.random.default_rng(0)
+        speed = np.repeat([1.0, 2.0, 3.0], [40, 10, 2])
+        columns = generator.standard_normal((52, 2))
+        found = sweep_thresholds(synthetic(columns, columns @ [2.0, 3.0], speed), self.THRESHOLDS)
+        np.testing.assert_array_equal(found.samples, [52, 12, 2])
+        assert is_unknown(found, 2)
+        np.testing.assert_allclose(found.estimates["mass"][:2], 2.0, rtol=1e-14)
+        np.testing.assert_allclose(found.estimates["coulomb_friction"][:2], 3.0, rtol=1e-14)
+
+    def test_no_samples(self):
+        columns = np.random.default_rng(0).standard_normal((20, 2))
+        found = sweep_thresholds(synthetic(columns, columns[:, 0], np.ones(20)), self.THRESHOLDS)
+        np.testing.assert_array_equal(found.samples, [20, 0, 0])
+        assert not is_unknown(found, 0)
+        assert is_unknown(found, 1)
+        assert is_unknown(found, 2)
+
+    def test_one_direction_at_the_top(self):
+        """Where all fast samples go up, the sign column is the constant column."""
+        generator = np.random.default_rng(0)
+        speed = np.repeat([1.0, 2.0], [40, 40])
+        sign = np.concatenate([generator.choice([-1.0, 1.0], 40), np.ones(40)])
+        columns = np.column_stack([sign, np.ones(80)])
+        found = sweep_thresholds(synthetic(columns, columns @ [5.0, 7.0], speed), self.THRESHOLDS)
+        assert found.estimates["mass"][0] == pytest.approx(5.0, rel=1e-13)
+        assert found.estimates["coulomb_friction"][0] == pytest.approx(7.0, rel=1e-13)
+        assert is_unknown(found, 1)
+
+    def test_one_direction_of_a_record(self, record, derivatives):
+        """The upstroke of the bench alone, in the five-column form."""
+        force = BENCH_VALVE.actuator_force(record.pressure)
+        settings = IdentificationSettings()
+        regression = force_balance_regression(force, record.position, derivatives, settings)
+        up = derivatives.velocity > 0
+        one_way = ForceBalanceRegression(
+            regression.names,
+            regression.columns[up],
+            regression.force[up],
+            regression.speed[up],
+            regression.fixed,
+            None,
+        )
+        found = sweep_thresholds(one_way, np.array([2e-3, 4e-3]))
+        assert (found.samples > 1000).all()
+        assert np.isnan(found.sigma).all()
+        assert np.isnan(found.estimates["coulomb_friction"]).all()
+
+
+def test_a_sample_at_the_threshold_is_not_above_it():
+    speed = np.repeat([1.0, 2.0, 3.0], 10)
+    columns = np.random.default_rng(0).standard_normal((30, 2))
+    regression = synthetic(columns, columns[:, 0], speed)
+    found = sweep_thresholds(regression, np.array([1.0, np.nextafter(2.0, 0.0), 2.0, 3.0]))
+    np.testing.assert_array_equal(found.samples, [20, 20, 10, 0])

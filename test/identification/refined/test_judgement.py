@@ -1,0 +1,147 @@
+"""Judgements of a refined model: each reason to doubt it, one at a time."""
+
+import numpy as np
+import pytest
+from problems import FREE, perfect_problem, true_coordinates
+
+from valve_friction_ros.identification import IdentificationSettings, Verdict
+from valve_friction_ros.identification.refined.judgement import judge_refinement
+from valve_friction_ros.identification.refined.model_test import Misfit
+from valve_friction_ros.identification.refined.output_error import SLIP
+from valve_friction_ros.identification.refined.refinement import refine
+from valve_friction_ros.identification.trust.limits import FALL_SPEED, FEWEST_STROKES
+from valve_friction_ros.identification.trust.uncertainty import worst_case
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    HIGH_FRICTION,
+    Recording,
+    SquareWave,
+    TriangleWave,
+)
+
+FRICTION = ("viscous_friction", "coulomb_friction")
+SPRING = ("spring_constant", "spring_preload")
+GOOD = Misfit(fit=1.0, rms=1e-6, systematic=1e-6, tolerated=4e-6)
+BAD = Misfit(fit=0.9, rms=9e-5, systematic=9e-5, tolerated=4e-6)
+
+
+@pytest.fixture(scope="module")
+def refined(bench_trajectory):
+    """Function of excitation, duration and noise (m): a refinement of the high-friction valve."""
+
+    def run(excitation, duration, names=FREE, noise=0.0, **settings):
+        pressure, motion = bench_trajectory("high", excitation, duration)
+        scatter = noise * np.random.default_rng(0).standard_normal(pressure.size)
+        recording = Recording(1e-3, pressure, motion.position + scatter)
+        problem = perfect_problem(BENCH_VALVE, recording, **settings)
+        return refine(problem, true_coordinates(HIGH_FRICTION, motion.position[0]), names)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def square(refined):
+    return refined(SquareWave(), 41.6)
+
+
+def judged(refinement, misfit=GOOD, **settings):
+    return judge_refinement(refinement, misfit, IdentificationSettings(**settings))
+
+
+def test_no_doubt(square):
+    found = judged(square)
+    assert square.top_speed > FALL_SPEED
+    for name in (*FRICTION, *SPRING):
+        assert found[name].verdict is Verdict.IDENTIFIED
+        # A clean record leaves no scatter: the narrowest interval that is ever shown.
+        finest = 2e-4 if name == "spring_constant" else 5e-4
+        assert found[name].half_width == pytest.approx(finest * found[name].value, rel=1e-6)
+
+
+def test_static_friction_without_a_slip_jump(square):
+    one = judged(square)["static_friction"]
+    assert one.verdict is Verdict.NOT_IDENTIFIABLE
+    assert np.isnan(one.value)
+    assert one.reason == "no slip jump seen: F_s cannot be told from F_c"
+
+
+def test_mass_that_is_not_seen(square):
+    one = judged(square)["mass"]
+    assert one.verdict is Verdict.NOT_IDENTIFIABLE
+    assert one.reason == "inertia is too small a part of the force to be seen; 1.75 kg assumed"
+
+
+def test_misfit_doubts_the_friction_and_widens_every_interval(square):
+    found = judged(square, BAD)
+    bound = worst_case(square.equation.curvature, square.simulated.size, BAD.excess)
+    for name in FRICTION:
+        assert found[name].verdict is not Verdict.IDENTIFIED
+        assert found[name].reason == (
+            "the Karnopp model does not describe this valve: 90 µm of misfit are not noise"
+        )
+    index = square.names.index("spring_constant")
+    width = found["spring_constant"].half_width
+    assert width == pytest.approx(np.sqrt(bound[index, index]), rel=0.01)
+
+
+def test_slow_record_cannot_tell_how_far_the_friction_falls(refined):
+    slow = refined(TriangleWave(), 120.0)
+    assert slow.top_speed < FALL_SPEED
+    found = judged(slow)
+    for name in FRICTION:
+        assert found[name].verdict is Verdict.WEAK
+        assert found[name].reason == (
+            f"holds up to {slow.top_speed * 1e3:.2g} mm/s, the fastest here: "
+            "friction may fall further up to 6.5 mm/s"
+        )
+    assert {found[name].verdict for name in SPRING} == {Verdict.IDENTIFIED}
+
+
+def test_few_strokes_are_weak_whatever_else(refined):
+    short = refined(SquareWave(), 15.0)  # up and down
+    found = judged(short, BAD)
+    for name in (*FRICTION, *SPRING):
+        assert found[name].verdict is not Verdict.IDENTIFIED
+        assert found[name].reason == (
+            f"2 strokes only: record at least {FEWEST_STROKES}, up and down"
+        )
+
+
+def test_fixed_parameters(refined):
+    names = tuple(name for name in FREE if name != "viscous_friction")
+    fixed = {"viscous_friction": 4.48e4, "mass": 1.75, "static_friction": 606.0}
+    found = judged(refined(SquareWave(), 41.6, names, static_friction=606.0), fixed=fixed)
+    for name, value in fixed.items():
+        assert (found[name].verdict, found[name].value) == (Verdict.FIXED, value)
+        assert found[name].half_width == 0.0
+    assert found["coulomb_friction"].verdict is Verdict.IDENTIFIED
+
+
+def test_preload_from_the_bias_has_the_spring_s_interval(refined):
+    bias = 1.13e-3
+    names = tuple(name for name in FREE if name != "spring_preload")
+    refinement = refined(SquareWave(), 41.6, names, 3e-4, position_bias=bias)
+    found = judged(refinement, position_bias=bias)
+    spring, preload = found["spring_constant"], found["spring_preload"]
+    assert preload.value == pytest.approx(bias * spring.value, rel=1e-12)
+    assert preload.standard_error == pytest.approx(bias * spring.standard_error, rel=1e-12)
+    assert preload.half_width == pytest.approx(bias * spring.half_width, rel=1e-12)
+
+
+def test_static_friction_adds_slip_and_coulomb_friction(bench_trajectory, benches):
+    """Var(F_c + slip) takes their covariance along."""
+    pressure, motion = bench_trajectory("graphite", SquareWave(), 41.6)
+    valve, parameters = benches["graphite"]
+    noise = 30e-6 * np.random.default_rng(0).standard_normal(pressure.size)
+    recording = Recording(1e-3, pressure, motion.position + noise)
+    problem = perfect_problem(valve, recording)
+    refinement = refine(problem, true_coordinates(parameters, motion.position[0]), (*FREE, SLIP))
+    found = judged(refinement)
+    from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
+
+    covariance = block_covariance(refinement.equation, stroke_length(refinement.simulated)).matrix
+    a, b = refinement.names.index("coulomb_friction"), refinement.names.index(SLIP)
+    expected = covariance[a, a] + covariance[b, b] + 2 * covariance[a, b]
+    one = found["static_friction"]
+    assert one.standard_error == pytest.approx(np.sqrt(expected), rel=1e-9)
+    assert one.value == pytest.approx(parameters.static_friction, rel=0.01)

@@ -1,0 +1,248 @@
+"""The valve signature and the paper's model 2, on valves whose truth is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    RefusalError,
+    Verdict,
+    assess_force_balance,
+)
+from valve_friction_ros.identification.signature.valve_signature import valve_signature
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    IsaSteps,
+    Recording,
+    SensorNoise,
+    SineWave,
+    SquareWave,
+    TriangleWave,
+    converter_response,
+    simulate,
+)
+
+PACKINGS = ["low", "high", "graphite"]
+NOISES = [None, SensorNoise(28.6e-6, 165.0, seed=3)]
+FIVE_STROKES = 150.0
+JUDGED = (
+    "viscous_friction",
+    "coulomb_friction",
+    "static_friction",
+    "spring_constant",
+    "spring_preload",
+)
+
+
+@pytest.fixture(scope="module", params=PACKINGS)
+def bench(request, benches):
+    return request.param, benches[request.param]
+
+
+@pytest.fixture(scope="module", params=NOISES, ids=["clean", "noisy"])
+def signature(request, bench, bench_record):
+    """Name, bench and signature of five strokes of the default triangle."""
+    name, plant = bench
+    record = bench_record(name, TriangleWave(), FIVE_STROKES, request.param)
+    return name, plant, valve_signature(record, plant.valve)
+
+
+def test_spring_constant_and_bias(signature):
+    _, plant, found = signature
+    truth = plant.parameters
+    assert found.spring_constant == pytest.approx(truth.spring_constant, rel=2e-3)
+    bias = truth.spring_preload / truth.spring_constant
+    assert found.position_bias == pytest.approx(bias, abs=0.05e-3)
+    assert found.standard_errors["spring_constant"] < 1e-3 * truth.spring_constant
+
+
+def test_points_are_where_static_friction_gives_way(signature):
+    """(11) and (12), with the true k and F_0."""
+    _, plant, found = signature
+    truth = plant.parameters
+    assert (len(found.upward_points), len(found.downward_points)) == (3, 2)
+    for side, points in ((1, found.upward_points), (-1, found.downward_points)):
+        for point in points:
+            assert point.force == plant.valve.actuator_force(np.array([point.pressure]))[0]
+            pull = point.force - truth.spring_constant * point.position - truth.spring_preload
+            assert side * pull == pytest.approx(truth.static_friction, rel=0.03)
+
+
+def test_dead_zone_is_twice_the_sliding_friction(signature):
+    _, plant, found = signature
+    truth = plant.parameters
+    speed = np.mean([np.mean(np.abs(stroke.sliding.velocity)) for stroke in found.strokes])
+    friction = truth.coulomb_friction + truth.viscous_friction * speed
+    width = 2 * friction / plant.valve.diaphragm_area
+    assert found.dead_zone == pytest.approx(width, rel=5e-3)
+    assert 0 < found.dead_zone_share < 1
+
+
+def test_sliding_instants_have_the_speed_of_the_ramp(signature):
+    """The pressure rises by 165.1 kPa in 30 s, and the spring turns it into the way."""
+    _, plant, found = signature
+    rate = plant.valve.diaphragm_area * 165_100.0 / 30.0
+    for stroke in found.strokes:
+        assert stroke.steadiness > 0.85
+        expected = stroke.direction * rate / plant.parameters.spring_constant
+        np.testing.assert_allclose(np.median(stroke.sliding.velocity), expected, rtol=5e-3)
+
+
+def test_high_friction_has_three_times_the_dead_zone_of_low(bench_record):
+    low, high = (
+        valve_signature(bench_record(name, TriangleWave(), FIVE_STROKES), BENCH_VALVE).dead_zone
+        for name in ("low", "high")
+    )
+    assert high > 3 * low
+
+
+@pytest.mark.parametrize("noise", NOISES, ids=["clean", "noisy"])
+def test_every_interval_holds_the_truth(bench, bench_record, noise):
+    name, plant = bench
+    record = bench_record(name, TriangleWave(), FIVE_STROKES, noise)
+    found = assess_force_balance(record, plant.valve, IdentificationSettings(assumed_mass=1.6))
+    for parameter in JUDGED:
+        low, high = found.parameters[parameter].interval
+        assert low < getattr(plant.parameters, parameter) < high, parameter
+    assert found.parameters["spring_constant"].verdict is Verdict.IDENTIFIED
+    assert found.parameters["static_friction"].verdict is Verdict.IDENTIFIED
+    friction = found.parameters["coulomb_friction"]
+    assert friction.verdict is Verdict.WEAK  # 1.2 mm/s says nothing about faster
+    assert friction.reason.startswith("holds at 1.2 mm/s")
+    assert friction.half_width < 0.05 * friction.value
+    mass = found.parameters["mass"]
+    assert (mass.verdict, mass.reason[-14:]) == (Verdict.NOT_IDENTIFIABLE, "1.6 kg assumed")
+    assert found.model().mass == 1.6
+    noise_level = noise.position if noise else 0.0
+    assert found.rms == pytest.approx(noise_level, abs=15e-6)
+    assert found.fit > 0.995
+    assert (found.published, found.misfit, found.sweep) == (None, None, None)
+
+
+def test_without_a_jump_coulomb_is_static_friction(bench_record):
+    record = bench_record("high", TriangleWave(), FIVE_STROKES)
+    values = assess_force_balance(record, BENCH_VALVE).values
+    assert values["coulomb_friction"] == values["static_friction"]
+
+
+class TestGiven:
+    @pytest.fixture(scope="class")
+    def record(self, bench_record):
+        return bench_record("high", TriangleWave(), FIVE_STROKES)
+
+    def test_values_stay(self, record):
+        fixed = {"mass": 1.75, "spring_constant": 2e5, "coulomb_friction": 600.0}
+        found = assess_force_balance(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+        for name, value in fixed.items():
+            parameter = found.parameters[name]
+            assert (parameter.verdict, parameter.value) == (Verdict.FIXED, value)
+
+    def test_coulomb_friction_moves_the_viscous_one(self, record):
+        """(19): 6.9 N less of F_c are 6.9 N more of F_v·ẋ."""
+        free = assess_force_balance(record, BENCH_VALVE)
+        less = free.values["coulomb_friction"] - 6.9
+        settings = IdentificationSettings(fixed={"coulomb_friction": less})
+        found = assess_force_balance(record, BENCH_VALVE, settings)
+        strokes = free.signature.strokes
+        inverse = np.mean([np.mean(1 / np.abs(one.sliding.velocity)) for one in strokes])
+        more = found.values["viscous_friction"] - free.values["viscous_friction"]
+        assert more == pytest.approx(6.9 * inverse, rel=1e-9)
+
+    def test_position_bias(self, record):
+        settings = IdentificationSettings(position_bias=1.13e-3)
+        values = assess_force_balance(record, BENCH_VALVE, settings).values
+        assert values["spring_preload"] == pytest.approx(1.13e-3 * values["spring_constant"])
+
+    def test_no_spring(self, record):
+        settings = IdentificationSettings(fixed={"spring_constant": 0.0})
+        with pytest.raises(RefusalError, match="needs a spring: use the method sweep"):
+            assess_force_balance(record, BENCH_VALVE, settings)
+
+
+@pytest.mark.parametrize("noise", NOISES, ids=["clean", "noisy"])
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("excitation", "duration"),
+        [
+            (SquareWave(), 52.0),
+            (SineWave(), 106.5),
+            (IsaSteps(), 370.0),
+            (TriangleWave(period=10.4), 52.0),
+        ],
+        ids=["square", "sine", "isa", "fast triangle"],
+    )
+    def test_no_constant_speed(self, bench_record, excitation, duration, noise):
+        record = bench_record("high", excitation, duration, noise)
+        with pytest.raises(RefusalError) as refusal:
+            assess_force_balance(record, BENCH_VALVE)
+        message = str(refusal.value)
+        assert "does not slide at a constant speed" in message
+        assert "slow triangular wave of pressure, such as 60 s a period" in message
+
+    @pytest.mark.parametrize(
+        ("period", "duration", "cause"),
+        [(200.0, 99.0, "here are 1 up and 0 down"), (60.0, 59.0, "here are 1 up and 1 down")],
+        ids=["one way", "one period"],
+    )
+    def test_too_few_strokes(self, bench_record, period, duration, cause, noise):
+        record = bench_record("high", TriangleWave(period=period), duration, noise)
+        with pytest.raises(RefusalError, match=f"{cause}: excite the valve by a slow triangular"):
+            assess_force_balance(record, BENCH_VALVE)
+
+    def test_a_record_that_begins_in_a_stroke_is_served(self, bench_record, noise):
+        """The first stroke has no breakaway, and takes no part."""
+        whole = bench_record("high", TriangleWave(), FIVE_STROKES + 30.0, noise)
+        late = Recording(whole.sample_period, whole.pressure[15_000:], whole.position[15_000:])
+        found = assess_force_balance(late, BENCH_VALVE)
+        assert found.signature.strokes[0].breakaway is None
+        assert found.values["static_friction"] == pytest.approx(606.0, rel=0.02)
+
+
+def test_pressure_and_stem_against_each_other(bench_record):
+    record = bench_record("high", TriangleWave(), FIVE_STROKES)
+    mirrored = Recording(
+        record.sample_period, record.pressure, BENCH_VALVE.travel - record.position
+    )
+    with pytest.raises(RefusalError, match="the stem moves against the pressure"):
+        assess_force_balance(mirrored, BENCH_VALVE)
+
+
+class TestContradictions:
+    """Given values that the record belies."""
+
+    @pytest.fixture(scope="class")
+    def record(self, bench_record):
+        return bench_record("high", TriangleWave(), FIVE_STROKES)
+
+    @pytest.mark.parametrize(
+        ("fixed", "cause"),
+        [
+            ({"spring_constant": 1.0}, "give a friction of -.* N, which cannot be"),
+            ({"spring_preload": 9000.0}, "does not reproduce the record"),
+        ],
+    )
+    def test_refused(self, record, fixed, cause):
+        with pytest.raises(RefusalError, match=cause):
+            assess_force_balance(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+
+    def test_too_large_a_coulomb_friction_leaves_no_viscous_one(self, record):
+        settings = IdentificationSettings(fixed={"coulomb_friction": 700.0})
+        found = assess_force_balance(record, BENCH_VALVE, settings)
+        viscous = found.parameters["viscous_friction"]
+        assert viscous.verdict is Verdict.NOT_IDENTIFIABLE
+        assert viscous.reason.startswith("it came out negative (-")
+        assert found.model().viscous_friction > 0
+        assert any("viscous_friction is not identified" in note for note in found.warnings)
+
+
+def test_slow_sampling_and_a_converter_without_lag(benches):
+    """100 Hz, and corners of the pressure that are sharp."""
+    time = np.arange(15_000) / 100
+    for lag in (0.0, 1.3):
+        pressure = converter_response(TriangleWave().sample(time), 0.01, lag)
+        position = simulate(*benches["high"], pressure, 0.01).position
+        found = assess_force_balance(Recording(0.01, pressure, position), BENCH_VALVE)
+        assert found.values["coulomb_friction"] == pytest.approx(606.0, rel=5e-3)
+        assert math.isclose(found.values["viscous_friction"], 4.48e4, rel_tol=0.05)

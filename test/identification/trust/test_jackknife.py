@@ -1,0 +1,33 @@
+"""Standard errors that are known without leaving anything out."""
+
+import math
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification.trust.jackknife import jackknife
+
+GROUPS = [[1.0, 2.0, 6.0], [10.0, 14.0]]
+
+
+def test_of_a_mean():
+    found = jackknife([GROUPS[0]], lambda groups: {"mean": float(np.mean(groups[0]))})
+    assert found.values["mean"] == 3.0
+    assert found.standard_errors["mean"] == pytest.approx(np.std(GROUPS[0], ddof=1) / math.sqrt(3))
+    assert found.freedom == 2
+
+
+def test_independent_groups_add_in_squares():
+    def difference(groups):
+        return {"difference": float(np.mean(groups[1]) - np.mean(groups[0]))}
+
+    found = jackknife(GROUPS, difference)
+    assert found.values["difference"] == 9.0
+    assert found.standard_errors["difference"] == pytest.approx(math.sqrt(7 / 3 + 8 / 2))
+    assert found.freedom == 3
+
+
+def test_one_alone_has_no_scatter():
+    found = jackknife([[1.0, 2.0], [3.0]], lambda groups: {"sum": sum(map(sum, groups))})
+    assert found.values["sum"] == 6.0
+    assert math.isnan(found.standard_errors["sum"])

@@ -1,0 +1,153 @@
+"""A buffer written as a bag: nothing lost, nothing half done."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bags import stamps_of
+from rosbags.rosbag2 import Reader
+
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.model import BENCH_VALVE, GRAPHITE_VALVE, Valve
+from valve_friction_ros.records.bags.topics import StreamNames, TopicChoice
+from valve_friction_ros.records.bags.writing import VALVE_FILE, write_bag
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
+from valve_friction_ros.records.valve_file import read_valve_file
+from valve_friction_ros.streams import RecordBuffer
+
+NAMES = StreamNames("/fv_101/actuator_pressure", "/plant/stems", "plug")
+
+
+@pytest.fixture
+def buffer(loose_record):
+    buffer = RecordBuffer(BENCH_VALVE, 5.0)
+    samples = zip(
+        stamps_of(loose_record).tolist(), loose_record.pressure, loose_record.position, strict=True
+    )
+    for stamp, pressure, position in samples:
+        buffer.add_pressure(stamp, pressure)
+        buffer.add_position(stamp + 1_234_567, position)
+    return buffer
+
+
+def write(folder, buffer, name="fv_101", valve=BENCH_VALVE):
+    return write_bag(folder, name, buffer.snapshot(), NAMES, valve, 1.6)
+
+
+def test_every_sample_to_the_last_bit(tmp_path, buffer):
+    bag = write(tmp_path, buffer)
+    assert bag == tmp_path / "fv_101"
+    expected = buffer.snapshot()
+    (valve,) = read_recordings(bag, BENCH_VALVE)
+    found, wanted = valve.recording(), expected.recording()
+    np.testing.assert_array_equal(found.pressure, wanted.pressure)
+    np.testing.assert_array_equal(found.position, wanted.position)
+    assert (found.sample_period, found.start_time) == (wanted.sample_period, wanted.start_time)
+    assert valve.notes == ()
+
+
+def test_topics_joint_and_stamps(tmp_path, buffer):
+    bag = write(tmp_path, buffer)
+    with Reader(bag) as reader:
+        assert {c.topic: c.msgtype for c in reader.connections} == {
+            NAMES.pressure: "sensor_msgs/msg/FluidPressure",
+            NAMES.stem: "sensor_msgs/msg/JointState",
+        }
+        received = [stamp for _, stamp, _ in reader.messages()]
+    snapshot = buffer.snapshot()
+    assert received == sorted([*snapshot.pressure.stamps, *snapshot.position.stamps])
+    options = ReadingOptions(topics=TopicChoice(joint="stem"))
+    (valve,) = read_recordings(bag, BENCH_VALVE, options)
+    with pytest.raises(RefusalError, match="no joint 'stem' among plug"):
+        valve.recording()
+
+
+@pytest.mark.parametrize("valve", [BENCH_VALVE, GRAPHITE_VALVE, Valve(1e-6, travel=float("inf"))])
+def test_the_valve_is_described(tmp_path, buffer, valve):
+    description = read_valve_file(write(tmp_path, buffer, valve=valve) / VALVE_FILE)
+    assert description.valve == valve
+    assert description.known == {"mass": 1.6}
+
+
+def test_nothing_is_overwritten(tmp_path, buffer):
+    (tmp_path / "fv_101_3").write_text("mine")
+    bags = [write(tmp_path / "new" / "folder", buffer)]
+    bags += [write(tmp_path, buffer) for _ in range(3)]
+    assert [bag.name for bag in bags] == ["fv_101", "fv_101", "fv_101_2", "fv_101_4"]
+    for bag in bags:
+        (valve,) = read_recordings(bag, BENCH_VALVE)
+        assert len(valve.recording()) == len(buffer.snapshot().recording())
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "new",
+        "fv_101",
+        "fv_101_2",
+        "fv_101_3",
+        "fv_101_4",
+    }
+
+
+def test_rejected_samples_are_told(tmp_path, buffer):
+    last = buffer.snapshot().position.stamps[-1]
+    buffer.add_pressure(int(last), 1e9)
+    assert len(buffer.snapshot().rejections) == 1
+    metadata = (write(tmp_path, buffer) / "metadata.yaml").read_text()
+    assert "outside the sensor's range 0 to 250000 Pa (1 samples)" in " ".join(metadata.split())
+
+
+def test_an_empty_buffer(tmp_path):
+    with pytest.raises(RefusalError, match="the buffer is empty: there is nothing to save"):
+        write(tmp_path / "new", RecordBuffer(BENCH_VALVE, 5.0))
+    assert not (tmp_path / "new").exists()
+
+
+def test_stamps_that_no_header_holds(tmp_path):
+    buffer = RecordBuffer(BENCH_VALVE, 5.0)
+    buffer.add_pressure((2**31 - 1) * 1_000_000_000, 1e5)
+    assert write(tmp_path, buffer).is_dir()
+    buffer.add_pressure(2**31 * 1_000_000_000, 1e5)
+    with pytest.raises(RefusalError, match="stamps after the year 2038"):
+        write(tmp_path, buffer)
+
+
+def test_a_folder_that_cannot_be(tmp_path, buffer):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match="Not a directory"):
+        write(tmp_path / "file" / "folder", buffer)
+
+
+FULL_DISK = """
+import resource, signal, sys
+from pathlib import Path
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.streams import RecordBuffer
+from valve_friction_ros.records.bags.topics import StreamNames
+from valve_friction_ros.records.bags.writing import write_bag
+
+buffer = RecordBuffer(BENCH_VALVE, 60.0)
+for number in range(2000):
+    buffer.add_pressure(number, 1e5)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+try:
+    names = StreamNames("/p", "/x", "")
+    write_bag(Path(sys.argv[1]), "fv_101", buffer.snapshot(), names, BENCH_VALVE, 1.0)
+except OSError as error:
+    print(error.strerror)
+"""
+
+
+def test_a_file_that_may_not_grow(tmp_path):
+    """As on a full disk: the reason is told, and nothing is left behind."""
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(tmp_path)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert (done.stdout, done.stderr) == ("File too large\n", "")
+    assert list(tmp_path.iterdir()) == []

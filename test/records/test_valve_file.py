@@ -1,0 +1,120 @@
+"""The YAML file of a valve: what it may hold, and the key that a refusal names."""
+
+import dataclasses
+import math
+
+import pytest
+
+from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Valve
+from valve_friction_ros.records.valve_file import read_valve_file
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        path = tmp_path / "valve.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+class TestGoodFiles:
+    def test_the_bench_valve_of_the_package(self, bench_yaml):
+        found = read_valve_file(bench_yaml)
+        assert found.valve == BENCH_VALVE
+        assert dict(found.known) == {"mass": 1.6}
+
+    def test_only_the_area_is_needed(self, write):
+        found = read_valve_file(write("diaphragm_area: 0.0445\n"))
+        assert found.valve == Valve(0.0445)
+        assert dict(found.known) == {}
+
+    def test_all_keys(self, write):
+        known = {name: getattr(LOW_FRICTION, name) for name in FIXABLE}
+        everything = dataclasses.asdict(BENCH_VALVE) | known
+        lines = [f"{name}: {value!r}\n" for name, value in everything.items()]
+        found = read_valve_file(write("".join(lines)))
+        assert found.valve == BENCH_VALVE
+        assert dict(found.known) == known
+
+    def test_whole_numbers_and_powers_of_ten(self, write):
+        """YAML 1.1 takes 2e5 for a text; people do not."""
+        found = read_valve_file(write("diaphragm_area: 1\npressure_maximum: 2e5\ntravel: 3e-2\n"))
+        assert found.valve == Valve(1.0, travel=0.03, pressure_maximum=2e5)
+        assert isinstance(found.valve.diaphragm_area, float)
+
+    def test_without_stops(self, write):
+        found = read_valve_file(write("diaphragm_area: 1.0\ntravel: .inf\n"))
+        assert found.valve.travel == math.inf
+
+    def test_a_static_friction_alone(self, write):
+        found = read_valve_file(write("diaphragm_area: 1.0\nstatic_friction: 5.0\n"))
+        assert dict(found.known) == {"static_friction": 5.0}
+
+    def test_the_known_values_are_read_only(self, bench_yaml):
+        with pytest.raises(TypeError):
+            read_valve_file(bench_yaml).known["mass"] = 2.0
+
+
+BROKEN = [
+    ("travel: 0.03", "diaphragm_area is missing"),
+    ("", "expected lines such as 'diaphragm_area: 0.0445'"),
+    ("- 0.0445", "expected lines such as 'diaphragm_area: 0.0445'"),
+    ("diaphragm_area 0.0445", "expected lines such as 'diaphragm_area: 0.0445'"),
+    ("diaphragm_area: [0.0445", "not YAML: while parsing a flow sequence"),
+    ("diaphragm_area: 1.0\n\ttravel: 1.0", "not YAML: while scanning"),
+    ("diaphragm_area: 1.0\ntravel: 0.02\ntravel: 0.03", "not YAML: travel is given twice in "),
+    ("diaphragm_area: 1.0\n? [travel]\n: 1.0", "not YAML: while constructing a mapping"),
+    ("diaphragm_area: 1.0\nmas: 1.0", "unknown key 'mas'; did you mean 'mass'?"),
+    ("diaphragm_area: 1.0\n17: 1.0", "unknown key 17; known are diaphragm_area, pressure_ref"),
+    ("diaphragm_area: 0.0", "diaphragm_area must be above zero, got 0"),
+    ("diaphragm_area: .nan", "diaphragm_area must be finite, got nan"),
+    ("diaphragm_area: wide", "diaphragm_area must be a number, got 'wide'"),
+    ("diaphragm_area:", "diaphragm_area must be a number, got None"),
+    ("diaphragm_area: true", "diaphragm_area must be a number, got True"),
+    ("diaphragm_area: [1.0]", "diaphragm_area must be a number, got [1.0]"),
+    ("diaphragm_area: 1.0\ntravel: -0.1", "travel must be above zero, got -0.1"),
+    ("diaphragm_area: 1.0\npressure_reference: .inf", "pressure_reference must be finite, got"),
+    ("diaphragm_area: 1.0\npressure_minimum: low", "pressure_minimum must be a number, got 'low'"),
+    ("diaphragm_area: 1.0\npressure_maximum: yes", "pressure_maximum must be a number, got True"),
+    (
+        "diaphragm_area: 1.0\npressure_minimum: 2.0\npressure_maximum: 1.0",
+        "pressure_minimum (2) must be below pressure_maximum (1)",
+    ),
+    ("diaphragm_area: 1.0\nmass: 0.0", "mass must be above zero, got 0"),
+    ("diaphragm_area: 1.0\nmass: -1.0", "mass must be above zero, got -1"),
+    ("diaphragm_area: 1.0\nviscous_friction: -1", "viscous_friction must not be negative"),
+    ("diaphragm_area: 1.0\ncoulomb_friction: -1", "coulomb_friction must not be negative"),
+    ("diaphragm_area: 1.0\nstatic_friction: -1", "static_friction must not be negative"),
+    ("diaphragm_area: 1.0\nspring_constant: .inf", "spring_constant must be finite, got inf"),
+    ("diaphragm_area: 1.0\nspring_preload: .nan", "spring_preload must be finite, got nan"),
+    ("diaphragm_area: 1.0\nlimit_velocity: -1", "limit_velocity must not be negative"),
+    (
+        "diaphragm_area: 1.0\ncoulomb_friction: 6\nstatic_friction: 5",
+        "static_friction (5) must not be below coulomb_friction (6)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), BROKEN)
+def test_broken_rules(write, text, message):
+    path = write(text + "\n")
+    with pytest.raises(ValueError, match=r"\A.*\Z") as refusal:  # one line
+        read_valve_file(path)
+    assert str(refusal.value).startswith(f"{path}: {message}")
+
+
+def test_unreadable(tmp_path, write):
+    for path, cause in (
+        (tmp_path / "none.yaml", "No such file or directory"),
+        (tmp_path, "Is a directory"),
+    ):
+        with pytest.raises(ValueError, match=r"\A.*\Z") as refusal:
+            read_valve_file(path)
+        assert str(refusal.value) == f"{path}: cannot be read: {cause}"
+    path = write("")
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError, match=r"valve.yaml: cannot be read: 'utf-8' codec"):
+        read_valve_file(path)

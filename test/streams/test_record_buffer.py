@@ -1,0 +1,197 @@
+"""Both signals of a valve: what is taken, what is rejected, what is refused because of it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.model import BENCH_VALVE, Valve
+from valve_friction_ros.streams import RecordBuffer
+
+MILLISECOND = 1_000_000
+START = 1_700_000_000_000_000_000
+RANGE = "actuator_pressure outside the sensor's range 0 to 250000 Pa"
+
+
+def fill(buffer, count, first=0, period=1):
+    """Add `count` good samples of both signals from `first` ms on; all are taken."""
+    for step in range(count):
+        stamp = START + MILLISECOND * (first + period * step)
+        assert buffer.add_pressure(stamp, 1e5 + step) is None
+        assert buffer.add_position(stamp, 1e-6 * step) is None
+
+
+def stamp(milliseconds):
+    return START + MILLISECOND * milliseconds
+
+
+@pytest.fixture
+def buffer():
+    return RecordBuffer(BENCH_VALVE, 1.0)
+
+
+def refused(buffer):
+    with pytest.raises(RefusalError) as refusal:
+        buffer.snapshot().recording()
+    return str(refusal.value)
+
+
+class TestGoodSamples:
+    def test_become_a_recording(self, buffer):
+        fill(buffer, 500)
+        record = buffer.snapshot().recording()
+        np.testing.assert_array_equal(record.pressure, 1e5 + np.arange(500))
+        np.testing.assert_array_equal(record.position, 1e-6 * np.arange(500))
+        assert record.sample_period == 1e-3
+        assert record.start_time == START / 1e9
+        assert len(buffer) == 1000
+
+    def test_the_last_window_of_them(self, buffer):
+        fill(buffer, 2500)
+        record = buffer.snapshot().recording()
+        assert record.duration == 1.0
+        assert record.pressure[0] == 1e5 + 1499
+
+    def test_a_snapshot_stays_as_it_is(self, buffer):
+        fill(buffer, 500)
+        snapshot = buffer.snapshot()
+        buffer.add_pressure(stamp(500), math.nan)
+        fill(buffer, 100, first=501)
+        buffer.clear("of the test")
+        assert len(snapshot.recording()) == 500
+
+    def test_memory_is_bounded(self, buffer):
+        """A window of 1 s at 1 kHz, a tenth more before it is cut, and both ends, each twice."""
+        largest = 0
+        for first in range(0, 10_000, 50):
+            fill(buffer, 50, first=first)
+            largest = max(largest, len(buffer))
+        assert 2 * 1001 <= largest <= 2 * 1101
+
+    @pytest.mark.parametrize("pressure", [0.0, 250000.0])
+    def test_the_ends_of_the_range_are_in_it(self, buffer, pressure):
+        assert buffer.add_pressure(START, pressure) is None
+
+    def test_without_a_range_any_finite_pressure_is_one(self):
+        buffer = RecordBuffer(Valve(1.0), 1.0)
+        assert buffer.add_pressure(START, -1e300) is None
+        assert buffer.add_pressure(START + 1, math.inf) == "actuator_pressure is not finite"
+
+
+BAD = [
+    ("pressure", math.nan, "actuator_pressure is not finite"),
+    ("pressure", math.inf, "actuator_pressure is not finite"),
+    ("pressure", -math.inf, "actuator_pressure is not finite"),
+    ("pressure", math.nextafter(0.0, -1.0), RANGE),
+    ("pressure", math.nextafter(250000.0, math.inf), RANGE),
+    ("position", math.nan, "stem_state is not finite"),
+    ("position", -math.inf, "stem_state is not finite"),
+    ("position", None, "stem_state without a position of the joint"),
+]
+
+
+@pytest.mark.parametrize(("signal", "value", "cause"), BAD)
+class TestBadSamples:
+    def add(self, buffer, signal, at, value):
+        return getattr(buffer, f"add_{signal}")(at, value)
+
+    def test_refuse_the_window(self, buffer, signal, value, cause):
+        fill(buffer, 500)
+        assert self.add(buffer, signal, stamp(500), value) == cause
+        assert self.add(buffer, signal, stamp(501), value) == cause
+        fill(buffer, 100, first=502)
+        assert len(buffer) == 1200
+        assert refused(buffer) == (
+            f"bad samples in the window: {cause} (2 samples); mend the source, then clear the "
+            "buffer or wait until they have left it"
+        )
+
+    def test_leave_with_the_window(self, buffer, signal, value, cause):
+        fill(buffer, 5)
+        self.add(buffer, signal, stamp(5), value)
+        fill(buffer, 1000, first=6)  # the newest is exactly one window younger
+        assert cause in refused(buffer)
+        fill(buffer, 1, first=1006)
+        assert buffer.snapshot().rejections == ()
+        assert buffer.snapshot().recording().duration == 1.0
+
+    def test_leave_with_a_clear(self, buffer, signal, value, cause):
+        self.add(buffer, signal, START, value)
+        assert cause in refused(buffer)
+        buffer.clear("of the test")
+        fill(buffer, 500)
+        assert len(buffer.snapshot().recording()) == 500
+
+
+class TestRepeatedStamps:
+    def test_the_first_stays(self, buffer):
+        fill(buffer, 500)
+        assert buffer.add_pressure(stamp(499), 7.0) == "actuator_pressure repeats a stamp"
+        assert buffer.add_position(stamp(499), 7.0) == "stem_state repeats a stamp"
+        snapshot = buffer.snapshot()
+        assert snapshot.pressure.values[-1] == 1e5 + 499
+        assert snapshot.position.values[-1] == 1e-6 * 499
+        message = refused(buffer)
+        assert "actuator_pressure repeats a stamp (1 samples)" in message
+        assert "stem_state repeats a stamp (1 samples)" in message
+
+    def test_the_signals_may_share_stamps(self, buffer):
+        assert buffer.add_pressure(START, 1e5) is None
+        assert buffer.add_position(START, 0.0) is None
+
+
+class TestStampsThatGoBack:
+    @pytest.mark.parametrize("signal", ["pressure", "position"])
+    def test_clear_everything(self, buffer, signal):
+        fill(buffer, 500)
+        buffer.add_pressure(stamp(500), math.nan)
+        name = {"pressure": "actuator_pressure", "position": "stem_state"}[signal]
+        cause = f"stamps of {name} went back by 0.25 s"
+        found = getattr(buffer, f"add_{signal}")(stamp(249), 1e-3)
+        assert found == cause + ": the buffer was cleared"
+        assert len(buffer) == 0
+        snapshot = buffer.snapshot()
+        assert snapshot.rejections == ()
+        assert snapshot.cleared_because == cause
+
+    def test_the_next_good_window_is_a_recording(self, buffer):
+        fill(buffer, 500)
+        buffer.add_position(stamp(-5000), 0.0)
+        fill(buffer, 300, first=-4999)
+        record = buffer.snapshot().recording()
+        assert len(record) == 300
+        assert record.start_time == stamp(-4999) / 1e9
+
+
+class TestTheCauseOfAClear:
+    def test_none_at_first(self, buffer):
+        assert buffer.snapshot().cleared_because is None
+
+    @pytest.mark.parametrize("period", [1, 7], ids=["divides the window", "does not"])
+    def test_told_until_the_buffer_is_full_again(self, buffer, period):
+        buffer.clear("of the test")
+        needed = math.ceil(1000 / period)  # periods in a window
+        fill(buffer, needed, period=period)
+        assert buffer.snapshot().cleared_because == "of the test"
+        fill(buffer, 1, first=needed * period)
+        assert buffer.snapshot().cleared_because is None
+        fill(buffer, 1000, first=(needed + 1) * period, period=period)
+        assert buffer.snapshot().cleared_because is None
+
+    def test_the_latest_is_told(self, buffer):
+        buffer.clear("first")
+        fill(buffer, 2000)
+        buffer.clear("second")
+        assert buffer.snapshot().cleared_because == "second"
+
+
+def test_rejections_are_bounded():
+    """A dead sensor for hours costs no more memory than for seconds."""
+    buffer = RecordBuffer(BENCH_VALVE, 3600.0)
+    for step in range(10_500):
+        buffer.add_pressure(stamp(step), math.nan)
+    assert [rejection.stamp for rejection in buffer.snapshot().rejections] == [
+        stamp(step) for step in range(500, 10_500)
+    ]
+    assert "actuator_pressure is not finite (10000 samples)" in refused(buffer)

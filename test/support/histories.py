@@ -1,0 +1,73 @@
+"""Entries of a history, made up."""
+
+import math
+
+from valve_friction_ros.health import (
+    Diagnosis,
+    FrictionLimits,
+    Level,
+    MonitorSettings,
+    StatusSignal,
+)
+from valve_friction_ros.history import HistoryEntry, KeptValve
+from valve_friction_ros.history.entry import Fit, Span, settings_text
+from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.model import BENCH_VALVE
+
+SECOND = 1_000_000_000
+DAY = 86_400 * SECOND
+START = 1_790_000_000 * SECOND
+"""2026-09-21 14:13:20 UTC."""
+VALVE = KeptValve("/fv_101/identifier", "FV-101")
+OTHER = KeptValve("/area_2/lv_7/identifier", "LV-7")
+_SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
+
+
+def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""):
+    return AssessedParameter(name, value, half_width / 2, half_width, verdict, reason)
+
+
+def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
+    """An identification of a Coulomb friction; the rest of its parameters are always the same."""
+    verdict = changes.pop("verdict", Verdict.IDENTIFIED)
+    baseline = changes.get("baseline")
+    one = parameter("coulomb_friction", friction, half_width, verdict)
+    ratio = None if baseline is None else baseline.compared_with(one)
+    return HistoryEntry(
+        **{
+            "time": time,
+            "valve": valve,
+            "span": Span(time - 60 * SECOND, time),
+            "method": "sweep",
+            "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, "friction normal: so", ratio),
+            "limits": FrictionLimits(),
+            "baseline": None,
+            "settings": _SETTINGS,
+            "parameters": {
+                "mass": parameter("mass", 1.0, 0.0, Verdict.FIXED, "assumed"),
+                "coulomb_friction": one,
+                "static_friction": parameter(
+                    "static_friction", math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, "no slip jump"
+                ),
+            },
+            "fit": Fit(0.99, 1e-5, 1e-6),
+            **changes,
+        }
+    )
+
+
+def refused(time=START, reason="the stem does not move: move the valve", valve=VALVE, **changes):
+    return HistoryEntry(
+        **{
+            "time": time,
+            "valve": valve,
+            "span": None,
+            "method": "sweep",
+            "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None),
+            "limits": FrictionLimits(),
+            "baseline": None,
+            "settings": _SETTINGS,
+            "refusal": reason,
+            **changes,
+        }
+    )

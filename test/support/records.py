@@ -1,0 +1,39 @@
+"""Simulated records of the bench valve."""
+
+import numpy as np
+
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SineWave,
+    SquareWave,
+    converter_response,
+    simulate,
+)
+
+
+def simulated(pressure, sample_period, parameters=LOW_FRICTION):
+    """Record of the bench valve under `pressure`, without noise."""
+    position = simulate(BENCH_VALVE, parameters, pressure, sample_period).position
+    return Recording(sample_period, pressure, position)
+
+
+def quick_record(parameters=LOW_FRICTION):
+    """Five seconds of a sine at 100 Hz: short to publish, and enough to be identified."""
+    time = np.arange(500) / 100
+    return simulated(SineWave(period=5.0).sample(time), 0.01, parameters)
+
+
+def bench_record(parameters=LOW_FRICTION):
+    """Two periods of a square wave, quicker than the paper's, behind a V/P converter, at 1 kHz."""
+    time = np.arange(5200) / 1000
+    pressure = converter_response(SquareWave(period=2.6).sample(time), 1e-3, 0.6)
+    return simulated(pressure, 1e-3, parameters)
+
+
+def sine_record(parameters, duration=16.0):
+    """Four strokes of two seconds and more, at 100 Hz, without noise."""
+    pressure = SineWave(period=4.0).sample(np.arange(round(100 * duration)) / 100)
+    position = simulate(BENCH_VALVE, parameters, pressure, 0.01).position
+    return Recording(0.01, pressure, position)

@@ -1,0 +1,1 @@
+"""The demonstration: a simulated valve whose friction grows."""

@@ -1,0 +1,107 @@
+"""The figure of an identification: record, sweep, signature and verdict on one page."""
+
+import math
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from valve_friction_ros.figures.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.figures.page import dress, titled_figure
+from valve_friction_ros.figures.panels import (
+    COLOURS,
+    draw_coulomb_sweep,
+    draw_record,
+    draw_sigma_sweep,
+    draw_signature,
+)
+from valve_friction_ros.figures.signature_figure import signature_figure
+from valve_friction_ros.health import dead_band, percentage
+from valve_friction_ros.identification import (
+    ASSESSED_UNITS,
+    AssessedParameter,
+    Assessment,
+    ForceBalanceAssessment,
+    SweepAssessment,
+)
+from valve_friction_ros.model import Recording, Valve
+
+__all__ = ["friction_figure", "identification_figure"]
+
+
+def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
+    """Draw one or several identified records of a valve, and the verdict on it.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        One to four, in the order of time.
+    verdict : str
+        One sentence, printed above the panels.
+
+    Returns
+    -------
+    Figure
+        To be saved or shown; no global state of matplotlib is touched.
+
+    Raises
+    ------
+    ValueError
+        If there is no case, or more than can be told apart.
+    """
+    if not 0 < len(cases) <= len(COLOURS):
+        raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
+    figure = titled_figure(verdict)
+    panels = figure.subplot_mosaic(
+        [
+            ["pressure", "pressure"],
+            ["stem", "stem"],
+            ["coulomb", "signature"],
+            ["sigma", "signature"],
+        ],
+        height_ratios=[1, 1.2, 1.8, 1],
+    )
+    panels["stem"].sharex(panels["pressure"])
+    panels["sigma"].sharex(panels["coulomb"])
+    draw_record(panels["pressure"], panels["stem"], cases)
+    draw_coulomb_sweep(panels["coulomb"], cases)
+    draw_sigma_sweep(panels["sigma"], cases)
+    draw_signature(panels["signature"], cases)
+    if len(cases) > 1:
+        panels["signature"].legend(loc="upper left", frameon=False)
+    dress(panels.values())
+    return figure
+
+
+def identification_figure(
+    recording: Recording, valve: Valve, assessment: Assessment, drive: DriveScale = PRESSURE
+) -> Figure:
+    """Draw a recording and its identification, each number with its verdict."""
+    verdict = _verdict(assessment, valve)
+    if isinstance(assessment, SweepAssessment):
+        return friction_figure([Case.of("recording", recording, assessment, drive)], verdict)
+    if isinstance(assessment, ForceBalanceAssessment):
+        return signature_figure(recording, valve, assessment, verdict, drive)
+    raise NotImplementedError(type(assessment))
+
+
+def _verdict(assessment: Assessment, valve: Valve) -> str:
+    told = [
+        _told(symbol, assessment.parameters[name], ASSESSED_UNITS[name])
+        for symbol, name in (
+            ("F_c", "coulomb_friction"),
+            ("F_v", "viscous_friction"),
+            ("k", "spring_constant"),
+        )
+    ]
+    share = dead_band(assessment, valve)
+    if math.isfinite(share):
+        told.append(f"dead band {percentage(share)} of travel")
+    if math.isfinite(assessment.rms):
+        told.append(f"fit {100 * assessment.fit:.2f} %")
+    return "; ".join((*told, *assessment.warnings))
+
+
+def _told(symbol: str, parameter: AssessedParameter, unit: str) -> str:
+    if math.isnan(parameter.value):
+        return f"{symbol} {parameter.verdict.value}"
+    return f"{symbol} {parameter.value:.4g} {unit} ({parameter.verdict.value})"

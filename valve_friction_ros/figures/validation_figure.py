@@ -1,0 +1,55 @@
+"""The figure of a validation: measured and simulated stem, what lies between, and the pressure."""
+
+import math
+
+from matplotlib.figure import Figure
+
+from valve_friction_ros.figures.case import PRESSURE, DriveScale
+from valve_friction_ros.figures.page import dress, titled_figure
+from valve_friction_ros.figures.panels import COLOURS, draw_pressure, draw_stem, thinned
+from valve_friction_ros.health import percentage
+from valve_friction_ros.identification import Validation
+from valve_friction_ros.model import Valve
+
+__all__ = ["validation_figure"]
+
+
+def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = PRESSURE) -> Figure:
+    """Draw measured and simulated stem over the time, the residual, and the pressure.
+
+    Parameters
+    ----------
+    validation : Validation
+        Record and simulated stem.
+    valve : Valve
+        Tells the travel, for the title.
+    drive : DriveScale
+        How the pressure is shown.
+
+    Returns
+    -------
+    Figure
+        To be saved or shown; no global state of matplotlib is touched.
+    """
+    share = valve.share_of_travel(validation.rms)
+    of_travel = f" ({percentage(share)} of travel)" if math.isfinite(share) else ""
+    figure = titled_figure(
+        f"fit {100 * validation.fit:.2f} %; rms {validation.rms * 1e6:.3g} µm{of_travel}; "
+        f"largest error {validation.maximum_error * 1e6:.3g} µm"
+    )
+    panels = figure.subplot_mosaic(
+        [["stem"], ["residual"], ["pressure"]], height_ratios=[2, 1, 1], sharex=True
+    )
+    recording = validation.recording
+    some = thinned(len(recording))
+    time = recording.time[some]
+    draw_stem(panels["stem"], recording, validation.simulated)
+    panels["stem"].set_title("stem (dotted: simulated)", loc="right", fontsize="small")
+    panels["residual"].plot(time, validation.residual[some] * 1e3, color=COLOURS[1], lw=0.9)
+    panels["residual"].set_ylabel("simulated −\nmeasured [mm]")
+    draw_pressure(panels["pressure"], recording, drive, COLOURS[2])
+    for name in ("stem", "residual"):
+        panels[name].set_xlabel("")
+    panels["pressure"].set_xlabel("time [s]")
+    dress(panels.values())
+    return figure

@@ -1,0 +1,235 @@
+"""From an estimate to a verdict: whether friction has grown or collapsed, and what it costs."""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
+
+from valve_friction_ros.health.baseline import Baseline, Ratio
+from valve_friction_ros.identification import AssessedParameter, Assessment
+from valve_friction_ros.model.valve import Valve
+
+__all__ = [
+    "Diagnosis",
+    "FrictionLimits",
+    "Level",
+    "StatusSignal",
+    "dead_band",
+    "diagnose",
+    "percentage",
+]
+
+
+class Level(IntEnum):
+    """Severity, numbered as in diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+class StatusSignal(Enum):
+    """Status signals of NAMUR NE 107."""
+
+    GOOD = ""
+    FAILURE = "F"
+    CHECK_FUNCTION = "C"
+    OUT_OF_SPECIFICATION = "S"
+    MAINTENANCE_REQUIRED = "M"
+
+
+@dataclass(frozen=True)
+class FrictionLimits:
+    """Bounds of the Coulomb friction, as ratios to its baseline.
+
+    A bound counts as passed only when the whole interval of the ratio lies beyond it.
+
+    Attributes
+    ----------
+    warn_ratio : float
+        From here on the valve is worth maintenance.
+    error_ratio : float
+        From here on friction is excessive.
+    low_ratio : float
+        From here down friction has collapsed: the packing is worn and may leak.
+
+    Raises
+    ------
+    ValueError
+        Unless 0 < low_ratio < 1 < warn_ratio < error_ratio.
+    """
+
+    warn_ratio: float = 1.25
+    error_ratio: float = 2.0
+    low_ratio: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Refuse limits that are out of order."""
+        if not 0 < self.low_ratio < 1 < self.warn_ratio < self.error_ratio:
+            raise ValueError(
+                "limits must obey 0 < low_ratio < 1 < warn_ratio < error_ratio, got "
+                f"low_ratio {self.low_ratio:g}, warn_ratio {self.warn_ratio:g}, "
+                f"error_ratio {self.error_ratio:g}"
+            )
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict on the friction of a valve.
+
+    Attributes
+    ----------
+    level : Level
+        Severity.
+    status_signal : StatusSignal
+        The same in the words of NE 107.
+    message : str
+        One sentence for people, with the consequence.
+    ratio : Ratio or None
+        Coulomb friction over its baseline, with its interval; None without a baseline or without
+        an identifiable friction.
+    """
+
+    level: Level
+    status_signal: StatusSignal
+    message: str
+    ratio: Ratio | None
+
+
+def dead_band(assessment: Assessment, valve: Valve) -> float:
+    """Return the dead band of the stem as a share of the travel.
+
+    After a move the sliding friction F_c still holds the spring off balance; to move back, the
+    actuator must undo it and overcome F_s: the pressure that does so would move a frictionless
+    stem by (F_c + F_s)/k. Where no slip jump was seen, F_s is F_c. The result is nan without a
+    spring, without travel stops, or where F_c or k is not identifiable.
+    """
+    values = assessment.values
+    if not values["spring_constant"] > 0:
+        return float("nan")
+    coulomb_friction, static_friction = values["coulomb_friction"], values["static_friction"]
+    if math.isnan(static_friction):
+        static_friction = coulomb_friction
+    force = coulomb_friction + static_friction
+    return valve.share_of_travel(force / values["spring_constant"])
+
+
+def percentage(share: float) -> str:
+    """Write a share in percent for people: two digits, or whole percents from 100 % on."""
+    percent = 100 * share
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
+
+
+def _consequence(assessment: Assessment, valve: Valve) -> str:
+    share = dead_band(assessment, valve)
+    if math.isnan(share):
+        friction = assessment.parameters["coulomb_friction"]
+        return f"coulomb friction {friction.value:.4g} ± {friction.half_width:.2g} N"
+    return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
+
+
+def _figures(ratio: Ratio) -> str:
+    return f"{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})"
+
+
+def diagnose(
+    assessment: Assessment,
+    valve: Valve,
+    baseline: Baseline | None = None,
+    limits: FrictionLimits | None = None,
+) -> Diagnosis:
+    """Compare the identified Coulomb friction with its baseline.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        The latest identification.
+    valve : Valve
+        Tells the travel, for the dead band.
+    baseline : Baseline, optional
+        Coulomb friction of the healthy valve.
+    limits : FrictionLimits, optional
+        Bounds of the ratio.
+
+    Returns
+    -------
+    Diagnosis
+        A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
+        uncertain estimate raises no alarm: an unchanged valve would have to be misjudged by the
+        whole distance to the bound. A friction too small to be told has collapsed where even the
+        largest that it can be lies below the low bound. A valve that the model does not describe
+        is WARN at least.
+    """
+    limits = limits or FrictionLimits()
+    friction = assessment.parameters["coulomb_friction"]
+    if math.isnan(friction.value):
+        message = f"coulomb friction is not identifiable: {friction.reason}"
+        verdict = Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
+        if baseline is not None and _has_vanished(friction, baseline, limits):
+            message = (
+                "friction collapsed, the packing may leak: coulomb friction is too small to be "
+                f"told, {friction.magnitude_bound:.2g} N at the most; its baseline is "
+                f"{baseline.coulomb_friction:.4g} N"
+            )
+            verdict = Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, message, None)
+        return _with_model_doubt(verdict, assessment)
+    if friction.value < 0:
+        message = (
+            f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, which cannot "
+            "be: check the direction of both signals"
+        )
+        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
+    effect = _consequence(assessment, valve)
+    if baseline is None:
+        verdict = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
+    else:
+        verdict = _against(baseline.compared_with(friction), limits, effect)
+    return _with_model_doubt(verdict, assessment)
+
+
+def _has_vanished(friction: AssessedParameter, baseline: Baseline, limits: FrictionLimits) -> bool:
+    """Tell whether a friction too small for a number of its own is surely below the low limit."""
+    least = baseline.coulomb_friction - baseline.half_width
+    return friction.magnitude_bound <= limits.low_ratio * least
+
+
+def _with_model_doubt(verdict: Diagnosis, assessment: Assessment) -> Diagnosis:
+    misfit = assessment.misfit
+    if misfit is None or misfit.describes:
+        return verdict
+    doubt = (
+        "the Karnopp model does not describe this valve "
+        f"({misfit.systematic * 1e6:.3g} µm of misfit); {verdict.message}"
+    )
+    if verdict.level >= Level.WARN:
+        return replace(verdict, message=doubt)
+    return replace(
+        verdict, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=doubt
+    )
+
+
+def _against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
+    compared = f"coulomb friction is {_figures(ratio)} times its baseline"
+    if ratio.low >= limits.error_ratio:
+        return Diagnosis(
+            Level.ERROR, StatusSignal.FAILURE, f"excess friction: {compared}; {effect}", ratio
+        )
+    if ratio.high <= limits.low_ratio:
+        return Diagnosis(
+            Level.ERROR,
+            StatusSignal.OUT_OF_SPECIFICATION,
+            f"friction collapsed, the packing may leak: {compared}; {effect}",
+            ratio,
+        )
+    if ratio.low >= limits.warn_ratio:
+        return Diagnosis(
+            Level.WARN,
+            StatusSignal.MAINTENANCE_REQUIRED,
+            f"friction has grown: {compared}; {effect}",
+            ratio,
+        )
+    words = "friction normal"
+    if ratio.value >= limits.warn_ratio:
+        words = "friction perhaps grown"
+    elif ratio.value <= limits.low_ratio:
+        words = "friction perhaps collapsed"
+    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {compared}; {effect}", ratio)

@@ -1,0 +1,184 @@
+"""The monitor of one valve, without any ROS: gather, identify, remember, judge."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    Level,
+    StatusSignal,
+    diagnose,
+)
+from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
+    Assessment,
+    IdentificationSettings,
+    RefusalError,
+    method_named,
+)
+from valve_friction_ros.model.checks import require_positive
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
+
+__all__ = ["FrictionMonitor", "MonitorSettings", "identify_snapshot"]
+
+
+@dataclass(frozen=True)
+class MonitorSettings:
+    """What a monitor needs to know about its valve and its task.
+
+    Attributes
+    ----------
+    valve : Valve
+        Geometry and sensor range.
+    identification : IdentificationSettings
+        How records are identified.
+    method : str
+        Name of the method of identification, among `METHODS`.
+    derivative_window : int or None
+        Derivative window of the assessment, samples; None: each record's noise chooses it.
+    limits : FrictionLimits
+        When friction is out of bounds.
+    baseline : Baseline or None
+        Friction of the healthy valve, where it is known beforehand.
+    window : float
+        Length of the record that is kept and identified, s.
+    """
+
+    valve: Valve
+    identification: IdentificationSettings = field(default_factory=IdentificationSettings)
+    method: str = DEFAULT_METHOD
+    derivative_window: int | None = None
+    limits: FrictionLimits = field(default_factory=FrictionLimits)
+    baseline: Baseline | None = None
+    window: float = 60.0
+
+    def __post_init__(self) -> None:
+        """Refuse windows that cannot be, and methods that there are not."""
+        method_named(self.method)
+        require_positive("window", self.window)
+        if self.derivative_window is not None:
+            replace(self.identification, window=self.derivative_window)
+
+
+def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Assessment:
+    """Identify a snapshot of the buffer; needs nothing of the monitor, so any thread may run it.
+
+    Raises
+    ------
+    RefusalError
+        With the cause, and why the buffer was emptied if that is recent.
+    """
+    try:
+        return method_named(settings.method)(
+            snapshot.recording(),
+            settings.valve,
+            settings.identification,
+            settings.derivative_window,
+        )
+    except RefusalError as refusal:
+        if snapshot.cleared_because is None:
+            raise
+        raise RefusalError(
+            f"{refusal} (the buffer was cleared: {snapshot.cleared_because})"
+        ) from refusal
+
+
+class FrictionMonitor:
+    """Watches one valve.
+
+    Parameters
+    ----------
+    settings : MonitorSettings
+        Valve, identification, limits, baseline and window.
+    """
+
+    def __init__(self, settings: MonitorSettings) -> None:
+        self._settings = settings
+        self._baseline = settings.baseline
+        self._assessment: Assessment | None = None
+        self._stamp: int | None = None
+        self._refusal: str | None = None
+        self.buffer = RecordBuffer(settings.valve, settings.window)
+
+    @property
+    def settings(self) -> MonitorSettings:
+        """The settings in force."""
+        return self._settings
+
+    @property
+    def baseline(self) -> Baseline | None:
+        """Friction to compare with."""
+        return self._baseline
+
+    @property
+    def assessment(self) -> Assessment | None:
+        """The latest assessment; a refusal leaves the one before it in place."""
+        return self._assessment
+
+    @property
+    def stamp(self) -> int | None:
+        """When the latest assessment was made, ns."""
+        return self._stamp
+
+    @property
+    def refusal(self) -> str | None:
+        """Why the latest identification was refused; None if it was not."""
+        return self._refusal
+
+    def change_settings(self, settings: MonitorSettings) -> None:
+        """Put new settings in force; a new window or valve empties the buffer."""
+        if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
+            self.buffer = RecordBuffer(settings.valve, settings.window)
+            self.buffer.clear("valve or window parameters were changed")
+        if settings.baseline != self._settings.baseline:
+            self._baseline = settings.baseline
+        self._settings = settings
+
+    def accept(self, assessment: Assessment, stamp: int) -> None:
+        """Remember an assessment made at `stamp` (ns)."""
+        self._assessment, self._stamp, self._refusal = assessment, stamp, None
+
+    def refuse(self, refusal: RefusalError) -> None:
+        """Remember that an identification was refused."""
+        self._refusal = str(refusal)
+
+    def set_baseline(self) -> Baseline:
+        """Make the latest estimate the baseline and return it.
+
+        Raises
+        ------
+        RefusalError
+            If there is no estimate, or its Coulomb friction is not identifiable or not above
+            zero.
+        """
+        if self._assessment is None:
+            raise RefusalError("there is no estimate to take as baseline: identify first")
+        friction = self._assessment.parameters["coulomb_friction"]
+        if math.isnan(friction.value):
+            raise RefusalError(
+                f"coulomb friction is not identifiable, so it is no baseline: {friction.reason}"
+            )
+        if friction.value <= 0:
+            raise RefusalError(f"a coulomb friction of {friction.value:.4g} N is no baseline")
+        self._baseline = Baseline(friction.value, friction.half_width)
+        return self._baseline
+
+    def take_baseline(self, baseline: Baseline) -> None:
+        """Compare with this baseline from now on."""
+        self._baseline = baseline
+
+    def diagnosis(self) -> Diagnosis:
+        """Judge the latest estimate, also after a refusal; OK while there is none."""
+        if self._assessment is None:
+            reason = self._refusal or "nothing has been identified yet"
+            return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
+        verdict = diagnose(
+            self._assessment, self._settings.valve, self._baseline, self._settings.limits
+        )
+        if self._refusal is None:
+            return verdict
+        message = f"the latest identification was refused: {self._refusal}; before: "
+        return replace(verdict, message=message + verdict.message)

@@ -1,0 +1,240 @@
+"""What the history keeps: identifications of a valve, and its baselines."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from valve_friction_ros import __version__
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
+from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.streams.record_buffer import Snapshot
+
+__all__ = [
+    "Fit",
+    "FrictionPoint",
+    "HistoryEntry",
+    "KeptBaseline",
+    "KeptValve",
+    "Span",
+    "entry_of",
+    "settings_text",
+    "span_of",
+]
+
+
+class KeptValve(NamedTuple):
+    """A valve: the fully qualified name of its identifier, and its tag in the plant."""
+
+    name: str
+    tag: str
+
+
+class Span(NamedTuple):
+    """First and last stamp of a record, ns."""
+
+    begin: int
+    end: int
+
+
+class Fit(NamedTuple):
+    """How well a model reproduces its record; nan where that cannot be told.
+
+    Attributes
+    ----------
+    share : float
+        Share of the stem's motion (of the force, without a spring) that is reproduced.
+    rms : float
+        Distance between simulated and measured stem, m.
+    systematic : float
+        What of it is not noise, m.
+    """
+
+    share: float = math.nan
+    rms: float = math.nan
+    systematic: float = math.nan
+
+
+class FrictionPoint(NamedTuple):
+    """One Coulomb friction of a trend.
+
+    Attributes
+    ----------
+    time : int
+        When it was identified, ns since 1970 (UTC).
+    value, half_width : float
+        F_c, and half the width of its 95 % interval, N.
+    """
+
+    time: int
+    value: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class KeptBaseline:
+    """A baseline and where it comes from.
+
+    Attributes
+    ----------
+    baseline : Baseline
+        The Coulomb friction of the healthy valve.
+    time : int
+        When it was set, ns since 1970 (UTC).
+    since : int
+        When the estimate that it was taken from was identified, ns: with it a new trend begins.
+    """
+
+    baseline: Baseline
+    time: int
+    since: int
+
+
+@dataclass(frozen=True)
+class HistoryEntry:
+    """One identification, successful or refused.
+
+    Attributes
+    ----------
+    time : int
+        When it ended, ns since 1970 (UTC) by the node's clock.
+    valve : KeptValve
+        Whose it is.
+    span : Span or None
+        Its record; None if nothing was gathered.
+    method : str
+        How it was identified.
+    diagnosis : Diagnosis
+        The verdict on the valve that the operator was shown.
+    limits : FrictionLimits
+        The bounds in force.
+    baseline : Baseline or None
+        The baseline in force.
+    settings : str
+        Settings of the identification, an object of JSON (`settings_text`).
+    parameters : mapping of str to AssessedParameter
+        What was identified; empty for a refusal.
+    fit : Fit
+        How well the model reproduces the record.
+    warnings : tuple of str
+        What a reader of the numbers should know.
+    refusal : str
+        Why it was refused; empty for a success.
+    version : str
+        Version of this software.
+    """
+
+    time: int
+    valve: KeptValve
+    span: Span | None
+    method: str
+    diagnosis: Diagnosis
+    limits: FrictionLimits
+    baseline: Baseline | None
+    settings: str
+    parameters: Mapping[str, AssessedParameter] = field(default_factory=dict)
+    fit: Fit = field(default_factory=Fit)
+    warnings: tuple[str, ...] = ()
+    refusal: str = ""
+    version: str = __version__
+
+    def __post_init__(self) -> None:
+        """Refuse an entry that is neither a success nor a refusal, or both."""
+        if bool(self.parameters) == bool(self.refusal):
+            raise ValueError("an entry holds either parameters or the reason of a refusal")
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+
+    @property
+    def friction(self) -> AssessedParameter | None:
+        """The Coulomb friction; None for a refusal."""
+        return self.parameters.get("coulomb_friction")
+
+    def point(self) -> FrictionPoint | None:
+        """Return what this entry adds to a trend.
+
+        Only an identified or weak friction does: one that is fixed was not measured, one that is
+        not identifiable has no value.
+        """
+        one = self.friction
+        if one is None or one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
+            return None
+        return FrictionPoint(self.time, one.value, one.half_width)
+
+
+def span_of(snapshot: Snapshot) -> Span | None:
+    """First and last stamp of what a snapshot holds of either signal."""
+    ends = [
+        (int(signal.stamps[0]), int(signal.stamps[-1]))
+        for signal in (snapshot.pressure, snapshot.position)
+        if signal.stamps.size
+    ]
+    return Span(min(ends)[0], max(end for _, end in ends)) if ends else None
+
+
+def _plain(value: object) -> Any:
+    """Return a value as JSON knows it; what is not finite is null."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def settings_text(settings: MonitorSettings) -> str:
+    """Write what an identification was asked to do as JSON, the same for the same settings."""
+    content = {
+        "valve": vars(settings.valve),
+        "identification": vars(settings.identification),
+        "derivative_window": settings.derivative_window,
+        "window": settings.window,
+    }
+    return json.dumps(_plain(content), sort_keys=True, allow_nan=False)
+
+
+def entry_of(
+    monitor: FrictionMonitor,
+    valve: KeptValve,
+    snapshot: Snapshot,
+    settings: MonitorSettings,
+    time: int,
+) -> HistoryEntry:
+    """Describe the identification that a monitor has just accepted or refused.
+
+    Parameters
+    ----------
+    monitor : FrictionMonitor
+        Holds the result and the verdict.
+    valve : KeptValve
+        The valve.
+    snapshot : Snapshot
+        What was identified.
+    settings : MonitorSettings
+        How it was; those in force may have changed since.
+    time : int
+        Now, ns.
+    """
+    assessment = monitor.assessment
+    outcome: dict[str, Any] = {"refusal": monitor.refusal}
+    if monitor.refusal is None and assessment is not None:
+        outcome = {
+            "parameters": assessment.parameters,
+            "fit": Fit(
+                assessment.fit,
+                assessment.rms,
+                math.nan if assessment.misfit is None else assessment.misfit.systematic,
+            ),
+            "warnings": assessment.warnings,
+        }
+    return HistoryEntry(
+        time=time,
+        valve=valve,
+        span=span_of(snapshot),
+        method=settings.method,
+        diagnosis=monitor.diagnosis(),
+        limits=monitor.settings.limits,
+        baseline=monitor.baseline,
+        settings=settings_text(settings),
+        **outcome,
+    )

@@ -1,0 +1,134 @@
+"""The history of a plant's valves: one file, that several processes write to at once."""
+
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.history.entry import (
+    FrictionPoint,
+    HistoryEntry,
+    KeptBaseline,
+    KeptValve,
+)
+from valve_friction_ros.history.rows import (
+    entries_in,
+    insert_baseline,
+    insert_entry,
+    valve_id,
+)
+from valve_friction_ros.history.schema import HistoryError, reading, writing
+from valve_friction_ros.identification import Verdict
+
+__all__ = ["HistoryError", "HistoryFile"]
+
+_DAY = 86_400_000_000_000
+_END_OF_TIME = 2**63 - 1
+"""Largest whole number that SQLite keeps."""
+
+
+@dataclass(frozen=True)
+class HistoryFile:
+    """A history in SQLite; every method opens it anew, so it may be moved, mended or missing.
+
+    Each change is one transaction: a process that is killed leaves it done or not done, and the
+    file whole. All methods raise HistoryError if the file cannot be read or written.
+
+    Attributes
+    ----------
+    path : Path
+        The file. All processes that write to it must run on one machine.
+    """
+
+    path: Path
+
+    def prepare(self) -> None:
+        """Make the file if it is not there, and see whether it can be written."""
+        with writing(self.path):
+            pass
+
+    def add(self, entry: HistoryEntry, days: float = 0.0) -> None:
+        """Add an identification, and forget those of its valve that are `days` older; 0: none.
+
+        The newest baseline stays, however old it is.
+        """
+        with writing(self.path) as connection:
+            valve = valve_id(connection, entry.valve)
+            insert_entry(connection, valve, entry)
+            if days > 0:
+                _forget(connection, valve, entry.time - round(days * _DAY))
+
+    def set_baseline(self, valve: KeptValve, kept: KeptBaseline) -> None:
+        """Make this the baseline of a valve."""
+        with writing(self.path) as connection:
+            insert_baseline(connection, valve_id(connection, valve), kept)
+
+    def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
+        """Return the newest baseline set before `until` (ns) for the valve of this name, if any."""
+        with reading(self.path) as connection:
+            row = connection.execute(
+                "SELECT coulomb_friction, half_width, time_ns, since_ns FROM baseline "
+                "JOIN valve ON valve.id = valve_id WHERE name = ? AND time_ns < ? "
+                "ORDER BY baseline.id DESC",
+                (valve, until),
+            ).fetchone()
+        return None if row is None else KeptBaseline(Baseline(*row[:2]), *row[2:])
+
+    def points(self, valve: str, method: str, since: int = 0) -> tuple[FrictionPoint, ...]:
+        """Return a valve's identified and weak Coulomb frictions of one method, from `since` on."""
+        with reading(self.path) as connection:
+            rows = connection.execute(
+                "SELECT time_ns, value, half_width FROM identification "
+                "JOIN valve ON valve.id = valve_id "
+                "JOIN parameter ON identification_id = identification.id "
+                "WHERE valve.name = ? AND method = ? AND time_ns >= ? "
+                "AND parameter.name = 'coulomb_friction' AND verdict IN (?, ?) "
+                "AND value IS NOT NULL AND half_width BETWEEN 0 AND 1e300 "
+                "ORDER BY time_ns, identification.id",
+                (valve, method, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
+            ).fetchall()
+        return tuple(FrictionPoint(*row) for row in rows)
+
+    def valves(self) -> tuple[KeptValve, ...]:
+        """Return all valves, by name."""
+        with reading(self.path) as connection:
+            rows = connection.execute("SELECT name, tag FROM valve ORDER BY name").fetchall()
+        return tuple(KeptValve(*row) for row in rows)
+
+    def entries(
+        self,
+        valves: Sequence[str] | None = None,
+        since: int = -_END_OF_TIME,
+        until: int = _END_OF_TIME,
+    ) -> tuple[HistoryEntry, ...]:
+        """Return identifications, oldest first.
+
+        Parameters
+        ----------
+        valves : sequence of str, optional
+            Names of the valves that are wanted; by default all.
+        since, until : int, optional
+            First time, and first time no longer, ns since 1970 (UTC).
+        """
+        with reading(self.path) as connection:
+            try:
+                return entries_in(connection, valves, since, until)
+            except ValueError as error:
+                raise HistoryError(f"{self.path}: a row holds no result: {error}") from None
+
+
+def _forget(connection: sqlite3.Connection, valve: int, before: int) -> None:
+    """Delete what a valve has from before a time (ns), with settings that nothing refers to."""
+    done = connection.execute(
+        "DELETE FROM identification WHERE valve_id = ? AND time_ns < ?", (valve, before)
+    )
+    if done.rowcount:
+        connection.execute(
+            "DELETE FROM settings WHERE id NOT IN (SELECT settings_id FROM identification)"
+        )
+    connection.execute(
+        "DELETE FROM baseline WHERE valve_id = ? AND time_ns < ? "
+        "AND id < (SELECT max(id) FROM baseline WHERE valve_id = ?)",
+        (valve, before, valve),
+    )

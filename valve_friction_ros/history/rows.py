@@ -1,0 +1,182 @@
+"""Between the history's value types and rows of its tables."""
+
+import math
+import sqlite3
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+
+from valve_friction_ros.health.baseline import Baseline, Ratio
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Level, StatusSignal
+from valve_friction_ros.history.entry import (
+    Fit,
+    HistoryEntry,
+    KeptBaseline,
+    KeptValve,
+    Span,
+)
+from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Verdict
+
+__all__ = ["entries_in", "insert_baseline", "insert_entry", "valve_id"]
+
+
+def valve_id(connection: sqlite3.Connection, valve: KeptValve) -> int:
+    """Return the row of a valve, with its tag as it is now."""
+    connection.execute(
+        "INSERT INTO valve (name, tag) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET "
+        "tag = excluded.tag WHERE tag != excluded.tag",
+        valve,
+    )
+    (row,) = connection.execute("SELECT id FROM valve WHERE name = ?", valve[:1]).fetchone()
+    return int(row)
+
+
+def _settings_id(connection: sqlite3.Connection, text: str) -> int:
+    connection.execute("INSERT INTO settings (content) VALUES (?) ON CONFLICT DO NOTHING", (text,))
+    (row,) = connection.execute("SELECT id FROM settings WHERE content = ?", (text,)).fetchone()
+    return int(row)
+
+
+def _insert(connection: sqlite3.Connection, table: str, **values: object) -> int:
+    names, marks = ", ".join(values), ", ".join("?" * len(values))
+    statement = f"INSERT INTO {table} ({names}) VALUES ({marks})"  # noqa: S608 - no user's text
+    row = connection.execute(statement, tuple(values.values())).lastrowid
+    return int(row or 0)
+
+
+def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry) -> None:
+    """Add an identification of a valve's row. SQLite keeps nan as NULL."""
+    diagnosis, baseline = entry.diagnosis, entry.baseline
+    begin, end = entry.span or (None, None)
+    ratio, low, high = diagnosis.ratio or (None, None, None)
+    identification = _insert(
+        connection,
+        "identification",
+        valve_id=valve,
+        time_ns=entry.time,
+        begin_ns=begin,
+        end_ns=end,
+        method=entry.method,
+        refusal=entry.refusal or None,
+        fit=entry.fit.share,
+        rms=entry.fit.rms,
+        systematic_misfit=entry.fit.systematic,
+        warnings="\n".join(entry.warnings),
+        level=int(diagnosis.level),
+        status_signal=diagnosis.status_signal.value,
+        message=diagnosis.message,
+        ratio=ratio,
+        ratio_low=low,
+        ratio_high=high,
+        baseline=None if baseline is None else baseline.coulomb_friction,
+        baseline_half_width=None if baseline is None else baseline.half_width,
+        warn_ratio=entry.limits.warn_ratio,
+        error_ratio=entry.limits.error_ratio,
+        low_ratio=entry.limits.low_ratio,
+        settings_id=_settings_id(connection, entry.settings),
+        software_version=entry.version,
+    )
+    for one in entry.parameters.values():
+        _insert(
+            connection,
+            "parameter",
+            identification_id=identification,
+            name=one.name,
+            value=one.value,
+            standard_error=one.standard_error,
+            half_width=one.half_width,
+            verdict=one.verdict.value,
+            reason=one.reason,
+        )
+
+
+def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseline) -> None:
+    """Add a baseline of a valve's row."""
+    _insert(
+        connection,
+        "baseline",
+        valve_id=valve,
+        time_ns=kept.time,
+        since_ns=kept.since,
+        coulomb_friction=kept.baseline.coulomb_friction,
+        half_width=kept.baseline.half_width,
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _place(parameter: AssessedParameter) -> int:
+    """Place of a parameter in an assessment."""
+    names = [*ASSESSED_UNITS]
+    return names.index(parameter.name) if parameter.name in names else len(names)
+
+
+def _parameter(row: sqlite3.Row) -> AssessedParameter:
+    return AssessedParameter(
+        row["name"],
+        _number(row["value"]),
+        _number(row["standard_error"]),
+        _number(row["half_width"]),
+        Verdict(row["verdict"]),
+        row["reason"],
+    )
+
+
+def _entry(row: sqlite3.Row, parameters: Sequence[AssessedParameter]) -> HistoryEntry:
+    ratio = Ratio(*(_number(row[name]) for name in ("ratio", "ratio_low", "ratio_high")))
+    baseline = row["baseline"]
+    return HistoryEntry(
+        time=row["time_ns"],
+        valve=KeptValve(row["name"], row["tag"]),
+        span=None if row["begin_ns"] is None else Span(row["begin_ns"], row["end_ns"]),
+        method=row["method"],
+        diagnosis=Diagnosis(
+            Level(row["level"]),
+            StatusSignal(row["status_signal"]),
+            row["message"],
+            None if row["ratio"] is None else ratio,
+        ),
+        limits=FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"]),
+        baseline=None if baseline is None else Baseline(baseline, row["baseline_half_width"]),
+        settings=row["content"],
+        parameters={one.name: one for one in parameters},
+        fit=Fit(*(_number(row[name]) for name in ("fit", "rms", "systematic_misfit"))),
+        warnings=tuple(filter(None, row["warnings"].split("\n"))),
+        refusal=row["refusal"] or "",
+        version=row["software_version"],
+    )
+
+
+def entries_in(
+    connection: sqlite3.Connection, valves: Sequence[str] | None, since: int, until: int
+) -> tuple[HistoryEntry, ...]:
+    """Read identifications, oldest first; see `HistoryFile.entries`."""
+    names = [name for (name,) in connection.execute("SELECT name FROM valve")]
+    wanted = names if valves is None else valves
+    connection.row_factory = sqlite3.Row
+    found = [
+        entry for valve in wanted for entry in _entries_of_valve(connection, (valve, since, until))
+    ]
+    return tuple(sorted(found, key=lambda entry: entry.time))
+
+
+def _entries_of_valve(
+    connection: sqlite3.Connection, choice: tuple[str, int, int]
+) -> Iterator[HistoryEntry]:
+    parameters: defaultdict[int, list[AssessedParameter]] = defaultdict(list)
+    for row in connection.execute(
+        "SELECT parameter.* FROM parameter JOIN identification ON identification.id = "
+        "identification_id JOIN valve ON valve.id = valve_id "
+        "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ?",
+        choice,
+    ):
+        parameters[row["identification_id"]].append(_parameter(row))
+    for row in connection.execute(
+        "SELECT identification.*, valve.name, valve.tag, settings.content FROM identification "
+        "JOIN settings ON settings.id = settings_id JOIN valve ON valve.id = valve_id "
+        "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ? "
+        "ORDER BY time_ns, identification.id",
+        choice,
+    ):
+        yield _entry(row, sorted(parameters[row["id"]], key=_place))

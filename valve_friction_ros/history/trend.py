@@ -1,0 +1,219 @@
+"""How the Coulomb friction of a valve drifts, and when it is expected to cross a limit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import FrictionLimits
+from valve_friction_ros.history.entry import FrictionPoint
+from valve_friction_ros.history.scattered_line import LEAST_ESTIMATES, ScatteredLine, fit_line
+from valve_friction_ros.model.checks import require_non_negative
+
+__all__ = ["MONTH", "Crossing", "Limit", "Trend", "trend_of"]
+
+DAY = 86_400e9
+MONTH = 365.25 / 12 * DAY
+"""Nanoseconds of a month."""
+
+_NORMAL = 1.959964
+"""Standard errors of a half width: that of a large sample, so that few strokes weigh less."""
+
+_HORIZON = 2.0
+"""Spans of the estimates by which a crossing may lie ahead of the last one."""
+
+_OUTLIER = 0.001
+"""Chance that a record without outliers is said to have one."""
+
+_MOST_OUTLIERS = 0.1
+"""Share of the days that may be left out as outliers."""
+
+
+class Limit(Enum):
+    """A bound of the Coulomb friction, by the name of its ratio."""
+
+    WARN = "warn_ratio"
+    ERROR = "error_ratio"
+    LOW = "low_ratio"
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """When a limit is expected to be crossed.
+
+    Attributes
+    ----------
+    limit : Limit
+        The next limit on the way.
+    level : float
+        Its Coulomb friction, N.
+    time, earliest, latest : int
+        Expected time and the 95 % interval of it, ns since 1970 (UTC).
+    """
+
+    limit: Limit
+    level: float
+    time: int
+    earliest: int
+    latest: int
+
+
+@dataclass(frozen=True)
+class Trend:
+    """The drift of the Coulomb friction.
+
+    Attributes
+    ----------
+    line : ScatteredLine
+        Through the days, N over ns since `begin`.
+    days : int
+        Days that the line goes through.
+    outliers : int
+        Days that are left out.
+    begin, end : int
+        First and last estimate, ns since 1970 (UTC).
+    crossing : Crossing or None
+        None without a significant drift, without a baseline, or where it lies too far ahead.
+    """
+
+    line: ScatteredLine
+    days: int
+    outliers: int
+    begin: int
+    end: int
+    crossing: Crossing | None
+
+    @property
+    def drift(self) -> float:
+        """Drift, N a month."""
+        return self.line.slope * MONTH
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of its 95 % interval, N a month."""
+        return self.line.slope_half_width * MONTH
+
+    @property
+    def is_significant(self) -> bool:
+        """Tell whether the interval of the drift excludes zero."""
+        return abs(self.drift) > self.half_width
+
+
+class _Days(NamedTuple):
+    """Times (ns since the first point), frictions and standard errors, a day each."""
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    errors: NDArray[np.float64]
+
+    def without(self, index: int) -> "_Days":
+        return _Days(*(np.delete(one, index) for one in self))
+
+
+def _days(points: Sequence[FrictionPoint]) -> _Days:
+    """Let the points of a day, in UTC, count as one: their weighted mean.
+
+    The record of one identification overlaps that of the next, and both saw the same weather.
+    """
+    times = np.array([point.time for point in points], dtype=np.int64)
+    values = np.array([point.value for point in points])
+    least = 1e-9 * np.abs(values).max()
+    errors = np.maximum(np.array([point.half_width for point in points]) / _NORMAL, least)
+    _, day = np.unique(times // int(DAY), return_inverse=True)
+    weights = errors**-2
+    total = np.bincount(day, weights)
+    since_first = (times - times.min()).astype(np.float64)
+    means = [np.bincount(day, weights * one) / total for one in (since_first, values)]
+    return _Days(means[0], means[1], np.sqrt(1.0 / total))
+
+
+def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
+    """Fit a line, and leave out days that it cannot be expected to have produced.
+
+    The day with the largest residual is compared with what the others predict for it: it is left
+    out where a day without fault would lie as far off in 0.1 % of such records (Bonferroni).
+    """
+    line, outliers = fit_line(*days), 0
+    for _ in range(int(_MOST_OUTLIERS * days.times.size)):
+        residual = np.abs(days.values - line.at(days.times))
+        worst = int(np.argmax(residual / np.hypot(days.errors, line.scatter)))
+        rest = days.without(worst)
+        others = fit_line(*rest)
+        time, error = days.times[worst], np.hypot(days.errors[worst], others.scatter)
+        predicted = np.hypot(error, others.half_width(time) / others.quantile)
+        surprise = abs(days.values[worst] - others.at(time)) / predicted
+        if surprise <= stdtrit(others.freedom, 1 - _OUTLIER / (2 * days.times.size)):
+            break
+        days, line, outliers = rest, others, outliers + 1
+    return line, outliers
+
+
+def _crossing(
+    line: ScatteredLine, begin: int, end: int, baseline: Baseline, limits: FrictionLimits
+) -> Crossing | None:
+    """Tell when the next limit is crossed, if that is not too far ahead."""
+    friction, span = baseline.coulomb_friction, end - begin
+    now = line.at(span)
+    rising = ((Limit.WARN, limits.warn_ratio), (Limit.ERROR, limits.error_ratio))
+    ahead = (
+        [one for one in rising if one[1] * friction > now]
+        if line.slope > 0
+        else [(Limit.LOW, limits.low_ratio)]
+    )
+    if not ahead:
+        return None
+    limit, ratio = ahead[0]
+    crossed = line.crossing(ratio * friction, ratio * baseline.half_width / _NORMAL)
+    if crossed is None or not span < crossed[0] <= (1 + _HORIZON) * span:
+        return None
+    return Crossing(limit, ratio * friction, *(begin + round(time) for time in crossed))
+
+
+def trend_of(
+    points: Sequence[FrictionPoint],
+    baseline: Baseline | None = None,
+    limits: FrictionLimits | None = None,
+) -> Trend | None:
+    """Estimate the drift of the Coulomb friction.
+
+    Each point weighs by its interval, together with a scatter between days that the points
+    themselves tell (`fit_line`). All points of one day count as one. A day that does not belong to
+    the others is left out, a tenth of them at most.
+
+    Parameters
+    ----------
+    points : sequence of FrictionPoint
+        Since the packing was last worked on, in any order.
+    baseline : Baseline, optional
+        Friction of the healthy valve, for the limits.
+    limits : FrictionLimits, optional
+        Bounds as ratios to it.
+
+    Returns
+    -------
+    Trend or None
+        None if the points lie on fewer than four days.
+
+    Raises
+    ------
+    ValueError
+        If a half width is negative or not finite.
+    """
+    if not points:
+        return None
+    for point in points:
+        require_non_negative("half_width", point.half_width)
+    days = _days(points)
+    if days.times.size < LEAST_ESTIMATES:
+        return None
+    line, outliers = _robust_line(days)
+    begin, end = min(one.time for one in points), max(one.time for one in points)
+    crossing = None
+    if baseline is not None and abs(line.slope) > line.slope_half_width:
+        crossing = _crossing(line, begin, end, baseline, limits or FrictionLimits())
+    return Trend(line, days.times.size - outliers, outliers, begin, end, crossing)

@@ -1,0 +1,74 @@
+"""What a history tells of one valve: its identifications, its baseline, its trend."""
+
+from dataclasses import dataclass
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.friction_monitor import MonitorSettings
+from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve
+from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.trend import Trend, trend_of
+
+__all__ = ["ValveHistory", "current_trend", "valve_histories"]
+
+
+@dataclass(frozen=True)
+class ValveHistory:
+    """A stretch of one valve's history.
+
+    Attributes
+    ----------
+    valve : KeptValve
+        The valve.
+    entries : tuple of HistoryEntry
+        Its identifications, oldest first; at least one.
+    set_baseline : KeptBaseline or None
+        The last baseline that was set; the trend begins with it.
+    trend : Trend or None
+        Drift by the method, and against the baseline and the limits, that were in force last.
+        Estimates of two methods may differ by themselves, so they make no common trend.
+    """
+
+    valve: KeptValve
+    entries: tuple[HistoryEntry, ...]
+    set_baseline: KeptBaseline | None
+    trend: Trend | None
+
+
+def valve_histories(
+    history: HistoryFile, valves: tuple[KeptValve, ...], since: int, until: int
+) -> tuple[ValveHistory, ...]:
+    """Read the histories of some valves from `since` to `until`, ns; those without any left out.
+
+    Raises
+    ------
+    HistoryError
+        If the file cannot be read.
+    """
+    found = []
+    for valve in valves:
+        entries = history.entries([valve.name], since, until)
+        if not entries:
+            continue
+        kept = history.baseline(valve.name, until)
+        begin = since if kept is None else max(since, kept.since)
+        last = entries[-1]
+        same = (one for one in entries if one.time >= begin and one.method == last.method)
+        points = [point for one in same if (point := one.point()) is not None]
+        trend = trend_of(points, last.baseline, last.limits)
+        found.append(ValveHistory(valve, entries, kept, trend))
+    return tuple(found)
+
+
+def current_trend(
+    history: HistoryFile, valve: str, baseline: Baseline | None, settings: MonitorSettings
+) -> Trend | None:
+    """Return the trend of a valve since its baseline was last set, by the method in force.
+
+    Raises
+    ------
+    HistoryError
+        If the file cannot be read.
+    """
+    kept = history.baseline(valve)
+    points = history.points(valve, settings.method, kept.since if kept else 0)
+    return trend_of(points, baseline, settings.limits)

@@ -1,0 +1,112 @@
+"""Static friction from the instants of breakaway, equation (9)."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.published.derivatives import Derivatives
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.signals.noise import position_noise, velocity_noise
+
+__all__ = ["Breakaway", "find_breakaways"]
+
+_AT_REST = 4.0
+"""A stem is at rest while its velocity is within this many standard deviations of zero …"""
+
+_AT_REST_SHARE = 1e-3
+"""… or, of a noiseless record, within this share of its top speed."""
+
+_FIRST_MARK, _SECOND_MARK = 4.0, 16.0
+"""Displacements, in standard deviations of the rest, that time the onset of motion."""
+
+_ROUNDING = 1e-12
+
+
+class Breakaway(NamedTuple):
+    """The last sample at which the stem still rests, and the way it leaves (+1 up, −1 down)."""
+
+    sample: int
+    direction: int
+
+
+def _runs(active: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and one-past-last index of each run of True."""
+    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
+    """Last index before the displacement stays beyond `mark`, −1 if it is never within."""
+    within = np.flatnonzero(displacement <= mark + _ROUNDING)
+    return int(within[-1]) if within.size else -1
+
+
+def _onset(displacement: NDArray[np.float64], spread: float) -> int | None:
+    """Index of the last sample at rest of a displacement that grows, None if it cannot be told."""
+    first = _last_within(displacement, _FIRST_MARK * spread)
+    second = _last_within(displacement, _SECOND_MARK * spread)
+    if first < 0 or second == displacement.size - 1:
+        return None
+    if second <= first:
+        return first
+    place = np.arange(second + 1)
+    trials = []
+    for power in (1, 2):
+        start = first - (second - first) / ((_SECOND_MARK / _FIRST_MARK) ** (1 / power) - 1)
+        growth = (np.maximum(place - start, 0) / (second - start)) ** power
+        misfit = displacement[: second + 1] - _SECOND_MARK * spread * growth
+        trials.append((float(misfit @ misfit), start))
+    onset = round(min(trials)[1])
+    return onset if onset >= 0 else None
+
+
+def find_breakaways(
+    recording: Recording, derivatives: Derivatives, settings: IdentificationSettings
+) -> list[Breakaway]:
+    """Find the instants at which the stem leaves a rest.
+
+    A rest is a stretch of at least two derivative windows without a speed that the noise cannot
+    explain. Its part clear of the motion that follows gives position and noise of the rest.
+    The instants t₁ and t₂ at which the displacement passes 4 and 16 standard deviations of that
+    noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows with the time to the power p:
+    p = 2 under a growing force, p = 1 after a slip jump, whichever follows the samples better.
+    Without noise the three instants coincide.
+
+    Parameters
+    ----------
+    recording : Recording
+        Stem position and pressure.
+    derivatives : Derivatives
+        Velocity of the stem.
+    settings : IdentificationSettings
+        Window and order that gave the derivatives.
+
+    Returns
+    -------
+    list of Breakaway
+        In the order of time; indices into the samples of `recording`.
+    """
+    window = settings.window
+    speed = np.abs(derivatives.velocity)
+    noise = velocity_noise(
+        position_noise(recording.position), recording.sample_period, window, settings.order
+    )
+    moving = speed > max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
+    for begin, end in zip(*_runs(moving), strict=True):
+        # The filter spreads any true motion over a window: a shorter burst is noise.
+        moving[begin:end] = end - begin >= window // 2
+    still = ~moving
+    found = []
+    for begin, end in zip(*_runs(still), strict=True):
+        if end - begin < 2 * window or end == still.size:
+            continue
+        first_moving = int(end) + derivatives.margin
+        rest = recording.position[begin + window : first_moving - window // 2]
+        level, spread = float(np.median(rest)), float(np.std(rest))
+        stretch = recording.position[first_moving - window : first_moving + 2 * window] - level
+        onset = _onset(np.abs(stretch), spread)
+        if onset is not None:
+            found.append(Breakaway(first_moving - window + onset, int(np.sign(stretch[-1]))))
+    return found

@@ -1,0 +1,80 @@
+"""The result of an identification."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from valve_friction_ros.identification.published.sweep import Sweep
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+
+__all__ = ["UNITS", "Estimate"]
+
+UNITS: Mapping[str, str] = {
+    "mass": "kg",
+    "viscous_friction": "N·s/m",
+    "coulomb_friction": "N",
+    "static_friction": "N",
+    "spring_constant": "N/m",
+    "spring_preload": "N",
+}
+"""Unit of each identified parameter, in the order in which they are shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Identified parameters and how they came about.
+
+    Attributes
+    ----------
+    mass, viscous_friction, coulomb_friction : float
+        See `static_friction`.
+    static_friction, spring_constant, spring_preload : float
+        Parameters in SI units, as regressed: an impossible value (a negative mass, say) is shown
+        as it is, with a warning.
+    threshold : float
+        Chosen threshold δv, m/s.
+    samples : int
+        Samples faster than the threshold.
+    sigma : float
+        Standard deviation σ_s of the force residual (17), N.
+    r_squared : float
+        R²_s of (18).
+    fixed : tuple of str
+        Parameters that were given or assumed, not identified.
+    warnings : tuple of str
+        What a reader of the numbers should know, one sentence each.
+    settings : IdentificationSettings
+        Settings that led here, an assumed mass among the fixed parameters.
+    sweep : Sweep
+        The whole sweep.
+    """
+
+    mass: float
+    viscous_friction: float
+    coulomb_friction: float
+    static_friction: float
+    spring_constant: float
+    spring_preload: float
+    threshold: float
+    samples: int
+    sigma: float
+    r_squared: float
+    fixed: tuple[str, ...]
+    warnings: tuple[str, ...]
+    settings: IdentificationSettings = field(repr=False)
+    sweep: Sweep = field(repr=False)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The parameters by name, in the order of `UNITS`."""
+        return {name: getattr(self, name) for name in UNITS}
+
+    def parameters(self) -> KarnoppParameters:
+        """Return the parameters as a model to simulate.
+
+        Raises
+        ------
+        ValueError
+            If an identified value is impossible; the message names it.
+        """
+        return KarnoppParameters(**self.values)

@@ -1,0 +1,175 @@
+"""Identification of the Karnopp parameters from a recording, as published."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from valve_friction_ros.identification.published.breakaway import find_breakaways
+from valve_friction_ros.identification.published.derivatives import Derivatives, differentiate
+from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
+from valve_friction_ros.identification.published.threshold import choose_threshold
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.excitation import (
+    require_enough_samples,
+    require_motion,
+    require_two_directions,
+)
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["identify"]
+
+_MASS_TOLERANCE = 0.25
+
+
+def _sweep(
+    recording: Recording, valve: Valve, settings: IdentificationSettings, derivatives: Derivatives
+) -> tuple[Sweep, int]:
+    """Sweep the thresholds (8), or take the one that is given; return the sweep and the choice."""
+    regression = force_balance_regression(
+        valve.actuator_force(recording.pressure), recording.position, derivatives, settings
+    )
+    given = settings.fixed.get("limit_velocity")
+    if given is not None:
+        thresholds = np.array([given])
+    else:
+        step = float(regression.speed.max()) / settings.resolution
+        thresholds = step * np.arange(1, settings.steps + 1)
+    sweep = sweep_thresholds(regression, thresholds)
+    return sweep, choose_threshold(sweep, settings.window)
+
+
+def _mass_by_shorter_window(
+    recording: Recording, valve: Valve, settings: IdentificationSettings, threshold: float
+) -> float:
+    """Mass at `threshold` with about half the derivative window; nan if that cannot be solved."""
+    window = max((settings.window // 2) | 1, (settings.order + 2) | 1)
+    shorter = replace(settings, window=window)
+    derivatives = differentiate(recording.position, recording.sample_period, window, settings.order)
+    regression = force_balance_regression(
+        valve.actuator_force(recording.pressure), recording.position, derivatives, shorter
+    )
+    return float(sweep_thresholds(regression, np.array([threshold])).estimates["mass"][0])
+
+
+def _why_mass_is_not_told(mass: float, other: float) -> str | None:
+    """Say why a regressed mass is no mass, or None if it is one."""
+    if mass <= 0:
+        return f"its estimate is {mass:.4g} kg"
+    if not abs(other - mass) <= _MASS_TOLERANCE * mass:
+        return f"{mass:.4g} kg becomes {other:.4g} kg with half the derivative window"
+    return None
+
+
+def _static_friction(
+    recording: Recording,
+    valve: Valve,
+    derivatives: Derivatives,
+    settings: IdentificationSettings,
+    values: dict[str, float],
+    warnings: list[str],
+) -> float:
+    """F_s by (9): the median over all breakaways, not below F_c."""
+    breakaways = find_breakaways(recording, derivatives, settings)
+    coulomb_friction = values["coulomb_friction"]
+    if not breakaways:
+        warnings.append(
+            "no breakaway from rest was seen: static_friction is taken equal to coulomb_friction"
+        )
+        return coulomb_friction
+    samples = np.array([breakaway.sample for breakaway in breakaways])
+    directions = np.array([breakaway.direction for breakaway in breakaways])
+    pull = (
+        valve.actuator_force(recording.pressure[samples])
+        - values["spring_constant"] * recording.position[samples]
+        - values["spring_preload"]
+    )
+    return max(float(np.median(directions * pull)), coulomb_friction)
+
+
+def identify(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Estimate:
+    """Identify the friction of a valve from a recording, as the paper does.
+
+    Derivatives by Appendix A, the sweep (3) to (8) with σ_s (17) and R²_s (18), the threshold
+    chosen on its plateau (`choose_threshold`), and F_s by (9) from the instants of breakaway.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position, several strokes in both directions.
+    valve : Valve
+        Diaphragm area and pressure reference.
+    settings : IdentificationSettings, optional
+        The paper's by default, with the preload as a regressor of its own.
+
+    Returns
+    -------
+    Estimate
+        Parameters, quality figures, warnings and the sweep behind them.
+
+    Raises
+    ------
+    RefusalError
+        If the record cannot tell: too short, no motion, one direction only, or too few samples.
+
+    Notes
+    -----
+    Between two levels of pressure the force balance does not determine all five parameters: a
+    square wave through a first-order lag moves the stem by two exponentials and a level each
+    way, which gives four equations. The weakest, the mass, is then a fiction of the derivative
+    window, so a regressed mass is kept only if it is positive and stays within 25 % when the
+    window is halved. Otherwise `assumed_mass` takes its place, with a warning; inertia is about
+    0.01 N in 5000 N on the bench valve, so the other parameters hardly notice.
+    """
+    settings = settings or IdentificationSettings()
+    warnings: list[str] = []
+    require_enough_samples(recording, settings.window)
+    derivatives = differentiate(
+        recording.position, recording.sample_period, settings.window, settings.order
+    )
+    require_motion(recording)
+    require_two_directions(recording, settings.window)
+    sweep, chosen = _sweep(recording, valve, settings, derivatives)
+    if "mass" not in settings.fixed:
+        reason = _why_mass_is_not_told(
+            float(sweep.estimates["mass"][chosen]),
+            _mass_by_shorter_window(recording, valve, settings, float(sweep.thresholds[chosen])),
+        )
+        if reason is not None:
+            warnings.append(
+                f"the record does not tell the mass ({reason}): "
+                f"{settings.assumed_mass:g} kg is assumed"
+            )
+            settings = replace(settings, fixed={**settings.fixed, "mass": settings.assumed_mass})
+            sweep, chosen = _sweep(recording, valve, settings, derivatives)
+    values = {name: float(column[chosen]) for name, column in sweep.estimates.items()}
+    threshold = float(sweep.thresholds[chosen])
+    for name, value in values.items():
+        if value < 0 and name != "spring_preload":
+            warnings.append(f"{name} came out negative ({value:.4g}): the model does not fit")
+    static_friction = settings.fixed.get("static_friction")
+    if static_friction is None:
+        static_friction = _static_friction(
+            recording, valve, derivatives, settings, values, warnings
+        )
+    elif static_friction < values["coulomb_friction"]:
+        warnings.append(
+            f"the fixed static_friction ({static_friction:.4g} N) lies below the identified "
+            f"coulomb_friction ({values['coulomb_friction']:.4g} N)"
+        )
+    return Estimate(
+        **values,
+        static_friction=static_friction,
+        threshold=threshold,
+        samples=int(sweep.samples[chosen]),
+        sigma=float(sweep.sigma[chosen]),
+        r_squared=float(sweep.r_squared[chosen]),
+        fixed=tuple(settings.fixed),
+        warnings=tuple(warnings),
+        settings=settings,
+        sweep=sweep,
+    )

@@ -1,0 +1,44 @@
+"""Verdicts on the parameters of a regression."""
+
+import numpy as np
+
+from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.published.regression_uncertainty import RegressionUncertainty
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.limits import (
+    NO_SLIP,
+    finest_half_share,
+    too_few_strokes,
+)
+from valve_friction_ros.identification.trust.verdict import (
+    AssessedParameter,
+    fixed,
+    judged,
+    not_identifiable,
+)
+
+__all__ = ["judge_regression"]
+
+
+def judge_regression(
+    estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
+) -> dict[str, AssessedParameter]:
+    """Judge every parameter of a regression, for a machine without a spring."""
+    covariance = regression.covariance
+    few = too_few_strokes(regression.strokes)
+    judgements = {}
+    for name, value in estimate.values.items():
+        if name in settings.fixed:
+            judgements[name] = fixed(name, settings.fixed[name])
+        elif name == "static_friction":
+            judgements[name] = not_identifiable(name, NO_SLIP)
+        elif name not in regression.names:
+            judgements[name] = not_identifiable(name, "the record does not tell it")
+        else:
+            gradient = np.eye(len(regression.names))[regression.names.index(name)]
+            error = covariance.standard_error(gradient)
+            width = max(
+                covariance.half_width(gradient), finest_half_share(name, settings) * abs(value)
+            )
+            judgements[name] = judged(name, value, error, width, few)
+    return judgements

@@ -1,0 +1,102 @@
+"""The force balance of the sliding stem as a linear regression, equations (3) to (7)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.published.derivatives import Derivatives
+from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+
+__all__ = ["ForceBalanceRegression", "force_balance_regression"]
+
+
+@dataclass(frozen=True, eq=False)
+class ForceBalanceRegression:
+    """Regressors φ(t) of (5), the force that they explain, and the speed that selects samples.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The free parameters, one a column.
+    columns : ndarray of float, shape (n, p)
+        Regressor of each free parameter.
+    force : ndarray of float, shape (n,)
+        Actuator force less the share of the fixed parameters, N.
+    speed : ndarray of float, shape (n,)
+        Absolute velocity, m/s.
+    fixed : mapping of str to float
+        Parameters that do not take part.
+    position_bias : float or None
+        x̄ of (10) where the preload follows from it.
+    """
+
+    names: tuple[str, ...]
+    columns: NDArray[np.float64]
+    force: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    fixed: Mapping[str, float]
+    position_bias: float | None
+
+    def complete(self, estimates: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Name the free `estimates`, shape (..., p), and put the fixed values beside them."""
+        shape = estimates.shape[:-1]
+        named = {name: estimates[..., index] for index, name in enumerate(self.names)}
+        for name in REGRESSED:
+            if name not in named and name in self.fixed:
+                named[name] = np.full(shape, self.fixed[name])
+        if self.position_bias is not None:
+            named["spring_preload"] = named["spring_constant"] * self.position_bias
+        return {name: named[name] for name in REGRESSED}
+
+
+def force_balance_regression(
+    force: NDArray[np.float64],
+    position: NDArray[np.float64],
+    derivatives: Derivatives,
+    settings: IdentificationSettings,
+) -> ForceBalanceRegression:
+    """Set up the regression (4) for the samples that have derivatives.
+
+    Parameters
+    ----------
+    force : ndarray of float, shape (n,)
+        Actuator force F_ext, N.
+    position : ndarray of float, shape (n,)
+        Stem position, m.
+    derivatives : Derivatives
+        Velocity and acceleration.
+    settings : IdentificationSettings
+        Which parameters are fixed, and the position bias if it is known.
+
+    Returns
+    -------
+    ForceBalanceRegression
+        With m = n − d + 1 rows.
+    """
+    bias = settings.position_bias
+    velocity = derivatives.velocity
+    place = derivatives.inner(position)
+    regressors = {
+        "mass": derivatives.acceleration,
+        "coulomb_friction": np.sign(velocity),
+        "viscous_friction": velocity,
+        "spring_constant": place if bias is None else place + bias,
+        "spring_preload": np.ones_like(velocity),
+    }
+    if bias is not None:
+        del regressors["spring_preload"]
+    target = derivatives.inner(force).copy()
+    for name in settings.fixed:
+        if name in regressors:
+            target -= settings.fixed[name] * regressors.pop(name)
+    fixed = {name: value for name, value in settings.fixed.items() if name in REGRESSED}
+    return ForceBalanceRegression(
+        tuple(regressors),
+        np.column_stack([*regressors.values()]) if regressors else np.empty((target.size, 0)),
+        target,
+        np.abs(velocity),
+        fixed,
+        bias,
+    )

@@ -1,0 +1,71 @@
+"""Uncertainty of the published regression, for machines whose motion cannot be simulated."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.published.derivatives import differentiate
+from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
+from valve_friction_ros.identification.trust.uncertainty import (
+    Covariance,
+    block_covariance,
+    stroke_length,
+)
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["RegressionUncertainty", "regression_uncertainty"]
+
+
+class RegressionUncertainty(NamedTuple):
+    """Covariance of a regression, and how well it reproduces the force.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The regressed parameters, in the order of the covariance.
+    covariance : Covariance
+        From sums over blocks of one stroke.
+    fit : float
+        Share of the force that is reproduced, 1 − |residual| / |force − mean|.
+    strokes : int
+        Strokes of the record.
+    """
+
+    names: tuple[str, ...]
+    covariance: Covariance
+    fit: float
+    strokes: int
+
+
+def regression_uncertainty(
+    recording: Recording, valve: Valve, estimate: Estimate
+) -> RegressionUncertainty:
+    """Scatter of the regression's normal equations between strokes.
+
+    Without a spring nothing calls the stem back, and a simulation drifts away from the record
+    whatever the parameters, so the regression is all there is. Its scores are the residual times
+    the regressors, φ_t·(F_t − φ_tᵀθ), at the samples above the chosen threshold.
+    """
+    settings = estimate.settings
+    derivatives = differentiate(
+        recording.position, recording.sample_period, settings.window, settings.order
+    )
+    regression = force_balance_regression(
+        valve.actuator_force(recording.pressure), recording.position, derivatives, settings
+    )
+    moving = regression.speed > estimate.threshold
+    values = np.array([estimate.values[name] for name in regression.names])
+    residual: NDArray[np.float64] = regression.columns @ values - regression.force
+    columns = regression.columns * moving[:, None]
+    equation = EstimatingEquation.of_least_squares(columns, residual)
+    stroke = stroke_length(np.cumsum(derivatives.velocity * moving))
+    covariance = block_covariance(equation, stroke)
+    force = regression.force[moving]
+    fit = 1 - float(np.linalg.norm(residual[moving]) / np.linalg.norm(force - force.mean()))
+    return RegressionUncertainty(
+        regression.names, covariance, fit, max(residual.size // max(stroke, 1), 1)
+    )

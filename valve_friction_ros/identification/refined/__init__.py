@@ -1,0 +1,1 @@
+"""The refined model: its simulated stem follows the measured one."""

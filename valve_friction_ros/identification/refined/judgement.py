@@ -1,0 +1,133 @@
+"""Verdicts on the parameters of a refinement."""
+
+import math
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.published.estimate import UNITS
+from valve_friction_ros.identification.refined.model_test import Misfit
+from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START
+from valve_friction_ros.identification.refined.refinement import Refinement, estimating_equation
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.limits import (
+    FALL_SPEED,
+    NO_SLIP,
+    finest_half_share,
+    too_few_strokes,
+)
+from valve_friction_ros.identification.trust.uncertainty import (
+    CONFIDENCE,
+    worst_case,
+)
+from valve_friction_ros.identification.trust.verdict import (
+    AssessedParameter,
+    fixed,
+    judged,
+    not_identifiable,
+)
+
+__all__ = ["judge_refinement"]
+
+_SPRING = ("mass", "spring_constant", "spring_preload", OFFSET)
+"""What is told as well where the model of the friction is doubted."""
+
+_RECTANGLE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) / math.sqrt(3)
+"""Half width of an interval over the half width of a rectangular distribution."""
+
+
+def judge_refinement(
+    refinement: Refinement, misfit: Misfit, settings: IdentificationSettings
+) -> dict[str, AssessedParameter]:
+    """Judge every parameter of a refined model.
+
+    The half width of an interval is the standard error by the scatter between strokes, times
+    Student's quantile. Where a mass is assumed, what an error of it would do is added in squares,
+    the error taken to lie anywhere within the mass's own size. Where the misfit is more than
+    noise, what it can have done at the worst (`worst_case`) is added in full. No half width is
+    less than 0.05 % of its value, of a spring constant 0.02 %.
+    """
+    covariance = refinement.covariance
+    samples = refinement.simulated.size
+    systematic = worst_case(refinement.equation.curvature, samples, misfit.excess)
+    by_mass = _shift_by_assumed_mass(refinement, settings)
+    values = {
+        **vars(refinement.problem.model(refinement.coordinates)),
+        OFFSET: refinement.coordinates[OFFSET],
+    }
+    few = too_few_strokes(samples // max(refinement.stroke, 1))
+    doubt = _doubt(refinement, misfit)
+    extras = (name for name in refinement.names if name not in (*UNITS, SLIP, START))
+    judgements = {}
+    for name in (*UNITS, *extras):
+        gradient = _gradient(refinement, name, settings)
+        if name in settings.fixed:
+            judgements[name] = fixed(name, settings.fixed[name])
+        elif name == "mass" and name not in refinement.names:
+            assumed = refinement.coordinates["mass"]
+            judgements[name] = not_identifiable(
+                name, f"inertia is too small a part of the force to be seen; {assumed:g} kg assumed"
+            )
+        elif name == "static_friction" and SLIP not in refinement.names:
+            judgements[name] = not_identifiable(name, NO_SLIP)
+        else:
+            error = covariance.standard_error(gradient)
+            bound = _root(float(gradient @ systematic @ gradient))
+            lean = _RECTANGLE * abs(float(gradient @ by_mass))
+            width = math.hypot(covariance.half_width(gradient), lean) + bound
+            width = max(width, finest_half_share(name, settings) * abs(values[name]))
+            reason = few or ("" if name in _SPRING else doubt)
+            judgements[name] = judged(name, values[name], error, width, reason)
+    return judgements
+
+
+def _shift_by_assumed_mass(
+    refinement: Refinement, settings: IdentificationSettings
+) -> NDArray[np.float64]:
+    """Change of the free coordinates with an assumed mass that is wrong by its own size."""
+    if "mass" in settings.fixed or "mass" in refinement.names:
+        return np.zeros(len(refinement.names))
+    at = refinement.coordinates
+    units = refinement.problem.units((*refinement.names, "mass"), at)
+    curvature = estimating_equation(refinement.problem, at, units).curvature
+    own, cross = curvature[:-1, :-1], curvature[:-1, -1]
+    step = np.linalg.lstsq(own, cross, rcond=1e-14)[0]
+    sizes = np.array([*units.values()])[:-1]
+    return np.asarray(step * sizes * (at["mass"] / units["mass"]), dtype=np.float64)
+
+
+def _root(variance: float) -> float:
+    return math.sqrt(variance) if variance >= 0 else math.nan
+
+
+def _doubt(refinement: Refinement, misfit: Misfit) -> str:
+    """Say why the friction cannot be more than weak, or nothing."""
+    if not misfit.describes:
+        return (
+            "the Karnopp model does not describe this valve: "
+            f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
+        )
+    speed = refinement.top_speed
+    if speed < FALL_SPEED:
+        return (
+            f"holds up to {speed * 1e3:.2g} mm/s, the fastest here: "
+            f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
+        )
+    return ""
+
+
+def _gradient(
+    refinement: Refinement, name: str, settings: IdentificationSettings
+) -> NDArray[np.float64]:
+    """Differentiate a parameter by the free coordinates of the refinement."""
+    gradient = np.zeros(len(refinement.names))
+    if name == "static_friction":
+        for part in ("coulomb_friction", SLIP):
+            if part in refinement.names:
+                gradient[refinement.names.index(part)] = 1.0
+    elif name == "spring_preload" and settings.position_bias is not None:
+        gradient[refinement.names.index("spring_constant")] = settings.position_bias
+    elif name in refinement.names:
+        gradient[refinement.names.index(name)] = 1.0
+    return gradient

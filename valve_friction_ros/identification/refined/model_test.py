@@ -1,0 +1,80 @@
+"""Whether the identified model describes the valve at all."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from valve_friction_ros.identification.refined.refinement import Refinement
+
+__all__ = ["Misfit", "misfit_of"]
+
+_NOISE_SHARE = 0.2
+_MOVED_SHARE = 1.0
+_EXPECTED_SHARE = 0.75
+_GROSS = 0.9
+_LEAST = 2e-4
+"""Misfit tolerated in any case, as a share of the stem's movement."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How well the simulated stem follows the measured one.
+
+    Attributes
+    ----------
+    fit : float
+        Share of the movement that is reproduced, at most 1.
+    rms : float
+        Root mean square of the whole residual, sensor noise included, m.
+    systematic : float
+        What of it the sensors' noise does not explain, m.
+    tolerated : float
+        The largest systematic misfit that still counts as the noise's doing, m.
+    """
+
+    fit: float
+    rms: float
+    systematic: float
+    tolerated: float
+
+    @property
+    def excess(self) -> float:
+        """Systematic misfit beyond what chance makes of it, m."""
+        expected = _EXPECTED_SHARE * self.tolerated
+        return math.sqrt(max(self.systematic**2 - expected**2, 0.0))
+
+    @property
+    def is_gross(self) -> bool:
+        """Whether so little of the movement is reproduced that no number means anything."""
+        return self.fit < _GROSS and not self.describes
+
+    @property
+    def describes(self) -> bool:
+        """Whether the model describes the valve."""
+        return self.systematic <= self.tolerated
+
+
+def misfit_of(refinement: Refinement) -> Misfit:
+    """Split the residual of a refinement into noise and misfit.
+
+    The residuals under the two halves of the pressure share the misfit and the noise of the stem
+    sensor, but not the noise of the pressure, so the mean of their product leaves
+
+        systematic² = mean(r₁·r₂) − (noise of the stem)² .
+
+    Half the distance between the two simulated stems is what the pressure's noise does. A misfit
+    within a fifth of the stem's noise, or within that of the pressure, may be chance; more is the
+    model's fault.
+    """
+    record = refinement.problem.record
+    first, second = refinement.residuals
+    shared = float(np.mean(first * second)) - record.noise**2
+    moved = 0.5 * float(np.sqrt(np.mean((first - second) ** 2)))
+    spread = record.position - record.position.mean()
+    rms = refinement.rms
+    tolerated = (
+        _MOVED_SHARE * moved + _NOISE_SHARE * record.noise + _LEAST * float(np.ptp(record.position))
+    )
+    fit = 1 - rms / float(np.sqrt(np.mean(spread**2)))
+    return Misfit(fit, rms, float(np.sqrt(max(shared, 0.0))), tolerated)

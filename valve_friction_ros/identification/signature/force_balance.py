@@ -1,0 +1,305 @@
+"""Method "force_balance": the paper's model 2, from the force balances of a valve signature."""
+
+import math
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.assessment import Assessment
+from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
+from valve_friction_ros.identification.published.estimate import UNITS
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.signature.valve_signature import (
+    TRIANGLE_NEEDED,
+    ValveSignature,
+    Ways,
+    breakaway_points,
+    leaving_speed,
+    mean_position_bias,
+    mean_spring_constant,
+    sliding_friction,
+    sliding_speed,
+    valve_signature,
+)
+from valve_friction_ros.identification.steps.validation import Validation, validate
+from valve_friction_ros.identification.trust.excitation import (
+    require_enough_samples,
+    require_motion,
+    require_related_signals,
+    require_travel,
+)
+from valve_friction_ros.identification.trust.jackknife import Jackknife, jackknife
+from valve_friction_ros.identification.trust.limits import FALL_SPEED
+from valve_friction_ros.identification.trust.uncertainty import half_width
+from valve_friction_ros.identification.trust.verdict import (
+    AssessedParameter,
+    fixed,
+    judged,
+    not_identifiable,
+)
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["ForceBalanceAssessment", "assess_force_balance"]
+
+_FEWEST_EACH_WAY = 2
+_SURE = 4.0
+_LEAST_SLIP = 0.03
+"""A slip jump counts from this share of F_s on, and from four standard errors."""
+
+_LEAST_FIT = 0.9
+_HIDDEN = "the stem jumps as it breaks away, too fast or too little for this record to tell how"
+
+_BREAKAWAY_BIAS = 0.01
+_STIFFNESS_BIAS = 2e-3
+"""Shares by which F_s at the breakaway points, and k, can be wrong alike in every stroke."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceBalanceAssessment(Assessment):
+    """The paper's model 2.
+
+    Attributes
+    ----------
+    signature : ValveSignature
+        The breakaway points, k, x̄ and dead zone behind it.
+    identified : IdentifiedModel
+        The model, with what stands in for numbers that are not identifiable.
+    validation : Validation
+        The same record simulated with it.
+    """
+
+    method: ClassVar[str] = "force_balance"
+
+    signature: ValveSignature
+    identified: IdentifiedModel
+    validation: Validation = field(repr=False)
+
+    @property
+    def fit(self) -> float:
+        """Share of the stem's movement in the record that the model reproduces."""
+        return self.validation.fit
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of simulated less measured position, m."""
+        return self.validation.rms
+
+    @property
+    def window(self) -> int:
+        """Derivative window of the velocity, samples."""
+        return self.signature.window
+
+    @property
+    def sweep(self) -> None:
+        """There is none."""
+        return
+
+    @property
+    def simulated(self) -> NDArray[np.float64]:
+        """Position of the model's stem, m, shape (n,)."""
+        return self.validation.simulated
+
+    def model(self) -> KarnoppParameters:
+        """Return the identified model, with what stands in for missing numbers."""
+        return self.identified.parameters
+
+
+def assess_force_balance(
+    recording: Recording,
+    valve: Valve,
+    settings: IdentificationSettings | None = None,
+    window: int | None = None,
+) -> ForceBalanceAssessment:
+    """Identify a valve signature by force balances, as the paper's model 2.
+
+    k is the mean of (15), x̄ follows from (14), F_s from (11) and (12) at the breakaway points,
+    F_c is F_s, and F_v the mean of (19) while the stem slides. Intervals come from the scatter
+    between strokes, widened by what may be wrong alike in all of them: 1 % of F_s, 0.2 % of k.
+
+    Parameters
+    ----------
+    recording : Recording
+        A valve signature, two strokes or more each way from rest at a constant speed
+        (`TriangleWave` with its 60 s suits the bench valve).
+    valve : Valve
+        Geometry.
+    settings : IdentificationSettings, optional
+        Fixed parameters, position bias and assumed mass; the sweep's settings do not matter here.
+    window : int, optional
+        Derivative window of the velocity, samples, odd; by default the noise chooses it.
+
+    Returns
+    -------
+    ForceBalanceAssessment
+        Parameters with intervals and verdicts, and the signature.
+
+    Raises
+    ------
+    RefusalError
+        If the record is no valve signature, and the message says which excitation gives one, or
+        if the model does not reproduce it.
+
+    Notes
+    -----
+    Read off a plot, as published, a breakaway point lies where the line of the sliding stem
+    begins, and F_s comes out as F_c + F_v·|ẋ|, with F_v = 0 in (19): on the bench at 1.19 mm/s
+    that is 3.8 % (low friction) and 8.8 % (high friction) too much. The onset is located here
+    instead (`fit_onset`), where the speed is still zero. On simulated records of 150 s, five
+    strokes, with no noise up to 28.6 µm / 165 Pa, F_s came within 1 % for all three packings, k
+    within 0.2 % and x̄ within 0.05 mm. F_v is a small difference: an error of 1 % in F_c is one of
+    26 % (low) or 11 % (high) in F_v.
+
+    With a slip jump F_c is not F_s, which the paper leaves to future work. The loop's half width
+    is then F_c + F_v·|ẋ|, and as the stem leaves at the speed v_j, the force balance is
+    F_s = F_c + F_v·v_j: their difference gives F_v = (F_s − half width)/(v_j − |ẋ|), and F_c
+    follows. A jump smaller than F_v·|ẋ| does not show.
+    """
+    settings = settings or IdentificationSettings()
+    if settings.fixed.get("spring_constant") == 0:
+        raise RefusalError("the force balance needs a spring: use the method sweep")
+    require_enough_samples(recording, settings.window)
+    require_motion(recording)
+    require_travel(recording, valve)
+    require_related_signals(recording)
+    signature = valve_signature(recording, valve, window)
+    ways = [[one for one in way if one.breakaway is not None] for way in signature.ways]
+    if min(map(len, ways)) < _FEWEST_EACH_WAY:
+        raise RefusalError(
+            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest each way, and here are "
+            f"{len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
+        )
+    found = jackknife(ways, lambda some: _figures(some, settings))
+    if found.values["static_friction"] <= 0:
+        raise RefusalError(
+            f"the breakaway points give a friction of {found.values['static_friction']:.4g} N, "
+            "which cannot be: check the direction and the clocks of both signals"
+        )
+    parameters = _judged(found, ways, settings)
+    values = {name: one.value for name, one in parameters.items()}
+    mass = settings.fixed.get("mass", settings.assumed_mass)
+    try:
+        identified = identified_model({**values, "mass": mass})
+    except ValueError as error:
+        raise RefusalError(
+            f"the force balances give an impossible valve: {error}; check both signals"
+        ) from None
+    validation = validate(recording, valve, identified.parameters)
+    if validation.fit < _LEAST_FIT:
+        raise RefusalError(
+            f"the model of the force balances does not reproduce the record (fit "
+            f"{100 * validation.fit:.0f} %): check what is fixed, both signals and their clocks"
+        )
+    return ForceBalanceAssessment(
+        MappingProxyType(parameters),
+        published=None,
+        misfit=None,
+        warnings=identified.notes,
+        signature=signature,
+        identified=identified,
+        validation=validation,
+    )
+
+
+def _figures(ways: Ways, settings: IdentificationSettings) -> dict[str, float]:
+    """Evaluate (11) to (15) and (19) on these strokes; what is fixed takes part as given."""
+    given = settings.fixed
+    spring_constant = given.get("spring_constant", mean_spring_constant(ways))
+    bias = settings.position_bias
+    if bias is None:
+        if "spring_preload" in given:
+            bias = given["spring_preload"] / spring_constant
+        else:
+            bias = mean_position_bias(ways, spring_constant)
+    pulls = [
+        float(
+            np.mean(
+                [
+                    stroke.direction * (point.force - spring_constant * (point.position + bias))
+                    for stroke in way
+                    if (point := stroke.breakaway) is not None
+                ]
+            )
+        )
+        for way in ways
+    ]
+    static_friction = given.get("static_friction", float(np.mean(pulls)))
+    coulomb_friction = given.get("coulomb_friction", static_friction)
+    slip = static_friction - sliding_friction(ways, spring_constant)
+    leaving, speed = leaving_speed(ways), sliding_speed(ways)
+    falling = slip / (leaving - speed) if leaving > speed else math.nan
+    return {
+        "spring_constant": spring_constant,
+        "spring_preload": spring_constant * bias,
+        "static_friction": static_friction,
+        "coulomb_friction": coulomb_friction,
+        "viscous_friction": _viscous_friction(ways, coulomb_friction, spring_constant, bias),
+        "slip": slip,
+        "viscous_friction after a jump": falling,
+        "coulomb_friction after a jump": static_friction - falling * leaving,
+    }
+
+
+def _viscous_friction(
+    ways: Ways, coulomb_friction: float, spring_constant: float, bias: float
+) -> float:
+    """Average (19) over the sliding instants of each stroke, and over the strokes."""
+    means = []
+    for way in ways:
+        for stroke in way:
+            sliding = stroke.sliding
+            spring = spring_constant * (sliding.position + bias)
+            left = sliding.force - stroke.direction * coulomb_friction - spring
+            means.append(float(np.mean(left / sliding.velocity)))
+    return float(np.mean(means))
+
+
+def _judged(
+    found: Jackknife, ways: Ways, settings: IdentificationSettings
+) -> dict[str, AssessedParameter]:
+    """Judge every parameter by its scatter between strokes and the bias of the method."""
+    values, errors = found.values, found.standard_errors
+    speed = sliding_speed(ways)
+    points = [point for way in ways for point in breakaway_points(way)]
+    place = float(np.mean([abs(point.position) for point in points]))
+    stiffness = _STIFFNESS_BIAS * values["spring_constant"]
+    friction = _BREAKAWAY_BIAS * values["static_friction"]
+    biases = {
+        "viscous_friction": friction / speed,
+        "coulomb_friction": friction,
+        "static_friction": friction,
+        "spring_constant": stiffness,
+        "spring_preload": stiffness * place,
+    }
+    least_slip = max(_SURE * errors["slip"], _LEAST_SLIP * values["static_friction"])
+    jumps = values["slip"] > least_slip and "coulomb_friction" not in settings.fixed
+    slow = (
+        ""
+        if speed >= FALL_SPEED
+        else f"holds at {speed * 1e3:.2g} mm/s, the speed here: "
+        f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
+    )
+    judgements = {
+        "mass": not_identifiable(
+            "mass", f"a constant speed takes no inertia; {settings.assumed_mass:g} kg assumed"
+        )
+    }
+    for name, bias in biases.items():
+        is_sliding = name in ("coulomb_friction", "viscous_friction")
+        source = f"{name} after a jump" if jumps and is_sliding else name
+        if math.isnan(values[source]):
+            judgements[name] = not_identifiable(name, _HIDDEN)
+        elif name == "viscous_friction" and values[source] < 0:
+            reason = f"it came out negative ({values[source]:.4g} N·s/m)"
+            judgements[name] = not_identifiable(name, reason)
+        else:
+            width = half_width(errors[source], found.freedom) + bias
+            doubt = slow if is_sliding else ""
+            judgements[name] = judged(name, values[source], errors[source], width, doubt)
+    given = {name: fixed(name, value) for name, value in settings.fixed.items() if name in UNITS}
+    return {**judgements, **given}

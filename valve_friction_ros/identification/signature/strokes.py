@@ -1,0 +1,245 @@
+"""The strokes of a valve signature: where each breaks away, and where it slides steadily."""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.published.derivatives import differentiate
+from valve_friction_ros.identification.signature.onset import fit_onset
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.derivative_window import fitting_window
+from valve_friction_ros.signals.noise import position_noise, velocity_noise
+
+__all__ = ["BreakawayPoint", "SignatureStroke", "Sliding", "find_strokes", "velocity_window"]
+
+_ORDER = 3
+_RUN_SHARE = 0.5
+_REST_SHARE = 0.1
+_LEAST_SPEED_SHARE = 0.1
+_LEAST_STROKE_SHARE = 0.1
+_STEADY = 0.05
+"""The stem slides steadily while its velocity is within this share of the stroke's median."""
+
+_VELOCITY_NOISE = 0.015
+"""Share of the speed that the velocity's noise may have; the derivative window grows until then."""
+
+_ONSET_SHARE = 0.05
+"""Share of a stroke's way whose beginning tells the onset."""
+
+_FEWEST = 8
+_SHORTEST_RECORD = 20
+"""Derivative windows that a record holds at least."""
+
+
+class BreakawayPoint(NamedTuple):
+    """Where a resting stem begins to slide: P1 of the valve signature on the way up, P2 down.
+
+    Attributes
+    ----------
+    time : float
+        Since the first sample, s.
+    position : float
+        Stem position of the rest, m.
+    pressure : float
+        Pressure at that instant, Pa.
+    force : float
+        Actuator force F_ext at that instant, N.
+    speed : float
+        Speed at which the stem leaves, m/s: above zero after a slip jump that shows.
+    """
+
+    time: float
+    position: float
+    pressure: float
+    force: float
+    speed: float
+
+
+class Sliding(NamedTuple):
+    """The instants of a stroke at which the stem slides at a constant speed, shape (n,) each.
+
+    Attributes
+    ----------
+    time : ndarray of float
+        Since the first sample, s.
+    position : ndarray of float
+        Stem position, m.
+    force : ndarray of float
+        Actuator force F_ext, N.
+    velocity : ndarray of float
+        Stem velocity, m/s.
+    force_rate : ndarray of float
+        Its derivative with time, N/s.
+    """
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    force: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    force_rate: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SignatureStroke:
+    """One stroke of the stem.
+
+    Attributes
+    ----------
+    direction : int
+        +1 up, −1 down.
+    breakaway : BreakawayPoint or None
+        Where it begins; None where no rest before it was recorded.
+    steadiness : float
+        Share of the stroke's way on which the speed was constant.
+    sliding : Sliding
+        The instants at which it was.
+    """
+
+    direction: int
+    breakaway: BreakawayPoint | None
+    steadiness: float
+    sliding: Sliding = field(repr=False)
+
+    @property
+    def spring_constant(self) -> float:
+        """Mean of (15) over the way that the stem slides, N/m.
+
+        The mean over the way, Σ dF_ext / Σ dx, is the one over the instants at a constant speed,
+        and noise on the speed does not bias it.
+        """
+        return float(np.sum(self.sliding.force_rate) / np.sum(self.sliding.velocity))
+
+
+def _runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one-past-last index of each run of True."""
+    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+
+def _usual_speed(speed: NDArray[np.float64]) -> float:
+    """Return the median speed, m/s, of the moving stem."""
+    return float(np.median(speed[speed >= _LEAST_SPEED_SHARE * speed.max()]))
+
+
+def velocity_window(recording: Recording) -> int:
+    """Return a derivative window, samples, that leaves hardly any noise on the usual speed."""
+    noise, period = position_noise(recording.position), recording.sample_period
+    window = fitting_window(recording, _ORDER)
+    while window <= len(recording) // _SHORTEST_RECORD:
+        velocity = differentiate(recording.position, period, window, _ORDER).velocity
+        allowed = _VELOCITY_NOISE * _usual_speed(np.abs(velocity))
+        if velocity_noise(noise, period, window, _ORDER) <= allowed:
+            break
+        window = (3 * window // 2) | 1
+    return window
+
+
+def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[SignatureStroke, ...]:
+    """Cut a record into strokes, and find the breakaway and the steady part of each.
+
+    A stroke is a run at more than half the usual speed over at least a tenth of the stem's range.
+    The breakaway is located by `fit_onset`, from the rest before the stroke and the first 5 % of
+    its way; the pressure there is read off a parabola through as many samples.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position.
+    valve : Valve
+        Diaphragm area and pressure reference.
+    window : int
+        Derivative window, samples, odd (`velocity_window`).
+
+    Returns
+    -------
+    tuple of SignatureStroke
+        In the order of time.
+    """
+    position, period = recording.position, recording.sample_period
+    force = valve.actuator_force(recording.pressure)
+    if len(recording) < window:
+        return ()
+    velocity, _, margin = differentiate(position, period, window, _ORDER)
+    force_rate, _, _ = differentiate(force, period, window, _ORDER)
+    speed = np.abs(velocity)
+    usual = _usual_speed(speed)
+    still = speed < _REST_SHARE * usual
+    span = float(np.ptp(position))
+    strokes = []
+    last_end = 0
+    for begin, end in _runs(speed > _RUN_SHARE * usual):
+        way = position[end - 1 + margin] - position[begin + margin]
+        direction = 1 if way > 0 else -1
+        run = velocity[begin:end]
+        if abs(way) < _LEAST_STROKE_SHARE * span or (direction * run < 0).any():
+            continue
+        steady = begin + _steady_instants(run)
+        sliding = Sliding(
+            recording.time[steady + margin],
+            position[steady + margin],
+            force[steady + margin],
+            velocity[steady],
+            force_rate[steady],
+        )
+        rests = [(a + last_end, b + last_end) for a, b in _runs(still[last_end:begin])]
+        rest = max(rests, key=lambda one: one[1] - one[0], default=(begin, begin))
+        strokes.append(
+            SignatureStroke(
+                direction,
+                _breakaway(recording, valve, (rest[0], begin, end), window),
+                float(np.sum(np.abs(velocity[steady])) / np.sum(np.abs(run))),
+                sliding,
+            )
+        )
+        last_end = end
+    return tuple(strokes)
+
+
+def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Find the samples of a run that are steady, in its longest stretch that is nearly so.
+
+    Elsewhere the velocity of a stem that jumps or stops only passes through the steady one.
+    """
+    pace = float(np.median(run))
+    distance = np.abs(run - pace)
+    begin, end = max(_runs(distance <= 2 * _STEADY * abs(pace)), key=lambda one: one[1] - one[0])
+    return begin + np.flatnonzero(distance[begin:end] <= _STEADY * abs(pace))
+
+
+def _breakaway(
+    recording: Recording, valve: Valve, places: tuple[int, int, int], window: int
+) -> BreakawayPoint | None:
+    """Locate the onset of a stroke from where its velocity rests, begins and ends.
+
+    A derivative window sees a jump half of its length too early, so half more is fitted.
+    """
+    rest, begin, end = (place + window // 2 for place in places)
+    position, period = recording.position, recording.sample_period
+    moved = np.abs(position[begin:end] - position[begin])
+    length = int(np.argmax(moved > _ONSET_SHARE * moved[-1])) + window // 2
+    first = max(rest, begin - length)
+    if begin - first < max(length // 4, _FEWEST) or length < _FEWEST:
+        return None
+    around = slice(first, begin + length)
+    time = recording.time[around]
+    pressure_then = Polynomial.fit(time, recording.pressure[around], 2)
+    rate = float(pressure_then.deriv()(begin * period))
+    growth = float(pressure_then.deriv(2)(begin * period)) / rate if rate else 0.0
+    most = 1 / float(time[-1] - time[0])
+    growth = min(max(growth, -most), most)
+    onset = fit_onset(time, position[around], begin * period, growth)
+    middle = round(onset.time / period)
+    near = slice(max(middle - length // 2, first), middle + length // 2 + 1)
+    pressure = float(Polynomial.fit(recording.time[near], recording.pressure[near], 2)(onset.time))
+    return BreakawayPoint(
+        onset.time,
+        onset.level,
+        pressure,
+        valve.diaphragm_area * (pressure - valve.pressure_reference),
+        onset.jump_speed,
+    )

@@ -1,0 +1,205 @@
+"""The valve signature: breakaway points, spring constant, bias and dead zone, (10) to (16)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.signature.strokes import (
+    BreakawayPoint,
+    SignatureStroke,
+    find_strokes,
+    velocity_window,
+)
+from valve_friction_ros.identification.trust.jackknife import jackknife
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+
+__all__ = [
+    "TRIANGLE_NEEDED",
+    "ValveSignature",
+    "Ways",
+    "breakaway_points",
+    "leaving_speed",
+    "mean_position_bias",
+    "mean_spring_constant",
+    "sliding_friction",
+    "sliding_speed",
+    "valve_signature",
+]
+
+TRIANGLE_NEEDED = (
+    "excite the valve by a slow triangular wave of pressure, such as 60 s a period, "
+    "for two periods or more"
+)
+"""The excitation that a valve signature is drawn with."""
+
+_LEAST_STEADINESS = 0.6
+
+Ways = Sequence[Sequence[SignatureStroke]]
+"""The strokes up, and the strokes down."""
+
+
+@dataclass(frozen=True, eq=False)
+class ValveSignature:
+    """What the paper reads off the valve signature.
+
+    Attributes
+    ----------
+    strokes : tuple of SignatureStroke
+        In the order of time, each with its breakaway point and its sliding instants.
+    spring_constant : float
+        k, N/m: mean of (15) over the sliding instants of each stroke, and over the strokes.
+    position_bias : float
+        x̄ of (14), m, between the mean P1 and the mean P2.
+    dead_zone : float
+        Width of the loop in pressure, Pa: how far the pressures at which the stem slides up and
+        down through the same position lie apart, 2·(F_c + F_v·|ẋ|)/S_a.
+    dead_zone_share : float
+        The same as a share of the pressure's span in the record.
+    standard_errors : mapping of str to float
+        Of `spring_constant`, `position_bias` and `dead_zone`, from the scatter between strokes;
+        nan with a single stroke either way.
+    window : int
+        Derivative window of the velocity, samples.
+    """
+
+    strokes: tuple[SignatureStroke, ...] = field(repr=False)
+    spring_constant: float
+    position_bias: float
+    dead_zone: float
+    dead_zone_share: float
+    standard_errors: Mapping[str, float]
+    window: int
+
+    @property
+    def ways(self) -> tuple[tuple[SignatureStroke, ...], tuple[SignatureStroke, ...]]:
+        """The strokes up, and the strokes down."""
+        upward = tuple(stroke for stroke in self.strokes if stroke.direction > 0)
+        return upward, tuple(stroke for stroke in self.strokes if stroke.direction < 0)
+
+    @property
+    def upward_points(self) -> tuple[BreakawayPoint, ...]:
+        """P1 of each stroke up that began from a recorded rest."""
+        return breakaway_points(self.ways[0])
+
+    @property
+    def downward_points(self) -> tuple[BreakawayPoint, ...]:
+        """P2 of each stroke down that began from a recorded rest."""
+        return breakaway_points(self.ways[1])
+
+
+def breakaway_points(strokes: Sequence[SignatureStroke]) -> tuple[BreakawayPoint, ...]:
+    """Return the breakaway points of those strokes that have one."""
+    return tuple(stroke.breakaway for stroke in strokes if stroke.breakaway is not None)
+
+
+def mean_spring_constant(ways: Ways) -> float:
+    """Return k of (15), N/m, averaged over the strokes of both ways."""
+    return float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
+
+
+def mean_position_bias(ways: Ways, spring_constant: float) -> float:
+    """Return x̄ of (14), m, between the mean breakaway point of either way."""
+    force, position = (
+        sum(
+            float(np.mean([getattr(point, name) for point in breakaway_points(way)]))
+            for way in ways
+        )
+        for name in ("force", "position")
+    )
+    return 0.5 * (force / spring_constant - position)
+
+
+def sliding_friction(ways: Ways, spring_constant: float) -> float:
+    """Return half the distance of F_ext − k·x between strokes up and down, N: F_c + F_v·|ẋ|."""
+    upward, downward = (
+        float(
+            np.mean(
+                [
+                    np.mean(stroke.sliding.force - spring_constant * stroke.sliding.position)
+                    for stroke in way
+                ]
+            )
+        )
+        for way in ways
+    )
+    return 0.5 * (upward - downward)
+
+
+def sliding_speed(ways: Ways) -> float:
+    """Return the mean speed at which the stem slides, m/s."""
+    strokes = [stroke for way in ways for stroke in way]
+    return float(np.mean([np.mean(np.abs(stroke.sliding.velocity)) for stroke in strokes]))
+
+
+def leaving_speed(ways: Ways) -> float:
+    """Return the mean speed at which the stem breaks away, m/s; 0 where any stroke shows none."""
+    speeds = [point.speed for way in ways for point in breakaway_points(way)]
+    return float(np.mean(speeds)) if min(speeds) > 0 else 0.0
+
+
+def valve_signature(
+    recording: Recording, valve: Valve, window: int | None = None
+) -> ValveSignature:
+    """Read spring constant, bias and dead zone off a valve signature.
+
+    The breakaway points, which the paper reads off its Fig. 2 by eye, are found by `fit_onset`.
+    A stroke that begins at a travel stop counts as well: as it leaves, the stop carries nothing.
+
+    Parameters
+    ----------
+    recording : Recording
+        Strokes in both directions at a constant speed, each from a rest, as a triangular pressure
+        makes them: `TriangleWave` with its 60 s suits the bench valve.
+    valve : Valve
+        Diaphragm area and pressure reference.
+    window : int, optional
+        Derivative window of the velocity, samples, odd; by default the noise chooses it.
+
+    Returns
+    -------
+    ValveSignature
+        Strokes, points and what follows from them.
+
+    Raises
+    ------
+    RefusalError
+        If there is no such stroke one way, or the stem does not slide at a constant speed.
+    """
+    window = window or velocity_window(recording)
+    strokes = find_strokes(recording, valve, window)
+    ways = [[one for one in strokes if one.direction == way] for way in (1, -1)]
+    counts = [len(breakaway_points(way)) for way in ways]
+    if strokes:
+        steadiness = float(np.median([stroke.steadiness for stroke in strokes]))
+        if steadiness < _LEAST_STEADINESS:
+            raise RefusalError(
+                "the stem does not slide at a constant speed, which a valve signature needs "
+                f"(only {100 * steadiness:.0f} % of a stroke's way is steady): {TRIANGLE_NEEDED}"
+            )
+    if not all(counts):
+        raise RefusalError(
+            "a valve signature needs strokes from rest both ways at a constant speed, and here "
+            f"are {counts[0]} up and {counts[1]} down: {TRIANGLE_NEEDED}"
+        )
+
+    def figures(ways: Ways) -> dict[str, float]:
+        spring_constant = mean_spring_constant(ways)
+        return {
+            "spring_constant": spring_constant,
+            "position_bias": mean_position_bias(ways, spring_constant),
+            "dead_zone": 2 * sliding_friction(ways, spring_constant) / valve.diaphragm_area,
+        }
+
+    pointed = [[stroke for stroke in way if stroke.breakaway is not None] for way in ways]
+    found = jackknife(pointed, figures)
+    return ValveSignature(
+        strokes,
+        **found.values,
+        dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.pressure)),
+        standard_errors=MappingProxyType(dict(found.standard_errors)),
+        window=window,
+    )

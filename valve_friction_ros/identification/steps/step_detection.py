@@ -1,0 +1,78 @@
+"""Where the steps of an input signal begin."""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.signals.noise import position_noise, sensor_noise
+from valve_friction_ros.signals.smoothing import find_corners
+
+__all__ = ["find_steps"]
+
+_GATE = 6.0
+_LEAST_SHARE = 1e-6
+_LEVEL_SAMPLES = 10
+_JUMP_SAMPLES = 3
+_JUMP_SHARE = 0.9
+_CORNER_SAMPLES = 40
+
+
+def find_steps(signal: NDArray[np.float64]) -> list[int]:
+    """Find the samples at which a signal leaves its level for another.
+
+    A command jumps: the first of three samples in a row beyond six standard deviations of the
+    noise from the level before begins the step. A pressure behind a lag bends instead, and its
+    steps begin where its slope jumps (`find_corners`). Without noise a millionth of the range
+    takes the place of its standard deviation.
+
+    Parameters
+    ----------
+    signal : ndarray of float, shape (n,)
+        Input signal, at least ten samples a level.
+
+    Returns
+    -------
+    list of int
+        Increasing; empty for a signal on one level.
+    """
+    # The levels of a command are no codes of a converter.
+    measured = position_noise(signal) > 0
+    noise = max(sensor_noise(signal) if measured else 0.0, _LEAST_SHARE * float(np.ptp(signal)))
+    if noise == 0 or signal.size <= _LEVEL_SAMPLES:
+        return []
+    starts = _departures(signal, _GATE * noise)
+    edges = [] if starts is None else [*starts, signal.size]
+    if starts is not None and all(_is_jump(signal, a, b) for a, b in pairwise(edges)):
+        return starts
+    return [int(corner) for corner in find_corners(signal, noise, _CORNER_SAMPLES)]
+
+
+def _is_jump(signal: NDArray[np.float64], start: int, end: int) -> bool:
+    """Tell whether nearly all of a change is done in three samples."""
+    before = float(np.mean(signal[max(start - _LEVEL_SAMPLES, 0) : start]))
+    at_once = float(np.mean(signal[start : start + _JUMP_SAMPLES])) - before
+    in_the_end = float(np.mean(signal[max(end - _LEVEL_SAMPLES, start) : end])) - before
+    return abs(at_once) >= _JUMP_SHARE * abs(in_the_end)
+
+
+def _departures(signal: NDArray[np.float64], gate: float) -> list[int] | None:
+    """Find where a signal leaves a level, which lasts ten samples at least, by more than `gate`.
+
+    None where it takes more than three samples to reach the next level.
+    """
+    windows = np.lib.stride_tricks.sliding_window_view(signal, _LEVEL_SAMPLES)
+    levels = np.flatnonzero(np.ptp(windows, axis=1) <= 2 * gate)
+    starts: list[int] = []
+    begin = 0
+    while (place := int(np.searchsorted(levels, begin))) < levels.size:
+        if starts and levels[place] > begin + _JUMP_SAMPLES:
+            return None
+        begin = int(levels[place])
+        away = np.abs(signal[begin:] - np.mean(signal[begin : begin + _LEVEL_SAMPLES])) > gate
+        lasting = np.convolve(away, np.ones(_JUMP_SAMPLES), "valid") == _JUMP_SAMPLES
+        if not lasting.any():
+            break
+        begin += int(np.argmax(lasting))
+        starts.append(begin)
+    return starts

@@ -1,0 +1,281 @@
+"""Response of a valve to steps of its input: T_d, T63, T86, overshoot, gain, dead band, resolution.
+
+These are the figures that ANSI/ISA-75.25.01, *Test Procedure for Control Valve Response
+Measurement from Step Inputs*, asks for; the attributes say how each is computed here. The input
+may be a command signal or a pressure, in any unit. With input and position both in percent of
+their spans the gain is the response gain of the standard.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.steps.step_detection import find_steps
+from valve_friction_ros.model.checks import require_positive
+from valve_friction_ros.signals.noise import sensor_noise
+from valve_friction_ros.signals.smoothing import (
+    longest_faithful_window,
+    smooth_between,
+)
+
+__all__ = ["Bracket", "StepMetrics", "StepTest", "step_test"]
+
+_T63 = -math.expm1(-1.0)
+_T86 = -math.expm1(-2.0)
+_SETTLED_SHARE = 0.05
+_VISIBLE = 5.0
+"""Standard deviations of the noise, as smoothed, that a movement has to exceed to be seen."""
+
+_LEAST_VISIBLE = 1e-3
+"""The least that is seen as a movement, as a share of the stem's range: settling leaves as much."""
+
+_LONGEST_SMOOTHING = 0.2
+_NO_CORNERS = np.empty(0, dtype=np.intp)
+
+
+class Bracket(NamedTuple):
+    """Two values between which a quantity lies, in the unit of the input.
+
+    Attributes
+    ----------
+    ignored : float
+        Largest change of the input that the stem ignored; 0 if it ignored none.
+    answered : float
+        Smallest change that it answered; infinite if it answered none.
+    """
+
+    ignored: float
+    answered: float
+
+
+@dataclass(frozen=True)
+class StepMetrics:
+    """Response to one step of the input.
+
+    Attributes
+    ----------
+    time : float
+        Beginning of the step, s since the first sample.
+    input_change : float
+        Steady input after the step less that before, unit of the input. Steady values are
+        means over the last twentieth of the time before the next step.
+    output_change : float
+        Steady position after the step less that before, unit of the position.
+    moved : bool
+        Whether the position changed by more than its noise explains.
+    dead_time : float
+        T_d: from the beginning of the step to the first detectable movement its way, s.
+    t63, t86 : float
+        From the beginning of the step to 63.2 % (1 − 1/e) and 86.5 % (1 − 1/e²) of the steady
+        change, s, dead time included. A first-order lag τ behind a delay has T_d + τ and T_d + 2·τ.
+    overshoot : float
+        How far the position goes beyond its final steady value, as a share of the steady change.
+
+    Notes
+    -----
+    Times and overshoot are nan where the stem did not move.
+    """
+
+    time: float
+    input_change: float
+    output_change: float
+    moved: bool
+    dead_time: float
+    t63: float
+    t86: float
+    overshoot: float
+
+    @property
+    def gain(self) -> float:
+        """Steady-state gain: change of the position over change of the input."""
+        return self.output_change / self.input_change
+
+
+@dataclass(frozen=True)
+class StepTest:
+    """What a record of steps says about a valve.
+
+    Attributes
+    ----------
+    steps : tuple of StepMetrics
+        In the order of time.
+    dead_band : Bracket
+        Range through which the input can be varied, upon reversal, without a movement. From
+        below by the largest range that the input swept while the stem stayed, from above by the
+        smallest change that moved the stem after a reversal right after a movement.
+    resolution : Bracket
+        Smallest change of the input, in the way of the movement before, that moves the stem.
+        From below by the largest such change, step upon step, that did not, from above by the
+        smallest that did.
+    smallest_movement : float
+        Movement that counts as seen, unit of the position.
+    smoothed : ndarray of float, shape (n,)
+        Position without its noise, from which times and overshoot were read.
+    """
+
+    steps: tuple[StepMetrics, ...]
+    dead_band: Bracket
+    resolution: Bracket
+    smallest_movement: float
+    smoothed: NDArray[np.float64] = field(repr=False, compare=False)
+
+
+def step_test(
+    input_signal: ArrayLike,
+    position: ArrayLike,
+    sample_period: float,
+    starts: Sequence[int] | None = None,
+    smallest_movement: float | None = None,
+) -> StepTest:
+    """Evaluate a record of steps, such as the test of ANSI/ISA-75.25.01.
+
+    Parameters
+    ----------
+    input_signal : array_like of float, shape (n,)
+        Command signal or pressure, any unit.
+    position : array_like of float, shape (n,)
+        Stem position, any unit.
+    sample_period : float
+        Time between two samples, s.
+    starts : sequence of int, optional
+        Sample at which each step begins, increasing; by default found in the input (`find_steps`).
+        Steps smaller than the noise of a measured input have to be given.
+    smallest_movement : float, optional
+        Change of the position that counts as a movement; by default five standard deviations of
+        the noise that smoothing leaves on the position, and at least 0.1 % of its range in the
+        record, which is about what a stem that still settles moves after a hold.
+
+    Returns
+    -------
+    StepTest
+        Response to each step, dead band and resolution.
+
+    Raises
+    ------
+    ValueError
+        If the signals differ in length, hold values that are not finite, or a step lies outside.
+    RefusalError
+        If there is no step.
+    """
+    period = require_positive("sample_period", sample_period)
+    signal = np.asarray(input_signal, dtype=np.float64)
+    measured = np.asarray(position, dtype=np.float64)
+    if signal.ndim != 1 or signal.shape != measured.shape or signal.size == 0:
+        raise ValueError(
+            f"input and position must be rows of as many samples, got shapes {signal.shape} and "
+            f"{measured.shape}"
+        )
+    for name, values in (("input", signal), ("position", measured)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"the {name} is not finite at sample {np.argmin(np.isfinite(values))}")
+    edges = [*(find_steps(signal) if starts is None else starts), signal.size]
+    if len(edges) == 1:
+        raise RefusalError("there is no step in the input: record steps, or give their samples")
+    if edges[0] < 1 or min(np.diff(edges)) < 1:
+        raise ValueError(f"steps must begin at increasing samples from 1 to {signal.size - 1}")
+    smooth, noise = _smoothed(measured, period)
+    least = smallest_movement
+    if least is None:
+        least = max(_VISIBLE * noise, _LEAST_VISIBLE * float(np.ptp(measured)))
+    holds = [slice(a, b) for a, b in zip([0, *edges[:-1]], edges, strict=True)]
+    inputs = [_steady(signal[hold]) for hold in holds]
+    outputs = [_steady(measured[hold]) for hold in holds]
+    steps = tuple(
+        _metrics(smooth[hold], hold.start * period, period, (u, y), least)
+        for hold, u, y in zip(holds[1:], pairwise(inputs), pairwise(outputs), strict=True)
+    )
+    return StepTest(steps, _dead_band(inputs, steps), _resolution(steps), least, smooth)
+
+
+def _smoothed(position: NDArray[np.float64], period: float) -> tuple[NDArray[np.float64], float]:
+    """Smooth a position as far as its noise asks for; return it and the noise that is left."""
+    noise = sensor_noise(position)
+    longest = max(round(_LONGEST_SMOOTHING / period), 1)
+    window = longest_faithful_window(position, _NO_CORNERS, noise, longest)
+    if window == 1:
+        return position, noise
+    kept = 1.5 / math.sqrt(window)  # of white noise by a cubic, in the middle of its window
+    return smooth_between(position, _NO_CORNERS, window), kept * noise
+
+
+def _steady(hold: NDArray[np.float64]) -> float:
+    """Mean of the last twentieth of a hold."""
+    return float(np.mean(hold[-max(round(_SETTLED_SHARE * hold.size), 1) :]))
+
+
+def _first_beyond(response: NDArray[np.float64], level: float) -> float:
+    """Place at which a response first reaches a level, between samples; nan if it never does."""
+    reached = np.flatnonzero(response >= level)
+    if not reached.size:
+        return math.nan
+    after = int(reached[0])
+    if after == 0:
+        return 0.0
+    before = response[after - 1]
+    return after - 1 + float((level - before) / (response[after] - before))
+
+
+def _metrics(
+    hold: NDArray[np.float64],
+    time: float,
+    period: float,
+    steady: tuple[tuple[float, float], tuple[float, float]],
+    least: float,
+) -> StepMetrics:
+    """Evaluate a step from the positions up to the next, and the steady inputs and positions."""
+    (input_before, input_after), (before, after) = steady
+    input_change, output_change = input_after - input_before, after - before
+    moved = abs(output_change) > least
+    dead_time = t63 = t86 = overshoot = math.nan
+    if moved:
+        way = math.copysign(1.0, output_change)
+        response = way * (hold - before)
+        change = abs(output_change)
+        dead_time, t63, t86 = (
+            period * _first_beyond(response, level)
+            for level in (least, _T63 * change, _T86 * change)
+        )
+        beyond = float(response.max()) - change
+        overshoot = beyond / change if beyond > least else 0.0
+    return StepMetrics(time, input_change, output_change, moved, dead_time, t63, t86, overshoot)
+
+
+def _dead_band(inputs: Sequence[float], steps: Sequence[StepMetrics]) -> Bracket:
+    """Bracket the dead band by what the stem ignored, and by what it answered upon reversal."""
+    ignored, answered = 0.0, math.inf
+    lowest = highest = inputs[0]
+    last_way, turn = 0.0, inputs[0]
+    for level, step in zip(inputs[1:], steps, strict=True):
+        way = math.copysign(1.0, step.input_change)
+        if step.moved:
+            if way == -last_way:
+                answered = min(answered, abs(level - turn))
+            last_way, turn, lowest, highest = way, level, level, level
+        else:
+            lowest, highest = min(lowest, level), max(highest, level)
+            ignored = max(ignored, highest - lowest)
+    return Bracket(ignored, answered)
+
+
+def _resolution(steps: Sequence[StepMetrics]) -> Bracket:
+    """Bracket the resolution by changes in the way of the movement before."""
+    ignored, answered = 0.0, math.inf
+    last_way, change = 0.0, 0.0
+    for step in steps:
+        way = math.copysign(1.0, step.input_change)
+        change = change + abs(step.input_change) if way == last_way else 0.0
+        if step.moved:
+            if way == last_way:
+                answered = min(answered, change)
+            last_way, change = way, 0.0
+        elif way == last_way:
+            ignored = max(ignored, change)
+        else:
+            last_way = 0.0
+    return Bracket(ignored, answered)

@@ -1,0 +1,129 @@
+"""Validation: a recording simulated with an identified model, section 5 of the paper."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.trust.excitation import require_motion
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.simulation import StemState, simulate
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.conditioned_record import smoothed_pressure
+from valve_friction_ros.signals.derivative_window import fitting_window
+from valve_friction_ros.signals.noise import position_noise
+
+__all__ = ["Validation", "measured_start", "validate"]
+
+_START_TIME = 0.1
+_START_ORDER = 3
+_MOVES = 4.0
+"""Standard errors from zero at which the first slope is a motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """A measured stem beside the simulated one.
+
+    Attributes
+    ----------
+    recording : Recording
+        What was measured.
+    simulated : ndarray of float, shape (n,)
+        Simulated stem position at the same times, m.
+    """
+
+    recording: Recording
+    simulated: NDArray[np.float64] = field(repr=False)
+
+    @property
+    def residual(self) -> NDArray[np.float64]:
+        """Simulated less measured position, m, shape (n,)."""
+        return self.simulated - self.recording.position
+
+    @property
+    def fit(self) -> float:
+        """Share of the movement that is reproduced, 1 − ‖y − ŷ‖ / ‖y − ȳ‖, at most 1.
+
+        It is 0 for a model no better than the mean position, and below for a worse one.
+        """
+        position = self.recording.position
+        moved = float(np.linalg.norm(position - position.mean()))
+        return 1 - float(np.linalg.norm(self.residual)) / moved
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual, m, sensor noise included."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def maximum_error(self) -> float:
+        """Largest magnitude of the residual, m, sensor noise included."""
+        return float(np.max(np.abs(self.residual)))
+
+
+def measured_start(recording: Recording, valve: Valve) -> StemState:
+    """Read the state of the stem at the first sample off the record.
+
+    A straight line through the first samples, as many as the noise asks for and 0.1 s at the
+    most, gives position and velocity; a slope that the noise could make counts as rest.
+    """
+    longest = max(round(_START_TIME / recording.sample_period), 2)
+    count = min(fitting_window(recording, _START_ORDER), longest, len(recording))
+    position = recording.position[:count]
+    place = np.arange(count) - (count - 1) / 2
+    spread = float(place @ place)
+    slope = float(place @ position) / spread
+    level = float(position.mean())
+    if abs(slope) <= _MOVES * position_noise(recording.position) / np.sqrt(spread):
+        slope = 0.0
+    start = level + slope * place[0]
+    stops = (0.0, valve.travel) if np.isfinite(valve.travel) else (-np.inf, np.inf)
+    inside = float(np.clip(start, *stops))
+    return StemState(inside, slope / recording.sample_period if inside == start else 0.0)
+
+
+def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) -> Validation:
+    """Simulate a recording with a model, and put the stem beside the measured one.
+
+    The stem starts where, and as fast as, it was measured (`measured_start`); nothing is fitted
+    to this record. Position and velocity are the whole state of a Karnopp stem: where it rests
+    within its dead band, static friction holds it there, as in the machine. An error of the
+    start, from sensor noise at most, lasts until the stem first slides. The pressure is smoothed
+    as for the identification, since its noise would break the stem away early.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position; another record than the one identified, to validate.
+    valve : Valve
+        Geometry.
+    parameters : KarnoppParameters
+        The model.
+
+    Returns
+    -------
+    Validation
+        Simulated position, fit and errors.
+
+    Raises
+    ------
+    RefusalError
+        If the stem did not move, or the model has no spring: nothing calls such a stem back, and
+        a simulation drifts away from the record whatever the friction.
+    """
+    if parameters.spring_constant == 0:
+        raise RefusalError(
+            "a model without a spring cannot be validated: its simulated stem drifts away"
+        )
+    require_motion(recording)
+    trajectory = simulate(
+        valve,
+        parameters,
+        smoothed_pressure(recording),
+        recording.sample_period,
+        measured_start(recording, valve),
+    )
+    return Validation(recording, trajectory.position)

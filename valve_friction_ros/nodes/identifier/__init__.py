@@ -1,0 +1,1 @@
+"""The node that identifies a valve and watches its friction."""

@@ -1,0 +1,66 @@
+"""The latched topics that an identifier's results go out on."""
+
+from rclpy.node import Node
+from std_msgs.msg import Float64, Float64MultiArray
+
+from valve_friction_ros.health import FrictionMonitor, dead_band
+from valve_friction_ros.identification import UNITS, Assessment
+from valve_friction_ros.nodes.plumbing.messages import sweep_message
+from valve_friction_ros.nodes.plumbing.qos import LATCHED
+
+__all__ = ["ResultTopics"]
+
+_FIGURES = (
+    "dead_band",
+    "coulomb_friction_ratio",
+    "fit",
+    "rms",
+    "threshold",
+    "sigma",
+    "r_squared",
+)
+
+
+class ResultTopics:
+    """Publishes each number of an assessment on a topic of its own, and the sweep.
+
+    Parameters
+    ----------
+    node : Node
+        The identifier.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._friction = {
+            name: node.create_publisher(Float64, f"~/friction/{name}", LATCHED)
+            for name in (*UNITS, *_FIGURES)
+        }
+        self._half_width, self._published = (
+            {name: node.create_publisher(Float64, f"~/{kind}/{name}", LATCHED) for name in UNITS}
+            for kind in ("half_width", "published")
+        )
+        self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
+
+    def publish(self, assessment: Assessment, monitor: FrictionMonitor) -> None:
+        """Publish an assessment that the monitor has accepted."""
+        ratio = monitor.diagnosis().ratio
+        published = assessment.published
+        unknown = float("nan")
+        figures = {
+            **assessment.values,
+            "dead_band": dead_band(assessment, monitor.settings.valve),
+            "coulomb_friction_ratio": unknown if ratio is None else ratio.value,
+            "fit": assessment.fit,
+            "rms": assessment.rms,
+            "threshold": unknown if published is None else published.threshold,
+            "sigma": unknown if published is None else published.sigma,
+            "r_squared": unknown if published is None else published.r_squared,
+        }
+        for name, publisher in self._friction.items():
+            publisher.publish(Float64(data=figures[name]))
+        for name, publisher in self._half_width.items():
+            publisher.publish(Float64(data=assessment.parameters[name].half_width))
+        for name, publisher in self._published.items():
+            value = unknown if published is None else published.values[name]
+            publisher.publish(Float64(data=value))
+        self._sweep.publish(sweep_message(assessment.sweep))

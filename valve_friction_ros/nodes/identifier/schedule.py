@@ -1,0 +1,72 @@
+"""Identification every so many seconds, and what came of it when nothing could be identified."""
+
+from collections.abc import Callable
+
+from rclpy.node import Node
+from rclpy.timer import Timer
+
+from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
+
+__all__ = ["PERIOD", "Schedule"]
+
+PERIOD = ParameterSpec(
+    "period",
+    0.0,
+    "Time from one scheduled identification to the next [s]; 0: only on demand",
+    (0.0, 31_557_600.0),
+)
+
+
+class Schedule:
+    """Calls for an identification by the node's clock, and remembers why the last was skipped.
+
+    A skip is nobody's fault: it changes neither verdict nor level, and it is not logged.
+
+    Parameters
+    ----------
+    node : Node
+        The identifier, with the parameter above.
+    identify : callable
+        Begins an identification.
+    """
+
+    def __init__(self, node: Node, identify: Callable[[], None]) -> None:
+        self._node = node
+        self._identify = identify
+        self._period = 0.0
+        self._timer: Timer | None = None
+        self._skip: tuple[str, int] | None = None
+        self.follow()
+
+    def follow(self) -> None:
+        """Follow the parameter."""
+        period = self._node.get_parameter(PERIOD.name).value
+        if period == self._period:
+            return
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
+            self._timer = None
+        if period > 0:
+            self._timer = self._node.create_timer(period, self._identify)
+        self._period, self._skip = period, None
+
+    def skip(self, reason: str) -> None:
+        """Remember that nothing was identified, and why."""
+        self._skip = reason, self._node.get_clock().now().nanoseconds
+
+    def stall(self) -> None:
+        """Remember that nothing new has come; an older reason for a skip still holds."""
+        if self._skip is None:
+            self.skip("no new samples since the last identification")
+
+    def succeed(self) -> None:
+        """Forget the last skip."""
+        self._skip = None
+
+    def values(self) -> dict[str, str]:
+        """Return the values of the diagnostic that tell of the last skip, if there is one."""
+        if self._skip is None:
+            return {}
+        reason, stamp = self._skip
+        age = (self._node.get_clock().now().nanoseconds - stamp) / 1e9
+        return {"scheduled_skip": reason, "scheduled_skip_age [s]": f"{age:.3f}"}

@@ -1,0 +1,1 @@
+"""What the nodes share: messages, parameters, qualities of service, running and stopping."""

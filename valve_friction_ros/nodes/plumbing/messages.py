@@ -1,0 +1,85 @@
+"""Between messages and plain numbers."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from valve_friction_ros.identification import Sweep
+from valve_friction_ros.streams import Arrivals, rows_arrived
+from valve_friction_ros.streams.joint_position import joint_position
+
+__all__ = ["position_of", "rows_of", "stamp_of", "sweep_message", "time_message"]
+
+_NANOSECONDS = 1_000_000_000
+
+
+def stamp_of(time: Time) -> int:
+    """Time of a message in whole nanoseconds."""
+    stamp: int = time.sec * _NANOSECONDS + time.nanosec
+    return stamp
+
+
+def time_message(stamp: int) -> Time:
+    """Message of a time in whole nanoseconds."""
+    seconds, nanoseconds = divmod(stamp, _NANOSECONDS)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def position_of(message: JointState, joint: str) -> float | None:
+    """Position of `joint` in m, of the first joint for an empty name; None if it is not there."""
+    return joint_position(message.name, message.position, joint)
+
+
+def rows_of(message: Float64MultiArray) -> Arrivals:
+    """Take the samples out of a block: a row each of s, Pa and m.
+
+    Raises
+    ------
+    ValueError
+        If the layout is not that of such a block; the message says what it should be.
+    """
+    dimensions = message.layout.dim
+    if len(dimensions) != 2:
+        raise ValueError(f"the layout has {len(dimensions)} dimensions, not sample × columns")
+    rows, columns = dimensions
+    if rows.label != "sample":
+        raise ValueError(f"the first dimension is labelled {rows.label!r}, not 'sample'")
+    count = rows.size * columns.size
+    if message.layout.data_offset or len(message.data) != count:
+        raise ValueError(
+            f"there are {len(message.data)} numbers from offset {message.layout.data_offset}, "
+            f"not {rows.size} × {columns.size} from 0"
+        )
+    table = np.asarray(message.data, dtype=np.float64).reshape(rows.size, columns.size)
+    return rows_arrived(table, columns.label.split(","))
+
+
+def sweep_message(sweep: Sweep | None) -> Float64MultiArray:
+    """Table of a sweep: a row a threshold, the columns named in the label of the second axis.
+
+    Empty for a method without a sweep, so that a latched one of before does not stay.
+    """
+    if sweep is None:
+        return Float64MultiArray()
+    columns: Mapping[str, np.ndarray] = {
+        "threshold": sweep.thresholds,
+        **sweep.estimates,
+        "sigma": sweep.sigma,
+        "r_squared": sweep.r_squared,
+        "samples": sweep.samples.astype(np.float64),
+    }
+    table = np.column_stack([*columns.values()])
+    rows, width = table.shape
+    return Float64MultiArray(
+        layout=MultiArrayLayout(
+            dim=[
+                MultiArrayDimension(label="threshold", size=rows, stride=math.prod(table.shape)),
+                MultiArrayDimension(label=",".join(columns), size=width, stride=width),
+            ]
+        ),
+        data=table.ravel().tolist(),
+    )

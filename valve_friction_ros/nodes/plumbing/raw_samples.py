@@ -1,0 +1,181 @@
+"""Samples out of serialised messages, by the block.
+
+The stream of one publisher repeats everything but stamps and numbers: frame, joint names and counts
+lie at the same bytes of each message. So one message is taken apart, and the others, once their
+bytes are seen to repeat, give their numbers to NumPy as columns of a table. Messages that are laid
+out differently are deserialised by rclpy, one by one.
+"""
+
+import struct
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import FluidPressure, JointState
+
+from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.streams import Arrivals, Kind, Samples
+from valve_friction_ros.streams.joint_position import joint_index
+
+__all__ = ["RawSamples", "positions_in", "pressures_in"]
+
+_LITTLE_ENDIAN = b"\x00\x01"
+_BODY = 4
+"""First byte after the representation's header, from which alignment counts."""
+_STAMP = slice(_BODY, _BODY + 8)
+_DOUBLE = 8
+
+
+class _Layout(NamedTuple):
+    """Where a message has its number, and which bytes up to there every message repeats."""
+
+    number: int
+    repeated: NDArray[np.bool_]
+
+
+class _Reader:
+    """Reads the beginning of a serialised message (CDR, little endian).
+
+    Raises struct.error or ValueError where it is not one.
+    """
+
+    def __init__(self, message: bytes) -> None:
+        if message[:2] != _LITTLE_ENDIAN:
+            raise ValueError("not little endian")
+        self._message = message
+        self._at = _STAMP.stop
+        self._repeated = np.zeros(len(message), dtype=bool)
+        self._repeated[:2] = True
+
+    def _align(self, size: int) -> None:
+        self._at += -(self._at - _BODY) % size
+
+    def _take(self, size: int) -> bytes:
+        taken = slice(self._at, self._at + size)
+        self._repeated[taken] = True
+        self._at += size
+        return self._message[taken]
+
+    def count(self) -> int:
+        self._align(4)
+        number: int = struct.unpack("<I", self._take(4))[0]
+        return number
+
+    def string(self) -> str:
+        return self._take(self.count()).rstrip(b"\0").decode()
+
+    def double(self, index: int = 0) -> _Layout:
+        self._align(_DOUBLE)
+        number = self._at + _DOUBLE * index
+        if number + _DOUBLE > len(self._message):
+            raise ValueError("the message ends before its number")
+        return _Layout(number, self._repeated[:number])
+
+
+def _pressure_layout(message: bytes) -> _Layout:
+    reader = _Reader(message)
+    reader.string()
+    return reader.double()
+
+
+def _position_layout(message: bytes, joint: str) -> _Layout:
+    reader = _Reader(message)
+    reader.string()
+    names = [reader.string() for _ in range(reader.count())]
+    index = joint_index(names, reader.count(), joint)
+    if index is None:
+        raise ValueError("no position of the joint")
+    return reader.double(index)
+
+
+def _alike(
+    messages: Sequence[bytes], layout_of: Callable[[bytes], _Layout]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+    """Return stamps and numbers of messages that are laid out alike, else None."""
+    try:
+        layout = layout_of(messages[0])
+    except (struct.error, ValueError):
+        return None
+    end = layout.number + _DOUBLE
+    joined = b"".join([message[:end] for message in messages])
+    if len(joined) != len(messages) * end:
+        return None
+    table = np.frombuffer(joined, np.uint8).reshape(-1, end)
+    repeated = np.flatnonzero(layout.repeated)
+    if (table[1:, repeated] != table[0, repeated]).any():
+        return None
+    seconds, nanoseconds = table[:, _STAMP].copy().view(np.dtype("<u4")).astype(np.int64).T
+    seconds = seconds.astype(np.int32).astype(np.int64)
+    values = table[:, layout.number : end].copy().view(np.dtype("<f8"))[:, 0]
+    return seconds * 1_000_000_000 + nanoseconds, values.astype(np.float64)
+
+
+def pressures_in(messages: Sequence[bytes]) -> Samples:
+    """Return the samples of serialised sensor_msgs/FluidPressure messages, Pa."""
+    if not messages:
+        return Samples(np.empty(0, np.int64), np.empty(0))
+    alike = _alike(messages, _pressure_layout)
+    if alike is not None:
+        return Samples(*alike)
+    read: list[Any] = [deserialize_message(message, FluidPressure) for message in messages]
+    return Samples(
+        np.array([stamp_of(message.header.stamp) for message in read], dtype=np.int64),
+        np.array([message.fluid_pressure for message in read], dtype=np.float64),
+    )
+
+
+def positions_in(messages: Sequence[bytes], joint: str) -> Arrivals:
+    """Return what serialised sensor_msgs/JointState messages hold of `joint`, m."""
+    alike = _alike(messages, lambda one: _position_layout(one, joint)) if messages else None
+    if alike is not None:
+        return Arrivals(np.full(len(messages), Kind.POSITION, np.uint8), *alike)
+    read: list[Any] = [deserialize_message(message, JointState) for message in messages]
+    found = [position_of(message, joint) for message in read]
+    return Arrivals(
+        np.array([Kind.NO_POSITION if one is None else Kind.POSITION for one in found], np.uint8),
+        np.array([stamp_of(message.header.stamp) for message in read], dtype=np.int64),
+        np.array([np.nan if one is None else one for one in found], dtype=np.float64),
+    )
+
+
+class RawSamples:
+    """Messages of both topics as they came, not yet looked at.
+
+    Parameters
+    ----------
+    joint : str
+        Joint of the stem; empty: the first.
+    """
+
+    def __init__(self, joint: str) -> None:
+        self._joint = joint
+        self._pressures: list[bytes] = []
+        self._stems: list[bytes] = []
+        self._order = bytearray()
+
+    def __len__(self) -> int:
+        """Count the messages."""
+        return len(self._order)
+
+    def add_pressure(self, message: bytes) -> None:
+        """Keep a serialised FluidPressure."""
+        self._pressures.append(message)
+        self._order.append(Kind.PRESSURE)
+
+    def add_stem(self, message: bytes) -> None:
+        """Keep a serialised JointState."""
+        self._stems.append(message)
+        self._order.append(Kind.POSITION)
+
+    def take(self) -> Arrivals:
+        """Return the samples of all messages in the order of their arrival, and forget them."""
+        kinds = np.frombuffer(bytes(self._order), np.uint8).copy()
+        pressures, stems = pressures_in(self._pressures), positions_in(self._stems, self._joint)
+        self._pressures, self._stems, self._order = [], [], bytearray()
+        stamps, values = np.empty(kinds.size, np.int64), np.empty(kinds.size)
+        of_stem = kinds == Kind.POSITION
+        stamps[~of_stem], values[~of_stem] = pressures
+        kinds[of_stem], stamps[of_stem], values[of_stem] = stems
+        return Arrivals(kinds, stamps, values)

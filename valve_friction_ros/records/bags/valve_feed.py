@@ -1,0 +1,130 @@
+"""The messages of one valve in a bag, on their way through the buffer that the node has."""
+
+from collections.abc import Callable, Mapping
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.records.bags.messages import UndecodableError, decode, stamp_of
+from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, Topic, ValveTopics
+from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.streams.joint_position import joint_position, only_joint
+from valve_friction_ros.streams.record_buffer import RecordBuffer
+from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
+
+__all__ = ["ValveFeed"]
+
+_ALL = 1e9
+"""A window longer than any recording, s."""
+
+
+class ValveFeed:
+    """Fills a `RecordBuffer` from recorded messages.
+
+    Parameters
+    ----------
+    topics : ValveTopics
+        The valve's topics; both are there.
+    valve : Valve
+        Tells the range of the pressure sensor.
+    joint : str or None
+        Name of the stem's joint; None: the only one, or the one called `stem`.
+    stretch : Stretch
+        Which part to take.
+    """
+
+    def __init__(
+        self, topics: ValveTopics, valve: Valve, joint: str | None, stretch: Stretch
+    ) -> None:
+        self._topics = topics
+        self._joint = joint
+        self._joints_seen: set[str] = set()
+        self._stretch = stretch
+        self._buffer = RecordBuffer(valve, min(stretch.last, _ALL))
+        self._first_stamp: int | None = None
+        self._undecodable: dict[str, int] = {}
+        self._refusal: str | None = None
+
+    @property
+    def inputs(self) -> Mapping[Topic, Callable[[bytes], None]]:
+        """What takes the messages of which topic."""
+        return {
+            Topic(name, kind): take
+            for name, kind, take in (
+                (self._topics.pressure, PRESSURE_TYPE, self._take_pressure),
+                (self._topics.stem, STEM_TYPE, self._take_stem),
+            )
+            if name is not None
+        }
+
+    def _wants(self, stamp: int) -> bool:
+        if self._first_stamp is None:
+            self._first_stamp = stamp
+        return self._stretch.contains(stamp - self._first_stamp)
+
+    def _take_pressure(self, data: bytes) -> None:
+        try:
+            message = decode(data, PRESSURE_TYPE)
+        except UndecodableError:
+            self._count_undecodable(self._topics.pressure)
+            return
+        stamp = stamp_of(message)
+        if self._wants(stamp):
+            self._buffer.add_pressure(stamp, float(message.fluid_pressure))
+
+    def _take_stem(self, data: bytes) -> None:
+        try:
+            message = decode(data, STEM_TYPE)
+        except UndecodableError:
+            self._count_undecodable(self._topics.stem)
+            return
+        stamp = stamp_of(message)
+        if not self._wants(stamp):
+            return
+        self._joints_seen.update(message.name)
+        if self._joint is None:
+            try:
+                self._joint = only_joint(message.name)
+            except ValueError as error:
+                self._refusal = self._refusal or f"{self._topics.stem}: {error}"
+                return
+        position = joint_position(message.name, message.position.tolist(), self._joint)
+        self._buffer.add_position(stamp, position)
+
+    def _count_undecodable(self, topic: str | None) -> None:
+        self._undecodable[str(topic)] = self._undecodable.get(str(topic), 0) + 1
+
+    def notes(self) -> list[str]:
+        """Tell what of the messages was left out."""
+        notes = [
+            f"{count} messages of {topic} are no such messages, and were left out"
+            for topic, count in self._undecodable.items()
+        ]
+        cause = self._buffer.snapshot().cleared_because
+        if cause is not None:
+            notes.append(f"{cause}: what was recorded before that was left out")
+        return notes
+
+    def recording(self) -> Recording:
+        """Bring both signals onto one grid, as the node does.
+
+        Raises
+        ------
+        RefusalError
+            If the samples make no record; told for a file, which cannot be waited for.
+        """
+        if self._refusal is not None:
+            raise RefusalError(self._refusal)
+        snapshot = self._buffer.snapshot()
+        if self._joint and self._joints_seen and self._joint not in self._joints_seen:
+            joints = ", ".join(sorted(self._joints_seen))
+            raise RefusalError(f"{self._topics.stem}: no joint {self._joint!r} among {joints}")
+        if snapshot.rejections:
+            raise RefusalError(
+                f"bad samples: {snapshot.causes()}: use a stretch of the record without them"
+            )
+        names = (str(self._topics.pressure), str(self._topics.stem))
+        try:
+            return uniform_recording(snapshot.pressure, snapshot.position, names)
+        except GapError as gap:
+            raise RefusalError(f"{gap.what}: use a stretch of the record without it") from None

@@ -1,0 +1,154 @@
+"""A buffer's content as a bag, so that it can be kept, sent and identified again."""
+
+import errno
+import heapq
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import yaml
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.records.bags.messages import TYPES, encode, header
+from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, StreamNames
+from valve_friction_ros.streams.record_buffer import Snapshot
+from valve_friction_ros.streams.samples import Samples
+
+__all__ = ["VALVE_FILE", "write_bag"]
+
+VALVE_FILE = "valve.yaml"
+"""The description of the valve, in the folder of the bag."""
+
+_VERSION: Final = 9
+"""Version of the metadata, that of ROS 2 Jazzy."""
+
+_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)
+"""Errors of a rename onto a name that something has."""
+
+_LARGEST_STAMP = (2**31 - 1) * 1_000_000_000
+
+_NOTHING = np.zeros(0)
+
+
+def _pressures(samples: Samples) -> Iterator[tuple[int, str, bytes]]:
+    kind = TYPES.types[PRESSURE_TYPE]
+    for stamp, pressure in zip(samples.stamps.tolist(), samples.values.tolist(), strict=True):
+        message = kind(header=header(stamp), fluid_pressure=pressure, variance=0.0)
+        yield stamp, PRESSURE_TYPE, encode(message, PRESSURE_TYPE)
+
+
+def _positions(samples: Samples, joint: str) -> Iterator[tuple[int, str, bytes]]:
+    kind = TYPES.types[STEM_TYPE]
+    for stamp, position in zip(samples.stamps.tolist(), samples.values, strict=True):
+        message = kind(
+            header=header(stamp),
+            name=[joint] if joint else [],
+            position=np.array([position]),
+            velocity=_NOTHING,
+            effort=_NOTHING,
+        )
+        yield stamp, STEM_TYPE, encode(message, STEM_TYPE)
+
+
+def _write(folder: Path, snapshot: Snapshot, names: StreamNames) -> None:
+    messages = heapq.merge(
+        _pressures(snapshot.pressure), _positions(snapshot.position, names.joint)
+    )
+    with Writer(folder, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+        if snapshot.rejections:
+            writer.set_custom_data("rejected_samples", snapshot.causes())
+        connections = {
+            kind: writer.add_connection(topic, kind, typestore=TYPES)
+            for topic, kind in ((names.pressure, PRESSURE_TYPE), (names.stem, STEM_TYPE))
+        }
+        for stamp, kind, data in messages:
+            writer.write(connections[kind], max(stamp, 0), data)
+
+
+def _flush(folder: Path) -> None:
+    """Have the disk hold all of a folder before its name says that it is whole."""
+    for path in (*folder.iterdir(), folder):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _moved(whole: Path, folder: Path, name: str) -> Path:
+    """Give a finished bag its name, or the first free one after it."""
+    number, target = 1, folder / name
+    while True:
+        try:
+            return whole.rename(target)
+        except OSError as error:
+            if error.errno not in _TAKEN:
+                raise
+        number += 1
+        target = folder / f"{name}_{number}"
+
+
+def write_bag(
+    folder: Path,
+    name: str,
+    snapshot: Snapshot,
+    names: StreamNames,
+    valve: Valve,
+    assumed_mass: float,
+) -> Path:
+    """Write a snapshot as a bag of MCAP, with the stamps it was received with.
+
+    It is written in a hidden folder beside its place and then renamed, so that nobody meets
+    half a bag. A valve file lies in it: `identify_recording BAG --valve BAG/valve.yaml` gives the
+    numbers that the snapshot gives.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the bag is put; made if it is not there.
+    name : str
+        Name of the bag; where it is taken, a number is put after it.
+    snapshot : Snapshot
+        Samples; the rejected ones are only counted, in the metadata.
+    names : StreamNames
+        Topics and joint.
+    valve : Valve
+        Geometry and sensor range, for the valve file.
+    assumed_mass : float
+        Mass where the record does not tell it, kg, for the valve file.
+
+    Returns
+    -------
+    Path
+        The bag.
+
+    Raises
+    ------
+    RefusalError
+        If there is nothing to write.
+    OSError
+        If it cannot be written; nothing is left behind.
+    """
+    stamps = np.concatenate((snapshot.pressure.stamps, snapshot.position.stamps))
+    if stamps.size == 0:
+        raise RefusalError("the buffer is empty: there is nothing to save")
+    if np.abs(stamps).max() > _LARGEST_STAMP:
+        raise RefusalError("there are stamps after the year 2038, which no header can hold")
+    folder.mkdir(parents=True, exist_ok=True)
+    workplace = Path(tempfile.mkdtemp(prefix=".saving_", dir=folder))
+    try:
+        whole = workplace / name
+        _write(whole, snapshot, names)
+        description = yaml.safe_dump({**asdict(valve), "mass": assumed_mass}, sort_keys=False)
+        (whole / VALVE_FILE).write_text(description, encoding="utf-8")
+        _flush(whole)
+        return _moved(whole, folder, name)
+    finally:
+        shutil.rmtree(workplace, ignore_errors=True)

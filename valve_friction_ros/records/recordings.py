@@ -1,0 +1,74 @@
+"""Recorded files of any kind: one function reads them all."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.records.bags.files import is_bag
+from valve_friction_ros.records.bags.reading import read_bag
+from valve_friction_ros.records.bags.topics import TopicChoice
+from valve_friction_ros.records.csv_recording import CsvFormat, drive_column, read_recording
+from valve_friction_ros.records.recorded_valve import RecordedValve
+from valve_friction_ros.records.stretch import Stretch
+
+__all__ = ["ReadingOptions", "holds_force", "read_recordings"]
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """What a file does not say itself.
+
+    Attributes
+    ----------
+    csv : CsvFormat
+        How a CSV file is written.
+    topics : TopicChoice
+        What to read from a bag.
+    stretch : Stretch
+        Which part of the time to read.
+    """
+
+    csv: CsvFormat = field(default_factory=CsvFormat)
+    topics: TopicChoice = field(default_factory=TopicChoice)
+    stretch: Stretch = field(default_factory=Stretch)
+
+
+def holds_force(path: Path, options: ReadingOptions) -> bool:
+    """Tell whether a file holds the force of a machine without a diaphragm, and no pressure.
+
+    Raises
+    ------
+    ValueError
+        If it is a CSV file that cannot be read, or has neither.
+    """
+    return not is_bag(path) and drive_column(path, options.csv) != options.csv.columns.pressure
+
+
+def read_recordings(
+    path: Path, valve: Valve, options: ReadingOptions | None = None
+) -> tuple[RecordedValve, ...]:
+    """Read the recordings of all valves in a CSV file or a bag, told by its content.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file, gzipped or not; or bag: folder or file, MCAP or SQLite3, compressed or not.
+    valve : Valve
+        Range of the sensor, travel, and diaphragm; for all valves of a bag.
+    options : ReadingOptions, optional
+        Format, topics and stretch.
+
+    Returns
+    -------
+    tuple of RecordedValve
+        One of a CSV file; of a bag one for each valve, with what was wrong where something was.
+
+    Raises
+    ------
+    ValueError, RefusalError
+        If nothing can be read: one line that names the file, the cause and what to do.
+    """
+    options = options or ReadingOptions()
+    if is_bag(path):
+        return read_bag(path, valve, options.topics, options.stretch)
+    return (RecordedValve(path, "", read_recording(path, valve, options.csv, options.stretch)),)

@@ -1,0 +1,67 @@
+"""Which part of a recorded file is wanted."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.streams.samples import nanoseconds
+
+__all__ = ["Stretch"]
+
+
+def _nanoseconds(seconds: float) -> float:
+    """Convert seconds to whole nanoseconds, as stamps are; infinity stays what it is."""
+    return nanoseconds(seconds) if math.isfinite(seconds) else seconds
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a recording; by default the whole.
+
+    Attributes
+    ----------
+    begin, end : float
+        Times since the first sample of the file, s; both belong to the stretch.
+    last : float
+        Only the last seconds of it, s: a recording that ends when a node identified, read with
+        the node's `window`, holds what the node's buffer held.
+
+    Raises
+    ------
+    ValueError
+        If a time is not a number, or nothing lies between them.
+    """
+
+    begin: float = -math.inf
+    end: float = math.inf
+    last: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Refuse stretches that hold nothing."""
+        if not self.begin < self.end:
+            raise ValueError(f"a stretch cannot begin at {self.begin:g} s and end at {self.end:g}")
+        if not self.last > 0:
+            raise ValueError(f"the last seconds must be above zero, got {self.last:g}")
+
+    def contains(self, since_first: int) -> bool:
+        """Tell whether a time after the first sample, ns, lies between begin and end."""
+        return _nanoseconds(self.begin) <= since_first <= _nanoseconds(self.end)
+
+    def select(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Choose from times in ns, shape (n,); one that is not a number stays, to be refused.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True within the stretch.
+        """
+        with np.errstate(invalid="ignore"):
+            since = np.rint(times - times[0])
+        outside = (since < _nanoseconds(self.begin)) | (since > _nanoseconds(self.end))
+        inside: NDArray[np.bool_] = ~outside | ~np.isfinite(times)
+        if inside.any():
+            newest = times[inside][-1]
+            inside &= ~(np.rint(newest - times) > _nanoseconds(self.last))
+        return inside

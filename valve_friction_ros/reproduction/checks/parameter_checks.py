@@ -1,0 +1,47 @@
+"""Parameters beside the wanted ones."""
+
+from collections.abc import Iterator
+
+from valve_friction_ros.model import KarnoppParameters
+from valve_friction_ros.reproduction.checks.check import Check, within
+
+__all__ = ["NOTATION", "TOLERANCES", "parameter_checks"]
+
+NOTATION = {
+    "mass": ("m", "kg"),
+    "spring_constant": ("k", "N/m"),
+    "viscous_friction": ("F_v", "N·s/m"),
+    "coulomb_friction": ("F_c", "N"),
+    "static_friction": ("F_s", "N"),
+}
+"""Symbol and unit of the parameters of Table 1, in its order."""
+
+TOLERANCES = {
+    "mass": 0.1,
+    "spring_constant": 0.01,
+    "viscous_friction": 0.05,
+    "coulomb_friction": 0.05,
+    "static_friction": 0.05,
+}
+"""Shares of the paper's value within which a parameter counts as reproduced."""
+
+
+def parameter_checks(
+    item: int,
+    place: str,
+    wanted: KarnoppParameters,
+    found: dict[str, float],
+    reasons: dict[str, str],
+) -> Iterator[Check]:
+    """Compare each found parameter with the wanted one, with a reason should it not match."""
+    for name, value in found.items():
+        symbol, unit = NOTATION[name]
+        yield within(
+            item,
+            f"{place}, {symbol}",
+            getattr(wanted, name),
+            value,
+            TOLERANCES[name],
+            unit,
+            why=reasons.get(name, "so far the noise of this run leads the method astray"),
+        )

@@ -1,0 +1,117 @@
+"""A record as the refinement takes it: pressure without its noise, at a rate that is enough."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.signals.noise import sensor_noise
+from valve_friction_ros.signals.smoothing import (
+    find_corners,
+    independent_halves,
+    longest_faithful_window,
+    smooth_between,
+)
+
+__all__ = ["ConditionedRecord", "condition", "smoothed_pressure"]
+
+_CORNER_TIME = 0.04
+_CORNER_SAMPLES = 8
+"""Time and samples over which the slopes on both sides of a corner are compared, at least."""
+
+_LONGEST_SMOOTHING = 0.5
+_SAMPLES_A_WINDOW = 32
+_LONGEST_PERIOD = 5e-3
+"""Longest sample period to thin out to, s: within it a corner of the pressure may lie."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionedRecord:
+    """Smoothed pressure, its two halves with independent noise, and the averaged position.
+
+    Attributes
+    ----------
+    sample_period : float
+        Time between two samples, s.
+    pressure : ndarray of float, shape (n,)
+        Smoothed pressure, Pa.
+    halves : tuple of two ndarray of float, shape (n,)
+        The pressure smoothed from its even and from its odd samples alone, Pa: each carries the
+        signal, and their noise is independent.
+    position : ndarray of float, shape (n,)
+        Stem position, averaged around each sample, m.
+    noise : float
+        Standard deviation of the noise of `position`, m.
+    smoothing_window : int
+        Samples of the original record that the pressure was smoothed over.
+    stride : int
+        Samples of the original record to each of these.
+    """
+
+    sample_period: float
+    pressure: NDArray[np.float64]
+    halves: tuple[NDArray[np.float64], NDArray[np.float64]]
+    position: NDArray[np.float64]
+    noise: float
+    smoothing_window: int
+    stride: int
+
+
+def condition(recording: Recording) -> ConditionedRecord:
+    """Smooth the pressure as far as its noise asks for, and thin the record out accordingly.
+
+    The noise of the sensors sets the window (`longest_faithful_window`); a 32nd of it, or 5 ms, is
+    a sample period that loses nothing. A noiseless record passes unchanged.
+    """
+    pressure, period = recording.pressure, recording.sample_period
+    corners, window = _smoothing(recording)
+    stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / period)), 1)
+    if window == 1:
+        whole = pressure[::stride]
+        halves = whole, whole  # one object: there are no two looks to cross
+    else:
+        whole = smooth_between(pressure, corners, window)[::stride]
+        one, two = independent_halves(pressure, corners, window)
+        halves = one[::stride], two[::stride]
+    position, kept = _averaged(recording.position, stride)
+    return ConditionedRecord(
+        stride * period,
+        whole,
+        halves,
+        position,
+        kept * sensor_noise(recording.position),
+        window,
+        stride,
+    )
+
+
+def smoothed_pressure(recording: Recording) -> NDArray[np.float64]:
+    """Smooth the pressure between its corners as far as its noise asks for, Pa, shape (n,)."""
+    corners, window = _smoothing(recording)
+    if window == 1:
+        return recording.pressure
+    return smooth_between(recording.pressure, corners, window)
+
+
+def _smoothing(recording: Recording) -> tuple[NDArray[np.intp], int]:
+    """Return the corners of the pressure, and the window to smooth it over between them."""
+    pressure, period = recording.pressure, recording.sample_period
+    noise = sensor_noise(pressure)
+    corners = find_corners(pressure, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
+    longest = max(round(_LONGEST_SMOOTHING / period), 1)
+    return corners, longest_faithful_window(pressure, corners, noise, longest)
+
+
+def _averaged(signal: NDArray[np.float64], stride: int) -> tuple[NDArray[np.float64], float]:
+    """Average around every `stride`-th sample with weights that fall linearly to its neighbours.
+
+    These are the weights with which a straight line between two samples depends on them.
+    Returns the averages and the share of white noise that they keep.
+    """
+    if stride == 1:
+        return signal, 1.0
+    weights = 1.0 - np.abs(np.arange(1 - stride, stride)) / stride
+    total = np.convolve(signal, weights, "same")
+    normal = np.convolve(np.ones_like(signal), weights, "same")
+    return (total / normal)[::stride], float(np.linalg.norm(weights) / weights.sum())

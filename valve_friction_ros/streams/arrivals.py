@@ -1,0 +1,95 @@
+"""Samples of both signals in the order in which they came."""
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from valve_friction_ros.streams.samples import Samples
+
+__all__ = ["COLUMNS", "Arrivals", "Kind", "rows_arrived"]
+
+COLUMNS = ("time", "pressure", "position")
+"""Columns of a table of samples: s, Pa, m."""
+
+
+_SECOND = 1_000_000_000
+_LATEST = 9.2e9
+"""Time, s, that 64 bits of nanoseconds can hold."""
+
+
+class Kind(IntEnum):
+    """What arrived."""
+
+    PRESSURE = 0
+    POSITION = 1
+    NO_POSITION = 2
+    """A message of the stem that holds no position of the joint."""
+
+
+class Arrivals(NamedTuple):
+    """What arrived since it was last looked at.
+
+    Attributes
+    ----------
+    kinds : ndarray of uint8, shape (n,)
+        A `Kind` for each.
+    stamps : ndarray of int64, shape (n,)
+        Times, ns.
+    values : ndarray of float, shape (n,)
+        Pressures (Pa) and positions (m); nan where there is none.
+    """
+
+    kinds: NDArray[np.uint8]
+    stamps: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+    def samples(self, kind: Kind) -> Samples:
+        """Return the samples of one kind."""
+        wanted = self.kinds == kind
+        return Samples(self.stamps[wanted], self.values[wanted])
+
+
+def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
+    """Take a table of samples apart.
+
+    Parameters
+    ----------
+    table : array_like of float, shape (n, 3)
+        A row a sample. Its time is rounded to the finest decimal that floats of this size tell
+        apart: nanoseconds below 97 days, microseconds for seconds since 1970. So a time of whole
+        microseconds comes back exactly.
+    labels : sequence of str
+        What the columns hold: those of `COLUMNS`, in their order.
+
+    Returns
+    -------
+    Arrivals
+        Of each row the pressure, then the position.
+
+    Raises
+    ------
+    ValueError
+        If the table has another shape or other columns, or a time is no time of a 64-bit clock.
+    """
+    if tuple(labels) != COLUMNS:
+        raise ValueError(f"the columns are {','.join(labels)!r}, not {','.join(COLUMNS)!r}")
+    rows = np.asarray(table, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != len(COLUMNS):
+        raise ValueError(f"the shape is {rows.shape}, not (n, {len(COLUMNS)})")
+    kinds = np.tile(np.array([Kind.PRESSURE, Kind.POSITION], np.uint8), len(rows))
+    return Arrivals(kinds, np.repeat(_stamps(rows[:, 0]), 2), rows[:, 1:].ravel())
+
+
+def _stamps(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
+    if not (np.abs(seconds) < _LATEST).all():
+        raise ValueError("a time is not finite, or beyond the years that nanoseconds can count")
+    apart = 1e9 * np.spacing(np.abs(seconds).max(initial=0.0))
+    step = 10 ** max(0, math.ceil(math.log10(apart)))
+    whole = np.floor(seconds)
+    steps = np.rint((seconds - whole) * (_SECOND / step))
+    stamps: NDArray[np.int64] = whole.astype(np.int64) * _SECOND + steps.astype(np.int64) * step
+    return stamps

@@ -1,0 +1,205 @@
+"""What an identifier has gathered: both signals of a valve, and what was wrong with them."""
+
+import math
+from collections import Counter, deque
+from typing import NamedTuple
+
+import numpy as np
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams.arrivals import Arrivals, Kind
+from valve_friction_ros.streams.samples import SampleBuffer, Samples, nanoseconds
+from valve_friction_ros.streams.uniform_grid import uniform_recording
+
+__all__ = ["Complaints", "RecordBuffer", "Rejection", "Snapshot"]
+
+_REJECTIONS_KEPT = 10_000
+_CLEARED = ": the buffer was cleared"
+
+
+class Rejection(NamedTuple):
+    """A sample that was not taken: its stamp (ns) and what was wrong with it."""
+
+    stamp: int
+    cause: str
+
+
+class Complaints(NamedTuple):
+    """What was wrong with arrivals: the first rejection, and the first clearing of the buffer."""
+
+    rejected: str | None = None
+    cleared: str | None = None
+
+
+class Snapshot(NamedTuple):
+    """A copy of a buffer, to be identified while the buffer goes on.
+
+    `cleared_because` tells why the buffer was last emptied, until it has filled again.
+    """
+
+    pressure: Samples
+    position: Samples
+    rejections: tuple[Rejection, ...]
+    cleared_because: str | None
+
+    def causes(self) -> str:
+        """Tell what was wrong with the rejected samples, and with how many of them."""
+        counts = Counter(rejection.cause for rejection in self.rejections)
+        return "; ".join(f"{cause} ({count} samples)" for cause, count in counts.items())
+
+    def recording(self) -> Recording:
+        """Bring both signals onto one grid.
+
+        Raises
+        ------
+        RefusalError
+            If samples were rejected within the window, or the signals do not make a record.
+        """
+        if self.rejections:
+            raise RefusalError(
+                f"bad samples in the window: {self.causes()}; mend the source, then clear the "
+                "buffer or wait until they have left it"
+            )
+        return uniform_recording(self.pressure, self.position)
+
+
+def _are_good(last_stamp: int | None, samples: Samples) -> bool:
+    """Tell whether all values are finite and all stamps later than the one before."""
+    stamps, values = samples
+    if stamps.size == 0:
+        return True
+    follows = last_stamp is None or bool(stamps[0] > last_stamp)
+    return follows and bool((stamps[1:] > stamps[:-1]).all() and np.isfinite(values).all())
+
+
+class RecordBuffer:
+    """The last seconds of pressure and stem position of one valve.
+
+    A sample that cannot be true is not taken and is remembered with its cause; a stamp that
+    goes back means that time has jumped, and clears the buffer.
+
+    Parameters
+    ----------
+    valve : Valve
+        Tells the range of the pressure sensor.
+    window : float
+        Time to keep, s.
+    """
+
+    def __init__(self, valve: Valve, window: float) -> None:
+        self._valve = valve
+        self._window = nanoseconds(window)
+        self._pressure = SampleBuffer(window)
+        self._position = SampleBuffer(window)
+        self._rejections: deque[Rejection] = deque(maxlen=_REJECTIONS_KEPT)
+        self._first_stamp: int | None = None
+        self._cleared_because: str | None = None
+
+    def __len__(self) -> int:
+        """Count the samples of both signals."""
+        return len(self._pressure) + len(self._position)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that the samples of both signals take, bytes."""
+        return self._pressure.nbytes + self._position.nbytes
+
+    @property
+    def newest_stamp(self) -> int | None:
+        """Stamp of the newest sample of either signal, ns, or None."""
+        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
+        return max((stamp for stamp in last_stamps if stamp is not None), default=None)
+
+    def add_pressure(self, stamp: int, pressure: float) -> str | None:
+        """Take a pressure (Pa) stamped `stamp` (ns); return what was wrong with it, if anything."""
+        lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
+        cause = None
+        if not lowest <= pressure <= highest and math.isfinite(pressure):
+            cause = f"actuator_pressure outside the sensor's range {lowest:g} to {highest:g} Pa"
+        return self._add("actuator_pressure", self._pressure, stamp, pressure, cause)
+
+    def add_position(self, stamp: int, position: float | None) -> str | None:
+        """Take a stem position (m) stamped `stamp` (ns); return what was wrong, if anything.
+
+        None stands for a message that held no position.
+        """
+        if position is None:
+            return self._reject(stamp, "stem_state without a position of the joint")
+        return self._add("stem_state", self._position, stamp, position, None)
+
+    def add_arrivals(self, arrivals: Arrivals) -> Complaints:
+        """Take samples of both signals in the order in which they came.
+
+        Arrivals without any fault are taken as a whole. Else each is taken or rejected for itself,
+        by the methods above: which samples a clearing leaves depends on their order.
+        """
+        pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
+        lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
+        if not (
+            pressure.stamps.size + position.stamps.size == arrivals.stamps.size
+            and _are_good(self._pressure.last_stamp, pressure)
+            and _are_good(self._position.last_stamp, position)
+            and ((lowest <= pressure.values) & (pressure.values <= highest)).all()
+        ):
+            return self._add_one_by_one(arrivals)
+        self._pressure.extend(pressure)
+        self._position.extend(position)
+        if self._first_stamp is None and arrivals.stamps.size:
+            self._first_stamp = int(arrivals.stamps[0])
+        return Complaints()
+
+    def _add_one_by_one(self, arrivals: Arrivals) -> Complaints:
+        rejected: str | None = None
+        cleared: str | None = None
+        for kind, stamp, value in zip(*(part.tolist() for part in arrivals), strict=True):
+            if kind == Kind.PRESSURE:
+                problem = self.add_pressure(stamp, value)
+            else:
+                problem = self.add_position(stamp, value if kind == Kind.POSITION else None)
+            if problem is not None and problem.endswith(_CLEARED):
+                cleared = cleared or problem
+            else:
+                rejected = rejected or problem
+        return Complaints(rejected, cleared)
+
+    def _add(
+        self, name: str, buffer: SampleBuffer, stamp: int, value: float, cause: str | None
+    ) -> str | None:
+        last = buffer.last_stamp
+        if last is not None and stamp < last:
+            cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
+            self.clear(cause)
+            return cause + _CLEARED
+        if last is not None and stamp == last:
+            cause = f"{name} repeats a stamp"
+        elif not math.isfinite(value):
+            cause = f"{name} is not finite"
+        if cause is not None:
+            return self._reject(stamp, cause)
+        buffer.append(stamp, value)
+        self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
+        return None
+
+    def _reject(self, stamp: int, cause: str) -> str:
+        self._rejections.append(Rejection(stamp, cause))
+        return cause
+
+    def clear(self, cause: str) -> None:
+        """Forget everything; `cause` is told with a refusal that follows from it."""
+        self._pressure.clear()
+        self._position.clear()
+        self._rejections.clear()
+        self._first_stamp = None
+        self._cleared_because = cause
+
+    def snapshot(self) -> Snapshot:
+        """Copy the samples and the rejections of the last window."""
+        pressure, position = self._pressure.samples(), self._position.samples()
+        newest = self.newest_stamp or 0
+        rejections = tuple(
+            rejection for rejection in self._rejections if rejection.stamp >= newest - self._window
+        )
+        is_full = self._first_stamp is not None and newest - self._first_stamp >= self._window
+        return Snapshot(pressure, position, rejections, None if is_full else self._cleared_because)

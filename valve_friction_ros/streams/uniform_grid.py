@@ -1,0 +1,112 @@
+"""Two stamped signals of any rates, brought onto one uniform time grid."""
+
+import numpy as np
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.streams.samples import Samples
+
+__all__ = ["GapError", "uniform_recording"]
+
+_LARGEST_GAP = 10
+"""Longer pauses, in sampling periods of the signal, are gaps; shorter ones are interpolated."""
+
+
+class GapError(RefusalError):
+    """A signal has a gap.
+
+    Parameters
+    ----------
+    name : str
+        What to call the signal.
+    samples : Samples
+        The signal.
+    sample : int
+        Number of the first sample after the gap.
+
+    Attributes
+    ----------
+    sample : int
+        As above.
+    seconds : float
+        Length of the gap, s.
+    what : str
+        The refusal without its advice.
+    """
+
+    def __init__(self, name: str, samples: Samples, sample: int) -> None:
+        self.sample = sample
+        self.seconds = float(samples.stamps[sample] - samples.stamps[sample - 1]) / 1e9
+        since_start = float(samples.stamps[sample - 1] - samples.stamps[0]) / 1e9
+        self.what = (
+            f"gap of {self.seconds:.3g} s in {name}, {since_start:.3f} s after its first sample"
+        )
+        super().__init__(
+            f"{self.what}: use a record without it, or clear the buffer and gather anew"
+        )
+
+
+def _checked(name: str, samples: Samples) -> int:
+    """Return the median sampling period in ns, or refuse a signal with nothing or a gap in it."""
+    if samples.stamps.size == 0:
+        raise RefusalError(f"no samples of {name}: is it published, and on this topic?")
+    if samples.stamps.size == 1:
+        raise RefusalError(f"only one sample of {name}")
+    pauses = np.diff(samples.stamps)
+    period = int(np.median(pauses))
+    longest = int(np.argmax(pauses))
+    if pauses[longest] > _LARGEST_GAP * period:
+        raise GapError(name, samples, longest + 1)
+    return period
+
+
+def uniform_recording(
+    pressure: Samples,
+    position: Samples,
+    names: tuple[str, str] = ("actuator_pressure", "stem_state"),
+) -> Recording:
+    """Put pressure and stem position on the time grid of the stem position.
+
+    The grid starts at the first position inside the time that both signals cover and runs at
+    the median period of the positions; both signals are interpolated linearly. Where the
+    positions are uniform already they are taken as they are, to the last bit, and so is the
+    pressure where it shares their stamps.
+
+    Parameters
+    ----------
+    pressure : Samples
+        Actuator pressure, Pa.
+    position : Samples
+        Stem position, m.
+    names : tuple of str
+        What to call the two signals in a refusal.
+
+    Returns
+    -------
+    Recording
+        Its `start_time` is the stamp of its first sample, s.
+
+    Raises
+    ------
+    RefusalError
+        If a signal is empty or has a gap of more than ten of its periods (a `GapError`), or the
+        two do not overlap in time.
+    """
+    _checked(names[0], pressure)
+    period = _checked(names[1], position)
+    begin = max(pressure.stamps[0], position.stamps[0])
+    end = min(pressure.stamps[-1], position.stamps[-1])
+    inside = position.stamps[(position.stamps >= begin) & (position.stamps <= end)]
+    if inside.size < 2:
+        apart = (position.stamps[0] - pressure.stamps[0]) / 1e9
+        raise RefusalError(
+            f"{names[0]} and {names[1]} do not overlap in time ({names[1]} begins {apart:.3g} s "
+            "later): their clocks differ, or one of them has stopped"
+        )
+    origin = inside[0]
+    grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)
+    on_grid = [
+        np.interp(grid, (signal.stamps - origin).astype(np.float64), signal.values)
+        for signal in (pressure, position)
+    ]
+    return Recording(period / 1e9, on_grid[0], on_grid[1], start_time=float(origin) / 1e9)
