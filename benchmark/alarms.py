@@ -8,7 +8,7 @@ import numpy as np
 from benchmark.cases import EXCITATIONS, NOISES, PERIOD
 from benchmark.runs import SETTINGS
 from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
-from valve_friction_ros.identification import Assessment, RefusalError, assess
+from valve_friction_ros.identification import RefusalError, Result, identify_refined
 from valve_friction_ros.model import (
     BENCH_VALVE,
     LOW_FRICTION,
@@ -70,10 +70,10 @@ def _clean(growth: float) -> Recording:
     return Recording(PERIOD, pressure, simulate(BENCH_VALVE, valve, pressure, PERIOD).position)
 
 
-def _assessed(growth: float, seed: int) -> Assessment:
+def _assessed(growth: float, seed: int) -> Result:
     noise = NOISES["28.6 µm"]
     recording = SensorNoise(noise.position, noise.pressure, seed).applied_to(_clean(growth))
-    return assess(recording, BENCH_VALVE, SETTINGS)
+    return identify_refined(recording, BENCH_VALVE, SETTINGS)
 
 
 @cache
@@ -85,11 +85,11 @@ def _baseline() -> Baseline:
 def judge(growth: float, seed: int) -> Judged:
     """Identify a valve with its friction grown, and let the monitor judge it."""
     try:
-        assessment = _assessed(growth, seed)
+        result = _assessed(growth, seed)
     except RefusalError:
         return Judged("", float("nan"))
     limits = FrictionLimits()
-    ratio = diagnose(assessment, BENCH_VALVE, _baseline(), limits).ratio
+    ratio = diagnose(result, BENCH_VALVE, _baseline(), limits).ratio
     if ratio is None:
         return Judged("", float("nan"))
     if ratio.low >= limits.warn_ratio:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmark.bounds import Bound
-from valve_friction_ros.identification import IdentificationSettings, Verdict, assess
+from valve_friction_ros.identification import IdentificationSettings, Verdict, identify_refined
 from valve_friction_ros.model import Recording, Valve
 
 __all__ = ["PUBLISHED", "RECORD", "emps_bounds"]
@@ -30,10 +30,10 @@ def emps_bounds() -> list[Bound] | None:
     time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
     record = Recording(float(np.median(np.diff(time))), force, position)
     settings = IdentificationSettings(fixed={"spring_constant": 0.0})
-    assessment = assess(record, Valve(1.0), settings)
+    result = identify_refined(record, Valve(1.0), settings)
     bounds = []
     for name, published in PUBLISHED.items():
-        one = assessment.parameters[name]
+        one = result.parameters[name]
         error = one.value / published - 1
         inside = abs(one.value - published) <= one.half_width
         shown = one.verdict is not Verdict.NOT_IDENTIFIABLE

@@ -6,7 +6,8 @@ import numpy as np
 
 from benchmark.cases import NOISES, PERIOD, clean_record
 from benchmark.plants import PLANTS
-from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START, OutputError
+from valve_friction_ros.identification.refined.output_error import SLIP, START, OutputError
+from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.signals.conditioned_record import ConditionedRecord
 
 __all__ = ["Information", "information"]
@@ -62,7 +63,7 @@ def information(plant_name: str, noise: str) -> Information:
         "stribeck_velocity": 0.0,
         "coulomb_asymmetry": 0.0,
         "viscous_asymmetry": 0.0,
-        OFFSET: 0.0,
+        CLOCK_OFFSET: 0.0,
         START: float(recording.position[0]),
     }
     problem = OutputError(record, plant.valve)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from benchmark.cases import PERIOD, Case, clean_record
 from benchmark.plants import PLANTS
 from valve_friction_ros.identification import (
-    Assessment,
     IdentificationSettings,
     RefusalError,
+    Result,
     Verdict,
-    assess,
+    identify_refined,
 )
 
 __all__ = ["SETTINGS", "TRUE_NAMES", "Outcome", "force_error", "run", "run_speeds", "wrong_claims"]
@@ -83,12 +83,12 @@ def run_speeds(plant_name: str, excitation: str) -> NDArray[np.float64]:
     return np.linspace(lowest, highest, 50)
 
 
-def force_error(case: Case, assessment: Assessment) -> float:
+def force_error(case: Case, result: Result) -> float:
     """Return the worst relative error of the friction force, both ways."""
     speeds = run_speeds(case.plant_name, case.excitation)
     velocities = np.concatenate([-speeds, speeds])
     truth = case.plant.parameters.sliding_friction(velocities)
-    found = assessment.model().sliding_friction(velocities)
+    found = result.model.sliding_friction(velocities)
     return float(np.max(np.abs(found / truth - 1)))
 
 
@@ -97,14 +97,14 @@ def run(case: Case, seed: int) -> Outcome:
     recording = case.record(seed)
     begin = time.perf_counter()
     try:
-        assessment = assess(recording, case.plant.valve, SETTINGS)
+        result = identify_refined(recording, case.plant.valve, SETTINGS)
     except RefusalError as refusal:
         return Outcome(case, seed, time.perf_counter() - begin, str(refusal))
     seconds = time.perf_counter() - begin
     truth = vars(PLANTS[case.plant_name].parameters)
-    known = [name for name in TRUE_NAMES if name in assessment.parameters and truth[name]]
-    parameters = assessment.parameters
-    misfit = assessment.misfit
+    known = [name for name in TRUE_NAMES if name in result.parameters and truth[name]]
+    parameters = result.parameters
+    misfit = result.misfit
     return Outcome(
         case,
         seed,
@@ -113,7 +113,7 @@ def run(case: Case, seed: int) -> Outcome:
         {name: parameters[name].value / truth[name] - 1 for name in known},
         {name: parameters[name].half_width / abs(truth[name]) for name in known},
         {name: one.verdict.value for name, one in parameters.items()},
-        force_error(case, assessment),
+        force_error(case, result),
         math.nan if misfit is None else misfit.systematic,
         math.nan if misfit is None else misfit.tolerated,
     )

@@ -48,6 +48,9 @@ INNER = {
     "commands.demo": set(),
 }
 ROS_ROOMS = {"nodes", "commands"}
+
+# The one arrow up: a result draws itself, and loads the figures when it is asked to.
+UPWARD = {"identification/result.py": {"figures"}}
 CORE = ["model", "signals", "identification", "streams", "records", "health", "history", "fleet"]
 
 
@@ -119,7 +122,8 @@ def test_arrows_run_one_way(room):
     sources = sorted((SOURCES / room).rglob("*.py"))
     assert len(sources) > 1
     for path in sources:
-        strangers = imported_rooms(path) - MAY_IMPORT[room] - {room}
+        upward = UPWARD.get(path.relative_to(SOURCES).as_posix(), set())
+        strangers = imported_rooms(path) - MAY_IMPORT[room] - {room} - upward
         assert not strangers, f"{path.relative_to(SOURCES)} imports {strangers}"
 
 
@@ -128,6 +132,7 @@ def test_imports_are_seen():
     assert imported_rooms(SOURCES / "identification" / "published" / "identify.py") == {
         "identification",
         "model",
+        "signals",
     }
     assert any(is_ros(name) for name in imported(SOURCES / "nodes" / "simulator.py"))
 

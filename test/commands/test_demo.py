@@ -18,10 +18,10 @@ from valve_friction_ros.figures import Case
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
     UNITS,
-    AssessedParameter,
     IdentificationSettings,
+    Parameter,
     Verdict,
-    assess,
+    identify_refined,
 )
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION
 
@@ -40,12 +40,12 @@ HALF_WIDTH = 0.01  # of the value
 @pytest.fixture(scope="module")
 def case(quick_record):
     settings = IdentificationSettings(position_bias=1.13e-3, fixed={"mass": 1.6})
-    return Case.of("loose", quick_record, assess(quick_record, BENCH_VALVE, settings))
+    return Case.of("loose", quick_record, identify_refined(quick_record, BENCH_VALVE, settings))
 
 
 def refined(name, value, verdict=Verdict.IDENTIFIED, reason=""):
     half_width = HALF_WIDTH * abs(value)
-    return AssessedParameter(name, value, half_width / 2, half_width, verdict, reason)
+    return Parameter(name, value, half_width / 2, half_width, verdict, reason)
 
 
 @pytest.fixture
@@ -132,7 +132,7 @@ class TestReport:
 
     def test_a_number_without_a_verdict_is_never_shown(self, report, outcome):
         withheld = refined("static_friction", math.nan, Verdict.NOT_IDENTIFIABLE, "no slip jump")
-        given = AssessedParameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED)
+        given = Parameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED)
         _, words = report([outcome(assessed=[withheld, given])], Level.ERROR)
         row = r"static_friction +N +152\.7 +152\.7 +\+0\.000 % +– +not identifiable *$"
         assert re.search(row, words, re.MULTILINE)
@@ -206,7 +206,7 @@ class TestIdentify:
     def test_both_estimates_with_the_verdicts(self, quick_record, values):
         client = FakeClient(quick_record, values)
         found = demo._identify(client, "loose", LOW_FRICTION)
-        assert found.published == dict.fromkeys(demo._TOLERANCES, 3.0)
+        assert found.estimate == dict.fromkeys(demo._TOLERANCES, 3.0)
         friction = found.refined["coulomb_friction"]
         assert (friction.value, friction.half_width) == (3.5, 0.25)
         assert (friction.verdict, friction.reason) == (Verdict.WEAK, "2 strokes only")
@@ -225,7 +225,7 @@ class TestIdentify:
         }
         found = demo._identify(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
         assert found.refined["coulomb_friction"].verdict is Verdict.NOT_IDENTIFIABLE
-        assert found.published["coulomb_friction"] == 3.0
+        assert found.estimate["coulomb_friction"] == 3.0
 
     @pytest.mark.parametrize("age", [None, "2.5"])
     def test_an_older_estimate_is_not_the_one_asked_for(self, quick_record, values, age):

@@ -87,7 +87,7 @@ class TestTable:
         """The last one's alone: here five days that lie 100 N above those before."""
         history = HistoryFile(tmp_path / "history.sqlite")
         for day in range(10):
-            method, friction = ("sweep", 150.0) if day < 5 else ("force_balance", 250.0)
+            method, friction = ("refined", 150.0) if day < 5 else ("signature", 250.0)
             history.add(success(START + day * DAY, friction, method=method))
         (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
         assert (valve["trend"]["days"], valve["trend"]["significant"]) == (5, False)

@@ -17,12 +17,12 @@ from valve_friction_ros.commands.assessment_output import as_json, print_table
 from valve_friction_ros.commands.identify_recording import main
 from valve_friction_ros.identification import (
     UNITS,
-    AssessedParameter,
     IdentificationSettings,
+    Parameter,
     Verdict,
-    assess,
-    assess_force_balance,
-    identify,
+    identify_refined,
+    identify_signature,
+    published_estimate,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -140,8 +140,8 @@ def none_for_nan(value):
 
 
 @pytest.fixture(scope="session")
-def assessment(quick_record):
-    return assess(quick_record, BENCH_VALVE, SETTINGS)
+def result(quick_record):
+    return identify_refined(quick_record, BENCH_VALVE, SETTINGS)
 
 
 class TestProcesses:
@@ -159,7 +159,7 @@ class TestProcesses:
                 assert found[name] == pytest.approx(getattr(LOW_FRICTION, name), rel=1e-3)
         assert published["mass"] == pytest.approx(LOW_FRICTION.mass, rel=0.1)
         settings = IdentificationSettings(position_bias=POSITION_BIAS)
-        expected = identify(square_record, BENCH_VALVE, settings)
+        expected = published_estimate(square_record, BENCH_VALVE, settings)
         assert published == expected.values
         assert answer["threshold"] == expected.threshold
         assert answer["model_describes"] is True
@@ -186,33 +186,33 @@ class TestProcesses:
 
 
 class TestJson:
-    def test_the_assessment_of_the_library(self, printed, quick_csv, assessment, bench_options):
+    def test_the_assessment_of_the_library(self, printed, quick_csv, result, bench_options):
         answer = printed(quick_csv, *bench_options)
         assert set(answer) == KEYS
-        assert list(answer["parameters"]) == list(UNITS) == list(assessment.parameters)
+        assert list(answer["parameters"]) == list(UNITS) == list(result.parameters)
         for name, entry in answer["parameters"].items():
-            expected = assessment.parameters[name]
+            expected = result.parameters[name]
             assert entry == {
                 "value": none_for_nan(expected.value),
                 "standard_error": none_for_nan(expected.standard_error),
                 "interval": [none_for_nan(end) for end in expected.interval],
                 "verdict": expected.verdict.value,
                 "reason": expected.reason,
-                "published": assessment.published.values[name],
+                "published": result.estimate.values[name],
                 "unit": UNITS[name],
                 "fixed": False,
             }
-        assert answer["fit"] == assessment.misfit.fit
-        assert answer["rms"] == assessment.misfit.rms
-        assert answer["systematic_misfit"] == assessment.misfit.systematic
+        assert answer["fit"] == result.misfit.fit
+        assert answer["rms"] == result.misfit.rms
+        assert answer["systematic_misfit"] == result.misfit.systematic
         assert answer["model_describes"] is True
-        assert answer["chosen_window"] == assessment.start.settings.window
+        assert answer["chosen_window"] == result.start.settings.published_window
 
     def test_the_published_estimate_beside_it(
         self, printed, quick_csv, quick_record, bench_options
     ):
         answer = printed(quick_csv, *bench_options)
-        expected = identify(quick_record, BENCH_VALVE, SETTINGS)
+        expected = published_estimate(quick_record, BENCH_VALVE, SETTINGS)
         assert column(answer, "published") == expected.values
         for key in ("threshold", "samples", "sigma", "r_squared"):
             assert answer[key] == getattr(expected, key)
@@ -242,14 +242,14 @@ class TestJson:
         assert mass["reason"].endswith("; 1.6 kg assumed")
         assert mass["published"] == 1.6  # assumed there as well
 
-    def test_without_a_published_estimate(self, assessment):
+    def test_without_a_published_estimate(self, result):
         """The rest of the answer does not depend on it."""
-        alone = dataclasses.replace(assessment, published=None, warnings=("no answer",))
+        alone = dataclasses.replace(result, published=None, warnings=("no answer",))
         answer = as_json(alone)
         assert set(answer) == KEYS
         assert set(column(answer, "published").values()) == {None}
-        assert values(answer) == values(as_json(assessment))
-        assert answer["threshold"] == assessment.start.threshold
+        assert values(answer) == values(as_json(result))
+        assert answer["threshold"] == result.start.threshold
         assert answer["warnings"] == ["no answer"]
 
     def test_gzipped(self, printed, quick_csv, bench_options):
@@ -303,11 +303,11 @@ class TestOptions:
         self, printed, quick_csv, quick_record, bench_options
     ):
         answer = printed(quick_csv, *bench_options, "--window", 15, "--order", 4)
-        settings = IdentificationSettings(window=15, order=4, assumed_mass=1.6)
+        settings = IdentificationSettings(derivative_window=15, order=4, assumed_mass=1.6)
         assert (answer["window"], answer["chosen_window"]) == (15, 15)
-        expected = assess(quick_record, BENCH_VALVE, settings, 15)
+        expected = identify_refined(quick_record, BENCH_VALVE, settings, 15)
         assert expected.start.settings.order == 4
-        assert column(answer, "published") == expected.published.values
+        assert column(answer, "published") == expected.estimate.values
         assert known(answer) == {
             name: value for name, value in expected.values.items() if not math.isnan(value)
         }
@@ -366,14 +366,14 @@ def row_of(out, name):
 
 class TestTable:
     def test_every_parameter_with_interval_and_verdict(
-        self, call, assessment, quick_csv, bench_options
+        self, call, result, quick_csv, bench_options
     ):
         code, out, err = call(quick_csv, *bench_options)
         assert (code, err) == (0, "")
         weak = "weak"  # two strokes only
         for name, unit in UNITS.items():
-            one = assessment.parameters[name]
-            published = format(assessment.published.values[name], ".6g")
+            one = result.parameters[name]
+            published = format(result.estimate.values[name], ".6g")
             if math.isnan(one.value):
                 assert row_of(out, name) == f"{name} – {unit} not identifiable {published}"
             else:
@@ -391,12 +391,12 @@ class TestTable:
         assert row_of(out, "mass") == "mass 1.6 kg fixed 1.6"
         assert "fixed: given" not in out
 
-    def test_reasons_fit_and_notes(self, call, printed, assessment, quick_csv, bench_options):
+    def test_reasons_fit_and_notes(self, call, printed, result, quick_csv, bench_options):
         answer = printed(quick_csv, *bench_options)
         words = " ".join(call(quick_csv, *bench_options)[1].split())
         for name, entry in answer["parameters"].items():
             assert f"{name} {entry['verdict']}: {entry['reason']}" in words
-        misfit = assessment.misfit
+        misfit = result.misfit
         share = f"{100 * misfit.rms / BENCH_VALVE.travel:.2g} % of travel"
         assert f"fit {100 * misfit.fit:.2f} %: the refined model's stem is" in words
         assert f"{misfit.rms * 1e6:.3g} µm rms from the measured one, {share}; " in words
@@ -407,17 +407,17 @@ class TestTable:
         for warning in answer["warnings"]:
             assert f"note: {warning}" in words
 
-    def test_doubt_of_the_model_is_a_note(self, assessment, capsys):
+    def test_doubt_of_the_model_is_a_note(self, result, capsys):
         """And what was not identified leaves a dash, the published value beside it or not."""
         doubt = "the Karnopp model does not describe this valve: 98 µm [of it] are not noise"
-        friction = AssessedParameter(
+        friction = Parameter(
             "coulomb_friction", math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, doubt
         )
         doubted = dataclasses.replace(
-            assessment,
+            result,
             warnings=(doubt,),
             published=None,
-            parameters={**assessment.parameters, "coulomb_friction": friction},
+            parameters={**result.parameters, "coulomb_friction": friction},
         )
         print_table(doubted, BENCH_VALVE)
         out = capsys.readouterr().out
@@ -820,11 +820,11 @@ class TestForceBalance:
 
     @pytest.fixture(scope="class")
     def expected(self, signature):
-        return assess_force_balance(signature, BENCH_VALVE, SETTINGS)
+        return identify_signature(signature, BENCH_VALVE, SETTINGS)
 
     def test_json(self, printed, path, bench_options, expected):
-        answer = printed(path, *bench_options, "--method", "force_balance")
-        assert answer["method"] == "force_balance"
+        answer = printed(path, *bench_options, "--method", "signature")
+        assert answer["method"] == "signature"
         assert values(answer) == pytest.approx(
             {name: none_for_nan(value) for name, value in expected.values.items()}, rel=1e-9
         )
@@ -838,7 +838,7 @@ class TestForceBalance:
 
     def test_table_and_picture(self, call, path, bench_options, tmp_path):
         picture = tmp_path / "signature.png"
-        code, out, err = call(path, *bench_options, "--method", "force_balance", "--plot", picture)
+        code, out, err = call(path, *bench_options, "--method", "signature", "--plot", picture)
         assert (code, err) == (0, "")
         words = " ".join(out.split())
         assert "the model's stem is" in words
@@ -849,7 +849,7 @@ class TestForceBalance:
         self, call, write_csv, columns_of, square_record, bench_options
     ):
         path = write_csv(columns_of(square_record))
-        code, out, err = call(path, *bench_options, "--method", "force_balance")
+        code, out, err = call(path, *bench_options, "--method", "signature")
         assert (code, out) == (2, "")
         assert err.startswith(f"identify_recording: {path}: the stem does not slide at a constant")
         assert "slow triangular wave" in err

@@ -17,7 +17,7 @@ import pytest
 from bags import messages_of, write_bag
 
 from valve_friction_ros.commands.identify_recordings import main
-from valve_friction_ros.identification import IdentificationSettings, assess
+from valve_friction_ros.identification import IdentificationSettings, identify_refined
 from valve_friction_ros.model import (
     Recording,
     SensorNoise,
@@ -184,12 +184,12 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
             if each.name == row["valve"]
         )
         settings = IdentificationSettings(assumed_mass=description.known["mass"])
-        assessment = assess(recorded.recording(), description.valve, settings)
-        friction = assessment.parameters["coulomb_friction"]
+        result = identify_refined(recorded.recording(), description.valve, settings)
+        friction = result.parameters["coulomb_friction"]
         # The worker's libraries have one thread, which may change the order of a sum.
         assert float(row["coulomb_friction_n"]) == pytest.approx(friction.value, rel=1e-9)
         assert row["coulomb_friction_verdict"] == friction.verdict.value
-        assert float(row["rms_um"]) == pytest.approx(1e6 * assessment.rms, rel=1e-9)
+        assert float(row["rms_um"]) == pytest.approx(1e6 * result.rms, rel=1e-9)
         assert (row["samples"], row["duration_s"]) == ("2000", "19.99")
 
 

@@ -85,7 +85,7 @@ def require_parameters(page, answer):
         low, high = told["interval"]
         has_interval = low is not None and low < high
         assert interval == (f"{shown(low)} to {shown(high)}" if has_interval else "–")
-        if answer["method"] == "sweep":
+        if answer["method"] == "refined":
             assert published == [shown(told["published"])]
 
 
@@ -99,7 +99,7 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     assert len(page.images) == 5
     notes = [f"{warning}." for warning in answer["warnings"]]
     assert [text for text in page.said("p") if text in notes] == notes
-    assert page.table("setting")["method"] == ("sweep",)
+    assert page.table("setting")["method"] == ("refined",)
     software = page.table("setting")["software"][0].split(", ")
     assert f"valve_friction_ros {valve_friction_ros.__version__}" in software
     assert {"numpy", "scipy", "Python"} < {each.split()[0] for each in software}
@@ -145,12 +145,12 @@ def test_the_table_ends_with_the_diagnosis(call, quick_csv, bench_yaml):
 def test_a_valve_signature(reported, write_csv, columns_of):
     pressure = TriangleWave().sample([each / 50 for each in range(7500)])
     record = Recording(0.02, pressure, simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.02).position)
-    page, answer = reported(write_csv(columns_of(record)), "--method", "force_balance")
+    page, answer = reported(write_csv(columns_of(record)), "--method", "signature")
     page.require_self_contained()
     require_parameters(page, answer)
     assert "Sweep of the velocity threshold δv" not in page.said("h2")
     assert len(page.images) == 4
-    assert page.table("setting")["method"] == ("force_balance",)
+    assert page.table("setting")["method"] == ("signature",)
 
 
 def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, quick_record):

@@ -96,7 +96,7 @@ def refused(call):
 
 @pytest.mark.parametrize(
     ("method", "excitation", "duration"),
-    [("sweep", SineWave(period=10.0), 40.0), ("force_balance", TriangleWave(), 130.0)],
+    [("refined", SineWave(period=10.0), 40.0), ("signature", TriangleWave(), 130.0)],
 )
 def test_a_model_validates_on_a_record_it_has_not_seen(
     method,

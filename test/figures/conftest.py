@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification import (
-    AssessedParameter,
     IdentificationSettings,
+    Parameter,
     Verdict,
-    assess,
+    identify_refined,
 )
 from valve_friction_ros.model import BENCH_VALVE, Recording, SensorNoise, SineWave, simulate
 
@@ -26,26 +26,26 @@ def record(benches):
 
 
 @pytest.fixture(scope="session")
-def assessment(record):
-    return assess(record, BENCH_VALVE, IdentificationSettings(position_bias=1.13e-3))
+def result(record):
+    return identify_refined(record, BENCH_VALVE, IdentificationSettings(position_bias=1.13e-3))
 
 
 @pytest.fixture(scope="session")
-def with_parameters(assessment):
-    """Function of (value, half width, verdict) by name: the assessment with these instead."""
+def with_parameters(result):
+    """Function of (value, half width, verdict) by name: the result with these instead."""
 
     def build(**changes):
         changed = {
-            name: AssessedParameter(name, value, half_width / 2, half_width, verdict, "reason")
+            name: Parameter(name, value, half_width / 2, half_width, verdict, "reason")
             for name, (value, half_width, verdict) in changes.items()
         }
-        return dataclasses.replace(assessment, parameters={**assessment.parameters, **changed})
+        return dataclasses.replace(result, parameters={**result.parameters, **changed})
 
     return build
 
 
 @pytest.fixture(scope="session")
-def nothing_known(with_parameters, assessment):
-    """The assessment with every parameter withheld."""
+def nothing_known(with_parameters, result):
+    """The result with every parameter withheld."""
     withheld = (NAN, NAN, Verdict.NOT_IDENTIFIABLE)
-    return with_parameters(**dict.fromkeys(assessment.parameters, withheld))
+    return with_parameters(**dict.fromkeys(result.parameters, withheld))

@@ -23,8 +23,8 @@ LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
 
 
 @pytest.fixture(scope="module")
-def figure(record, assessment):
-    return identification_figure(record, BENCH_VALVE, assessment)
+def figure(result):
+    return identification_figure(result)
 
 
 def panels(figure):
@@ -65,7 +65,7 @@ class TestPanels:
         np.testing.assert_array_equal(points(stem), [record.time, millimetres])
         np.testing.assert_array_equal(points(signature), [kilopascals, millimetres])
 
-    def test_the_refined_stem_lies_on_the_measured_one(self, figure, record, assessment):
+    def test_the_refined_stem_lies_on_the_measured_one(self, figure, record, result):
         """Dotted over the whole record, and no further away than the noise."""
         _, refined = panels(figure)["stem"].lines
         assert refined.get_linestyle() == ":"
@@ -73,18 +73,18 @@ class TestPanels:
         assert (time[0], time[-1]) == (record.time[0], record.time[-1])
         measured = np.interp(time, record.time, record.position * 1e3)
         rms = np.sqrt(np.mean((position - measured) ** 2))
-        assert rms == pytest.approx(assessment.misfit.rms * 1e3, rel=1e-9)
+        assert rms == pytest.approx(result.misfit.rms * 1e3, rel=1e-9)
         assert rms < 12e-3
 
-    def test_there_is_none_without_a_refined_model(self, record, assessment):
+    def test_there_is_none_without_a_refined_model(self, result):
         """As of a machine without a spring."""
-        regressed = dataclasses.replace(assessment, refinement=None, misfit=None)
-        found = identification_figure(record, BENCH_VALVE, regressed)
+        regressed = dataclasses.replace(result, stem=None, misfit=None, rms=math.nan)
+        found = identification_figure(regressed)
         assert len(panels(found)["stem"].lines) == 1
         assert "fit" not in title_of(found)
 
-    def test_the_published_sweep_with_the_chosen_threshold(self, figure, assessment):
-        published = assessment.published
+    def test_the_published_sweep_with_the_chosen_threshold(self, figure, result):
+        published = result.estimate
         sweep, marker, _ = panels(figure)["coulomb"].lines
         expected = [published.sweep.thresholds, published.sweep.estimates["coulomb_friction"]]
         np.testing.assert_array_equal(points(sweep), expected)
@@ -94,17 +94,14 @@ class TestPanels:
         np.testing.assert_array_equal(points(sigma)[0], published.sweep.thresholds)
         assert set(upright.get_xdata()) == {published.threshold}
 
-    def test_without_a_published_estimate_the_start_is_drawn(self, record, assessment):
-        alone = dataclasses.replace(assessment, published=None)
-        found = panels(identification_figure(record, BENCH_VALVE, alone))
-        start = assessment.start
-        assert start.threshold != assessment.published.threshold
-        chosen = [[start.threshold], [start.coulomb_friction]]
-        np.testing.assert_array_equal(points(found["coulomb"].lines[1]), chosen)
+    def test_a_method_without_a_sweep_has_none_to_draw(self, result):
+        alone = dataclasses.replace(result, estimate=None)
+        with pytest.raises(ValueError, match="the method refined has no sweep to draw"):
+            identification_figure(alone)
 
-    def test_the_refined_friction_with_its_band_and_verdict(self, record, with_parameters):
+    def test_the_refined_friction_with_its_band_and_verdict(self, with_parameters):
         found = with_parameters(coulomb_friction=(152.25, 3.5, Verdict.WEAK))
-        axes = panels(identification_figure(record, BENCH_VALVE, found))["coulomb"]
+        axes = panels(identification_figure(found))["coulomb"]
         level = axes.lines[2]
         assert level.get_linestyle() == "--"
         assert set(level.get_ydata()) == {152.25}
@@ -114,29 +111,30 @@ class TestPanels:
         (note,) = axes.texts
         assert note.get_text() == "$F_c$ = 152.2 ± 3.5 N: weak"
 
-    def test_a_given_friction_has_no_interval(self, record, with_parameters):
+    def test_a_given_friction_has_no_interval(self, with_parameters):
         found = with_parameters(coulomb_friction=(152.5, 0.0, Verdict.FIXED))
-        (note,) = panels(identification_figure(record, BENCH_VALVE, found))["coulomb"].texts
+        (note,) = panels(identification_figure(found))["coulomb"].texts
         assert note.get_text() == "$F_c$ = 152.5 N: fixed"
 
     @pytest.mark.parametrize("coulomb", [40.0, 152.0, 1520.0])
-    def test_both_frictions_are_in_sight(self, record, with_parameters, coulomb):
+    def test_both_frictions_are_in_sight(self, with_parameters, coulomb):
         found = with_parameters(coulomb_friction=(coulomb, 1.0, Verdict.IDENTIFIED))
-        axes = panels(identification_figure(record, BENCH_VALVE, found))["coulomb"]
+        axes = panels(identification_figure(found))["coulomb"]
         low, high = axes.get_ylim()
         assert low < coulomb < high
-        assert low < found.published.coulomb_friction < high
+        assert low < found.estimate.coulomb_friction < high
 
-    def test_force_of_a_machine_without_diaphragm(self, record, assessment):
-        found = panels(identification_figure(record, BENCH_VALVE, assessment, FORCE))
+    def test_force_of_a_machine_without_diaphragm(self, record, result):
+        found = panels(identification_figure(result, FORCE))
         assert found["pressure"].get_ylabel() == "drive force [N]"
         assert found["signature"].get_xlabel() == "drive force [N]"
         np.testing.assert_array_equal(found["pressure"].lines[0].get_ydata(), record.pressure)
 
-    def test_long_records_are_thinned(self, record, assessment):
+    def test_long_records_are_thinned(self, record, result):
         """Not below 20000 points, and to their whole length."""
         many = Recording(1e-3, np.tile(record.pressure, 60), np.tile(record.position, 60))
-        line = panels(identification_figure(many, BENCH_VALVE, assessment))["stem"].lines[0]
+        found = identification_figure(dataclasses.replace(result, recording=many))
+        line = panels(found)["stem"].lines[0]
         assert 20_000 <= line.get_xdata().size < 40_000
         step = line.get_xdata()[1] - line.get_xdata()[0]
         assert line.get_xdata()[-1] > many.duration - step
@@ -152,17 +150,17 @@ class TestVerdict:
             spring_constant=(2.05e5, 0.0, Verdict.FIXED),
         )
 
-    def test_each_number_has_its_verdict(self, record, known):
+    def test_each_number_has_its_verdict(self, known):
         """2·152.7 N over 2.05e5 N/m and 28.575 mm is 5.2 %."""
         known = dataclasses.replace(known, warnings=())
-        assert title_of(identification_figure(record, BENCH_VALVE, known)) == (
+        assert title_of(identification_figure(known)) == (
             "F_c 152.7 N (identified); F_v 4865 N·s/m (weak); k 2.05e+05 N/m (fixed); "
             f"dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
         )
 
-    def test_a_number_without_a_verdict_is_never_shown(self, record, nothing_known):
+    def test_a_number_without_a_verdict_is_never_shown(self, nothing_known):
         """What is withheld leaves no number in the title, and no line, band or note of it."""
-        figure = identification_figure(record, BENCH_VALVE, nothing_known)
+        figure = identification_figure(nothing_known)
         told = title_of(figure).split("; ")[:3]
         assert told == [f"{name} not identifiable" for name in ("F_c", "F_v", "k")]
         assert "dead band" not in title_of(figure)
@@ -174,42 +172,44 @@ class TestVerdict:
         everything = " ".join([title_of(figure), *(t.get_text() for t in axes.texts)])
         assert "nan" not in everything
 
-    def test_warnings_are_told(self, record, known):
+    def test_warnings_are_told(self, known):
         doubt = "the Karnopp model does not describe this valve: 98 µm are not noise"
         doubted = dataclasses.replace(known, warnings=(doubt, "check the clocks"))
-        title = title_of(identification_figure(record, BENCH_VALVE, doubted))
+        title = title_of(identification_figure(doubted))
         assert title.endswith(f"; {doubt}; check the clocks")
 
-    def test_a_long_verdict_is_wrapped_within_the_page(self, record, known):
+    def test_a_long_verdict_is_wrapped_within_the_page(self, known):
         doubted = dataclasses.replace(known, warnings=("many words " * 20,))
-        figure = identification_figure(record, BENCH_VALVE, doubted)
+        figure = identification_figure(doubted)
         figure.draw_without_rendering()
         box = figure._suptitle.get_window_extent()
         assert box.x1 < figure.bbox.x1
         assert len(figure.get_suptitle().splitlines()) > 2
 
-    def test_beyond_the_travel(self, record, with_parameters):
+    def test_beyond_the_travel(self, with_parameters):
         tight = with_parameters(
             coulomb_friction=(4e3, 1.0, Verdict.IDENTIFIED),
             static_friction=(4e3, 1.0, Verdict.IDENTIFIED),
             spring_constant=(2.05e5, 0.0, Verdict.FIXED),
         )
-        title = title_of(identification_figure(record, BENCH_VALVE, tight))
+        title = title_of(identification_figure(tight))
         assert "dead band 137 % of travel" in title
 
-    def test_without_a_travel(self, record, assessment):
+    def test_without_a_travel(self, result):
         endless = Valve(BENCH_VALVE.diaphragm_area, BENCH_VALVE.pressure_reference)
-        assert "dead band" not in title_of(identification_figure(record, endless, assessment))
+        assert "dead band" not in title_of(
+            identification_figure(dataclasses.replace(result, valve=endless))
+        )
 
 
 class TestSeveralCases:
-    def case(self, record, assessment, number):
+    def case(self, record, result, number):
         later = Recording(0.01, record.pressure, record.position, 100.0 + 30.0 * number)
-        return Case.of(f"case {number}", later, assessment)
+        return Case.of(f"case {number}", dataclasses.replace(result, recording=later))
 
     @pytest.mark.parametrize("count", [2, len(COLOURS)])
-    def test_each_has_its_line_colour_and_name(self, record, assessment, count):
-        cases = [self.case(record, assessment, number) for number in range(count)]
+    def test_each_has_its_line_colour_and_name(self, record, result, count):
+        cases = [self.case(record, result, number) for number in range(count)]
         found = panels(friction_figure(cases, "verdict"))
         for name in ("pressure", "stem", "signature"):
             drawn = [line.get_color() for line in found[name].lines if line.get_linestyle() == "-"]
@@ -218,8 +218,8 @@ class TestSeveralCases:
         assert names == [case.label for case in cases]
         assert len(found["coulomb"].texts) == count
 
-    def test_time_runs_from_the_first_record(self, record, assessment):
-        cases = [self.case(record, assessment, number) for number in (0, 1)]
+    def test_time_runs_from_the_first_record(self, record, result):
+        cases = [self.case(record, result, number) for number in (0, 1)]
         lines = panels(friction_figure(cases, "verdict"))["stem"].lines
         assert [line.get_xdata()[0] for line in lines] == [0.0, 0.0, 30.0, 30.0]
         ends = [line.get_xdata()[-1] for line in lines[2:]]
@@ -229,18 +229,18 @@ class TestSeveralCases:
         assert panels(figure)["signature"].get_legend() is None
 
     @pytest.mark.parametrize("count", [0, 1 + len(COLOURS)])
-    def test_none_or_too_many(self, record, assessment, count):
-        cases = [self.case(record, assessment, number) for number in range(count)]
+    def test_none_or_too_many(self, record, result, count):
+        cases = [self.case(record, result, number) for number in range(count)]
         with pytest.raises(ValueError, match=f"^one to 4 cases can be drawn, got {count}$"):
             friction_figure(cases, "verdict")
 
 
-def test_case_of_an_assessment(record, assessment):
-    case = Case.of("loose", record, assessment)
-    assert case.chosen_coulomb_friction == assessment.published.coulomb_friction
-    assert case.threshold == assessment.published.threshold
-    assert case.friction is assessment.parameters["coulomb_friction"]
-    assert case.simulated is assessment.refinement.simulated
+def test_case_of_a_result(result):
+    case = Case.of("loose", result)
+    assert case.chosen_coulomb_friction == result.estimate.coulomb_friction
+    assert case.threshold == result.estimate.threshold
+    assert case.friction is result.parameters["coulomb_friction"]
+    assert case.simulated is result.stem.simulated
     assert math.isclose(case.drive.pascals, 1e3)
 
 

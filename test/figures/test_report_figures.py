@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from valve_friction_ros.figures.comparison import comparison_of
 from valve_friction_ros.figures.report_figures import (
     chosen_region,
     comparison_figure,
@@ -12,19 +11,18 @@ from valve_friction_ros.figures.report_figures import (
     signature_loop_figure,
     sweep_figure,
 )
-from valve_friction_ros.model import BENCH_VALVE
 
 MILLIMETRE = 1 / 25.4
 PRINTABLE = 180.0  # mm between the margins of an A4 page
 
 
 @pytest.fixture(scope="module")
-def figures(record, assessment):
-    comparison = comparison_of(assessment)
+def figures(record, result):
+    comparison = result.stem
     return {
         "record": record_figure(record),
-        "loop": signature_loop_figure(record, BENCH_VALVE, assessment),
-        "sweep": sweep_figure(record, assessment),
+        "loop": signature_loop_figure(result),
+        "sweep": sweep_figure(result),
         "comparison": comparison_figure(comparison),
         "residual": residual_figure(comparison),
     }
@@ -53,9 +51,9 @@ def test_record_and_loop_show_what_was_measured(figures, record):
     np.testing.assert_allclose(loop, [record.pressure / 1e3, record.position * 1e3])
 
 
-def test_the_sweep_marks_choice_and_region_in_every_panel(figures, assessment):
-    threshold = assessment.published.threshold
-    low, high = chosen_region(assessment.sweep, threshold)
+def test_the_sweep_marks_choice_and_region_in_every_panel(figures, result):
+    threshold = result.estimate.threshold
+    low, high = chosen_region(result.estimate.sweep, threshold)
     assert low <= threshold <= high
     for axes in figures["sweep"].axes:
         spans = [patch.get_extents() for patch in axes.patches]
@@ -64,11 +62,11 @@ def test_the_sweep_marks_choice_and_region_in_every_panel(figures, assessment):
         assert any(threshold in np.asarray(line.get_xdata()) for line in axes.lines)
 
 
-def test_comparison_and_residual_belong_together(figures, assessment):
+def test_comparison_and_residual_belong_together(figures, result):
     measured, simulated = lines(figures["comparison"].axes[0])
     assert len(figures["comparison"].legends) == 1
     residual = lines(figures["residual"].axes[0])[0]
     np.testing.assert_allclose(residual[1] / 1e3, simulated[1] - measured[1], atol=1e-9)
-    assert np.sqrt(np.mean(residual[1] ** 2)) == pytest.approx(assessment.rms * 1e6)
+    assert np.sqrt(np.mean(residual[1] ** 2)) == pytest.approx(result.rms * 1e6)
     correlation = lines(figures["residual"].axes[2])[0]
     assert correlation[1][0] == 1

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.figures import identification_figure, validation_figure
-from valve_friction_ros.identification import assess_force_balance, validate
+from valve_friction_ros.identification import identify_signature, validate
 from valve_friction_ros.model import BENCH_VALVE, Recording, TriangleWave, simulate
 
 
@@ -19,7 +19,7 @@ def signature_record(benches):
 
 @pytest.fixture(scope="module")
 def found(signature_record):
-    return assess_force_balance(signature_record, BENCH_VALVE)
+    return identify_signature(signature_record, BENCH_VALVE)
 
 
 def panels(figure):
@@ -32,8 +32,8 @@ def lines(axes):
 
 class TestSignature:
     @pytest.fixture(scope="class")
-    def figure(self, signature_record, found):
-        return identification_figure(signature_record, BENCH_VALVE, found)
+    def figure(self, found):
+        return identification_figure(found)
 
     def test_points(self, figure, found):
         drawn = lines(panels(figure)["signature"])
@@ -57,7 +57,7 @@ class TestSignature:
     def test_stem_and_model(self, figure, found, signature_record):
         measured, model, points = panels(figure)["stem"].lines
         np.testing.assert_array_equal(measured.get_ydata(), signature_record.position * 1e3)
-        np.testing.assert_array_equal(model.get_ydata(), found.simulated * 1e3)
+        np.testing.assert_array_equal(model.get_ydata(), found.stem.simulated * 1e3)
         assert points.get_xdata().size == 5
 
     def test_words(self, figure, found):

@@ -6,10 +6,10 @@ import pytest
 from records import sine_record
 
 from valve_friction_ros.identification import (
-    AssessedParameter,
     IdentificationSettings,
+    Parameter,
     Verdict,
-    assess,
+    identify_refined,
 )
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
@@ -22,8 +22,8 @@ def tight_record():
 
 
 @pytest.fixture(scope="session")
-def assessment(loose_record):
-    return assess(loose_record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
+def result(loose_record):
+    return identify_refined(loose_record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
 
 
 @pytest.fixture(scope="session")
@@ -31,25 +31,23 @@ def friction():
     """Function of a value and its half width: an assessed Coulomb friction."""
 
     def build(value, half_width=0.0):
-        return AssessedParameter(
-            "coulomb_friction", value, half_width / 2, half_width, Verdict.IDENTIFIED
-        )
+        return Parameter("coulomb_friction", value, half_width / 2, half_width, Verdict.IDENTIFIED)
 
     return build
 
 
 @pytest.fixture(scope="session")
-def with_values(assessment):
-    """Function of values or assessed parameters by name: the assessment with these instead."""
+def with_values(result):
+    """Function of values or assessed parameters by name: the result with these instead."""
 
     def build(**changes):
-        parameters = dict(assessment.parameters)
+        parameters = dict(result.parameters)
         for name, new in changes.items():
-            is_whole = isinstance(new, AssessedParameter)
+            is_whole = isinstance(new, Parameter)
             parameters[name] = (
-                new if is_whole else AssessedParameter(name, new, 0.0, 0.0, Verdict.IDENTIFIED)
+                new if is_whole else Parameter(name, new, 0.0, 0.0, Verdict.IDENTIFIED)
             )
-        return replace(assessment, parameters=parameters)
+        return replace(result, parameters=parameters)
 
     return build
 
@@ -60,6 +58,6 @@ def unknown():
 
     def build(name="coulomb_friction", reason="the record does not tell it"):
         nan = float("nan")
-        return AssessedParameter(name, nan, nan, nan, Verdict.NOT_IDENTIFIABLE, reason)
+        return Parameter(name, nan, nan, nan, Verdict.NOT_IDENTIFIABLE, reason)
 
     return build

@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from valve_friction_ros.health import Baseline
-from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict
 
 FRICTIONS = st.floats(1.0, 1e4)
 SHARES = st.floats(0.0, 0.99)
 
 
 def friction_of(value, half_width):
-    return AssessedParameter("coulomb_friction", value, half_width / 2, half_width, Verdict.WEAK)
+    return Parameter("coulomb_friction", value, half_width / 2, half_width, Verdict.WEAK)
 
 
 class TestComparison:

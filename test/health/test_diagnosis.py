@@ -14,8 +14,8 @@ from valve_friction_ros.health import (
     diagnose,
     percentage,
 )
-from valve_friction_ros.identification import AssessedParameter, Verdict
-from valve_friction_ros.identification.refined.model_test import Misfit
+from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.model import BENCH_VALVE, Valve
 
 BASELINE = Baseline(128.0)
@@ -47,8 +47,8 @@ class TestDeadBand:
         found = with_values(static_friction=942.0, **{name: unknown(name)})
         assert math.isnan(dead_band(found, BENCH_VALVE))
 
-    def test_there_is_no_share_without_stops(self, assessment):
-        assert math.isnan(dead_band(assessment, Valve(1.0)))
+    def test_there_is_no_share_without_stops(self, result):
+        assert math.isnan(dead_band(result, Valve(1.0)))
 
 
 @pytest.mark.parametrize(
@@ -179,8 +179,8 @@ class TestUnknownFriction:
     def test_too_small_to_be_told_has_collapsed(self, with_values, unknown, bound, collapsed):
         """Half of the least that the baseline can be, 128 − 14 N, is 57 N."""
         vanished = dataclasses.replace(unknown(), magnitude_bound=bound)
-        assessment = with_values(coulomb_friction=vanished)
-        found = diagnose(assessment, BENCH_VALVE, Baseline(128.0, 14.0))
+        result = with_values(coulomb_friction=vanished)
+        found = diagnose(result, BENCH_VALVE, Baseline(128.0, 14.0))
         assert found.ratio is None
         if collapsed:
             assert (found.level, found.status_signal) == (
@@ -193,7 +193,7 @@ class TestUnknownFriction:
             )
         else:
             assert found.level == Level.OK
-        assert diagnose(assessment, BENCH_VALVE).level == Level.OK
+        assert diagnose(result, BENCH_VALVE).level == Level.OK
 
     @pytest.mark.parametrize("baseline", [None, BASELINE])
     def test_below_zero_is_a_fault_of_the_signals(self, with_values, friction, baseline):
@@ -211,7 +211,7 @@ class TestModelDoubt:
 
     @pytest.fixture
     def doubted(self, with_values):
-        """Function of a Coulomb friction: an assessment whose model misses the stem by 98 µm."""
+        """Function of a Coulomb friction: an result whose model misses the stem by 98 µm."""
 
         def build(coulomb_friction, systematic=98e-6):
             misfit = Misfit(0.98, 99e-6, systematic, 98e-6 - 1e-12)
@@ -262,7 +262,7 @@ class TestWords:
         """2·606 N over 2.05e5 N/m and 28.575 mm is 20.69 %; 3.9686·e^∓0.01 is 3.93 to 4.01."""
         found = diagnose(
             with_values(
-                coulomb_friction=AssessedParameter(
+                coulomb_friction=Parameter(
                     "coulomb_friction", 606.0, 3.0, 6.06, Verdict.IDENTIFIED
                 ),
                 static_friction=unknown("static_friction"),

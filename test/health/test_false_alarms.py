@@ -3,7 +3,7 @@
 import pytest
 
 from valve_friction_ros.health import Baseline, FrictionLimits, Level, diagnose
-from valve_friction_ros.identification import IdentificationSettings, assess
+from valve_friction_ros.identification import IdentificationSettings, identify_refined
 from valve_friction_ros.model import BENCH_VALVE, SensorNoise
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
@@ -12,11 +12,11 @@ SEEDS = range(40)
 
 def assessed(record, seed):
     noise = SensorNoise(28.6e-6, 165.0, seed)
-    return assess(noise.applied_to(record), BENCH_VALVE, SETTINGS)
+    return identify_refined(noise.applied_to(record), BENCH_VALVE, SETTINGS)
 
 
-def baseline_of(assessment):
-    healthy = assessment.parameters["coulomb_friction"]
+def baseline_of(result):
+    healthy = result.parameters["coulomb_friction"]
     return Baseline(healthy.value, healthy.half_width)
 
 
@@ -27,7 +27,7 @@ def unchanged(loose_record):
 
 @pytest.fixture(scope="module")
 def pairs(unchanged):
-    """Each assessment with the baseline that the one before it makes."""
+    """Each result with the baseline that the one before it makes."""
     return [
         (now, baseline_of(before))
         for now, before in zip(unchanged, unchanged[-1:] + unchanged, strict=False)

@@ -15,7 +15,7 @@ from valve_friction_ros.health import (
     diagnose,
     identify_snapshot,
 )
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, assess
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify_refined
 from valve_friction_ros.model import BENCH_VALVE
 
 SETTINGS = MonitorSettings(BENCH_VALVE)
@@ -26,8 +26,8 @@ def replaced(**changes):
     return dataclasses.replace(SETTINGS, **changes)
 
 
-def coulomb_friction(assessment):
-    return assessment.parameters["coulomb_friction"]
+def coulomb_friction(result):
+    return result.parameters["coulomb_friction"]
 
 
 def feed(monitor, record):
@@ -47,11 +47,13 @@ class TestSettings:
     @pytest.mark.parametrize("value", [0, -5, 3, 30])
     def test_impossible_derivative_windows_are_named(self, value):
         """Before a record is gathered for it, not when that record is identified."""
-        with pytest.raises(ValueError, match=r"^window must be odd and at least order \+ 2 = 5"):
-            replaced(derivative_window=value)
+        with pytest.raises(
+            ValueError, match=r"^derivative_window must be odd and at least order \+ 2"
+        ):
+            IdentificationSettings(derivative_window=value)
 
     def test_no_baseline_and_no_derivative_window_at_first(self):
-        assert (SETTINGS.baseline, SETTINGS.derivative_window) == (None, None)
+        assert (SETTINGS.baseline, SETTINGS.identification.derivative_window) == (None, None)
 
 
 class TestIdentification:
@@ -59,21 +61,20 @@ class TestIdentification:
         monitor = FrictionMonitor(SETTINGS)
         feed(monitor, loose_record)
         found = identify_snapshot(monitor.buffer.snapshot(), SETTINGS)
-        expected = assess(loose_record, BENCH_VALVE)
+        expected = identify_refined(loose_record, BENCH_VALVE)
         assert str(found.parameters) == str(expected.parameters)  # nan is not nan
-        assert found.published.values == expected.published.values
+        assert found.estimate.values == expected.estimate.values
 
     def test_by_the_settings(self, loose_record):
         settings = replaced(
-            identification=IdentificationSettings(fixed={"mass": 1.25}, window=21),
-            derivative_window=15,
+            identification=IdentificationSettings(fixed={"mass": 1.25}, derivative_window=21)
         )
         monitor = FrictionMonitor(settings)
         feed(monitor, loose_record)
         found = identify_snapshot(monitor.buffer.snapshot(), settings)
         assert found.values["mass"] == 1.25
-        assert found.published.settings.window == 21
-        assert found.start.settings.window == 15
+        assert found.estimate.settings.published_window == 21
+        assert found.derivative_window == 21
 
     def test_a_refusal_has_its_cause(self):
         snapshot = FrictionMonitor(SETTINGS).buffer.snapshot()
@@ -94,7 +95,7 @@ class TestIdentification:
 class TestMemory:
     def test_at_first(self):
         monitor = FrictionMonitor(SETTINGS)
-        remembered = (monitor.assessment, monitor.stamp, monitor.refusal, monitor.baseline)
+        remembered = (monitor.result, monitor.stamp, monitor.refusal, monitor.baseline)
         assert remembered == (None, None, None, None)
         diagnosis = monitor.diagnosis()
         assert (diagnosis.level, diagnosis.status_signal) == (Level.OK, StatusSignal.GOOD)
@@ -108,37 +109,35 @@ class TestMemory:
         assert monitor.diagnosis().level == Level.OK
         assert monitor.diagnosis().message == "no estimate: the stem did not move"
 
-    def test_an_estimate_ends_the_refusal(self, assessment):
+    def test_an_estimate_ends_the_refusal(self, result):
         monitor = FrictionMonitor(SETTINGS)
         monitor.refuse(RefusalError("the stem did not move"))
-        monitor.accept(assessment, START)
-        assert (monitor.assessment, monitor.stamp) == (assessment, START)
+        monitor.accept(result, START)
+        assert (monitor.result, monitor.stamp) == (result, START)
         assert monitor.refusal is None
-        assert monitor.diagnosis() == diagnose(assessment, BENCH_VALVE)
+        assert monitor.diagnosis() == diagnose(result, BENCH_VALVE)
 
-    def test_a_refusal_leaves_the_estimate(self, assessment):
-        monitor = FrictionMonitor(
-            replaced(baseline=Baseline(coulomb_friction(assessment).value / 3))
-        )
-        monitor.accept(assessment, START)
+    def test_a_refusal_leaves_the_estimate(self, result):
+        monitor = FrictionMonitor(replaced(baseline=Baseline(coulomb_friction(result).value / 3)))
+        monitor.accept(result, START)
         monitor.refuse(RefusalError("the stem did not move"))
-        assert (monitor.assessment, monitor.stamp) == (assessment, START)
+        assert (monitor.result, monitor.stamp) == (result, START)
         assert monitor.refusal == "the stem did not move"
         assert monitor.diagnosis().level == Level.ERROR
 
 
 class TestBaseline:
-    def test_of_the_settings(self, assessment):
+    def test_of_the_settings(self, result):
         monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
         assert monitor.baseline == Baseline(100.0, 0.0)
-        monitor.accept(assessment, START)
+        monitor.accept(result, START)
         ratio = monitor.diagnosis().ratio
-        assert ratio.value == coulomb_friction(assessment).value / 100.0
+        assert ratio.value == coulomb_friction(result).value / 100.0
 
-    def test_of_the_latest_assessment_with_its_interval(self, assessment, with_values, friction):
+    def test_of_the_latest_assessment_with_its_interval(self, result, with_values, friction):
         monitor = FrictionMonitor(SETTINGS)
-        monitor.accept(assessment, START)
-        healthy = coulomb_friction(assessment)
+        monitor.accept(result, START)
+        healthy = coulomb_friction(result)
         expected = Baseline(healthy.value, healthy.half_width)
         assert monitor.set_baseline() == monitor.baseline == expected
         assert monitor.diagnosis().ratio.value == 1.0
@@ -180,9 +179,9 @@ class TestBaseline:
 
 
 class TestChangeOfSettings:
-    def filled(self, assessment, settings=SETTINGS):
+    def filled(self, result, settings=SETTINGS):
         monitor = FrictionMonitor(settings)
-        monitor.accept(assessment, START)
+        monitor.accept(result, START)
         monitor.buffer.add_pressure(START, 1e5)
         return monitor
 
@@ -194,16 +193,16 @@ class TestChangeOfSettings:
         ],
         ids=["window", "valve"],
     )
-    def test_another_window_or_valve_empties_the_buffer(self, assessment, changes):
-        monitor = self.filled(assessment)
+    def test_another_window_or_valve_empties_the_buffer(self, result, changes):
+        monitor = self.filled(result)
         monitor.change_settings(replaced(**changes))
         assert len(monitor.buffer) == 0
         cause = "valve or window parameters were changed"
         assert monitor.buffer.snapshot().cleared_because == cause
-        assert monitor.assessment is assessment
+        assert monitor.result is result
 
-    def test_the_new_range_holds(self, assessment):
-        monitor = self.filled(assessment)
+    def test_the_new_range_holds(self, result):
+        monitor = self.filled(result)
         monitor.change_settings(
             replaced(valve=dataclasses.replace(BENCH_VALVE, pressure_maximum=2e5))
         )
@@ -213,38 +212,37 @@ class TestChangeOfSettings:
         "changes",
         [
             {"baseline": Baseline(3.0)},
-            {"derivative_window": 15},
             {"limits": FrictionLimits(warn_ratio=1.2)},
-            {"identification": IdentificationSettings(window=51)},
+            {"identification": IdentificationSettings(derivative_window=51)},
         ],
-        ids=["baseline", "derivative window", "limits", "identification"],
+        ids=["baseline", "limits", "identification"],
     )
-    def test_other_changes_keep_it(self, assessment, changes):
-        monitor = self.filled(assessment)
+    def test_other_changes_keep_it(self, result, changes):
+        monitor = self.filled(result)
         changed = replaced(**changes)
         monitor.change_settings(changed)
         assert len(monitor.buffer) == 1
         assert monitor.buffer.snapshot().cleared_because is None
         assert monitor.settings == changed
 
-    def test_a_baseline_that_was_set_survives_other_changes(self, assessment):
-        monitor = self.filled(assessment)
+    def test_a_baseline_that_was_set_survives_other_changes(self, result):
+        monitor = self.filled(result)
         monitor.set_baseline()
         monitor.change_settings(replaced(limits=FrictionLimits(warn_ratio=1.2)))
-        healthy = coulomb_friction(assessment)
+        healthy = coulomb_friction(result)
         assert monitor.baseline == Baseline(healthy.value, healthy.half_width)
 
-    def test_but_not_a_baseline_of_the_settings(self, assessment):
-        monitor = self.filled(assessment, replaced(baseline=Baseline(100.0)))
+    def test_but_not_a_baseline_of_the_settings(self, result):
+        monitor = self.filled(result, replaced(baseline=Baseline(100.0)))
         monitor.set_baseline()
         monitor.change_settings(replaced(baseline=Baseline(120.0)))
         assert monitor.baseline == Baseline(120.0)
         monitor.change_settings(SETTINGS)
         assert monitor.baseline is None
 
-    def test_new_limits_judge_the_old_estimate(self, assessment):
-        healthy = Baseline(coulomb_friction(assessment).value / 1.2)
-        monitor = self.filled(assessment, replaced(baseline=healthy))
+    def test_new_limits_judge_the_old_estimate(self, result):
+        healthy = Baseline(coulomb_friction(result).value / 1.2)
+        monitor = self.filled(result, replaced(baseline=healthy))
         assert monitor.diagnosis().level == Level.OK
         monitor.change_settings(dataclasses.replace(monitor.settings, limits=FrictionLimits(1.15)))
         assert monitor.diagnosis().level == Level.WARN

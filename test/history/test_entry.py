@@ -31,21 +31,21 @@ def monitor():
 
 def test_a_success(monitor):
     snapshot = monitor.buffer.snapshot()
-    assessment = identify_snapshot(snapshot, monitor.settings)
-    monitor.accept(assessment, START)
+    result = identify_snapshot(snapshot, monitor.settings)
+    monitor.accept(result, START)
     baseline = monitor.set_baseline()
     entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
-    assert entry.parameters == dict(assessment.parameters)
+    assert entry.parameters == dict(result.parameters)
     assert entry.span == (0, 499 * PERIOD)
     assert entry.fit == (
-        assessment.fit,
-        assessment.rms,
-        assessment.misfit.systematic,
+        result.fit,
+        result.rms,
+        result.misfit.systematic,
     )
     assert entry.diagnosis == monitor.diagnosis()
     assert entry.diagnosis.ratio.value == 1.0
     assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)
-    assert entry.warnings == assessment.warnings
+    assert entry.warnings == result.warnings
     assert (entry.time, entry.valve, entry.refusal) == (START, VALVE, "")
     assert entry.version == __version__
 

@@ -88,18 +88,18 @@ def test_points_are_those_of_the_entries(history):
     others = (
         refused(START + 9),
         success(START, valve=OTHER),
-        success(START, method="force_balance"),
+        success(START, method="signature"),
     )
     for entry in (*entries, *others):
         history.add(entry)
     expected = [point for one in entries if (point := one.point()) is not None]
     assert expected
-    assert history.points(VALVE.name, "sweep") == tuple(expected)
+    assert history.points(VALVE.name, "refined") == tuple(expected)
     later = expected[0].time + 1
-    assert history.points(VALVE.name, "sweep", later) == tuple(
+    assert history.points(VALVE.name, "refined", later) == tuple(
         p for p in expected if p.time >= later
     )
-    assert history.points(OTHER.name, "sweep") == (FrictionPoint(START, 150.0, 3.0),)
+    assert history.points(OTHER.name, "refined") == (FrictionPoint(START, 150.0, 3.0),)
 
 
 class TestBaseline:

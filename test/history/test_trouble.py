@@ -234,7 +234,7 @@ def test_a_row_that_holds_no_result(history):
 def test_a_row_that_somebody_has_spoilt_makes_no_trend(history, half_width):
     history.add(success(START + 1))
     change(history, f"UPDATE parameter SET half_width = {half_width} WHERE identification_id = 1")
-    assert [point.time for point in history.points("/fv_101/identifier", "sweep")] == [START + 1]
+    assert [point.time for point in history.points("/fv_101/identifier", "refined")] == [START + 1]
 
 
 def test_nothing_of_a_failed_change_stays(history, monkeypatch):

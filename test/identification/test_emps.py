@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, identify
+from valve_friction_ros.identification import IdentificationSettings, published_estimate
 from valve_friction_ros.model import Recording, Valve
 
 RECORD = (
@@ -30,7 +30,9 @@ def estimate():
     assert period == pytest.approx(1e-3, rel=1e-9)
     # No diaphragm and no spring: 1 Pa on 1 m² is 1 N.
     record = Recording(period, force, position)
-    return identify(record, Valve(1.0), IdentificationSettings(fixed={"spring_constant": 0.0}))
+    return published_estimate(
+        record, Valve(1.0), IdentificationSettings(fixed={"spring_constant": 0.0})
+    )
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

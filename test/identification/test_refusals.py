@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, assess
+from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify_refined
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,
@@ -34,11 +34,11 @@ def healthy():
 
 def refused(recording, message, noise=NOISE):
     with pytest.raises(RefusalError, match=message):
-        assess(noise.applied_to(recording), BENCH_VALVE, SETTINGS)
+        identify_refined(noise.applied_to(recording), BENCH_VALVE, SETTINGS)
 
 
 def test_the_healthy_record_passes(healthy):
-    found = assess(NOISE.applied_to(healthy), BENCH_VALVE, SETTINGS)
+    found = identify_refined(NOISE.applied_to(healthy), BENCH_VALVE, SETTINGS)
     assert found.values["coulomb_friction"] == pytest.approx(606.0, rel=0.01)
 
 
@@ -111,12 +111,12 @@ def test_position_counted_the_wrong_way(healthy):
 def test_a_record_that_is_too_short(healthy):
     short = Recording(PERIOD, healthy.pressure[:30], healthy.position[:30])
     with pytest.raises(RefusalError):
-        assess(short, BENCH_VALVE, SETTINGS)
+        identify_refined(short, BENCH_VALVE, SETTINGS)
 
 
 def test_too_few_reversals_leave_nothing_identified():
     """One stroke up and one down: weak at best, and the reason says what to do."""
-    found = assess(
+    found = identify_refined(
         NOISE.applied_to(recorded(SquareWave().sample(PERIOD * np.arange(15_600)))),
         BENCH_VALVE,
         replace(SETTINGS, fixed={"mass": 1.6}),

@@ -9,7 +9,7 @@ from records import quick_record
 
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import MONTH, FrictionPoint, HistoryFile, KeptBaseline, trend_of
-from valve_friction_ros.identification import assess
+from valve_friction_ros.identification import identify_refined
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.nodes.identifier.status import trend_values
 
@@ -17,7 +17,7 @@ NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
 PATIENT = {"input_timeout": 600.0}
 RECORD = quick_record()
-EXPECTED = assess(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
+EXPECTED = identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
 
 
 @pytest.fixture

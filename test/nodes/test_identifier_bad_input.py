@@ -7,7 +7,7 @@ import pytest
 from live_nodes import SECOND, stamps_of
 from records import quick_record
 
-from valve_friction_ros.identification import assess
+from valve_friction_ros.identification import identify_refined
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
 RECORD = quick_record()
@@ -163,12 +163,12 @@ BAD_INPUTS = {  # what is published, how many samples of it are taken, words of 
 
 def identifies_the_next_record(client):
     client.identified(RECORD)
-    expected = assess(RECORD, BENCH_VALVE).values["coulomb_friction"]
+    expected = identify_refined(RECORD, BENCH_VALVE).values["coulomb_friction"]
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
 
 
 def test_the_good_record_is_good():
-    value = assess(RECORD, BENCH_VALVE).values["coulomb_friction"]
+    value = identify_refined(RECORD, BENCH_VALVE).values["coulomb_friction"]
     assert value == pytest.approx(LOW_FRICTION.coulomb_friction, rel=1e-3)
 
 

@@ -6,7 +6,7 @@ from live_nodes import NAMESPACE, values_of
 from records import quick_record, simulated
 from std_msgs.msg import Float64MultiArray
 
-from valve_friction_ros.identification import UNITS, IdentificationSettings, assess_force_balance
+from valve_friction_ros.identification import UNITS, IdentificationSettings, identify_signature
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
 
 NODE = f"{NAMESPACE}/identifier"
@@ -20,19 +20,19 @@ def signature_record():
 
 @pytest.fixture(scope="module")
 def client(shared):
-    shared.start_identifier({"method": "force_balance", "input_timeout": 600.0})
+    shared.start_identifier({"method": "signature", "input_timeout": 600.0})
     return shared.client
 
 
 def test_the_choice_is_described(client):
     (descriptor,) = client.describe(NODE, ["method"])
-    assert descriptor.additional_constraints == "one of sweep, force_balance"
+    assert descriptor.additional_constraints == "one of refined, published, signature"
 
 
 def test_a_signature_is_identified(client):
     message = client.identified(signature_record())
     assert "the stem ignores reversals smaller than 21 % of its travel" in message
-    expected = assess_force_balance(signature_record(), BENCH_VALVE, IdentificationSettings())
+    expected = identify_signature(signature_record(), BENCH_VALVE, IdentificationSettings())
     told = client.friction(*UNITS, "fit", "rms", "dead_band", "threshold")
     for name in UNITS:
         assert told[name] == pytest.approx(expected.values[name], rel=1e-9, nan_ok=True)
@@ -46,7 +46,7 @@ def test_a_signature_is_identified(client):
     assert np.isnan([*client.published(*UNITS).values()]).all()
     assert not client.latched(Float64MultiArray, f"{NODE}/sweep").data
     values = values_of(client.next_status())
-    assert values["method"] == "force_balance"
+    assert values["method"] == "signature"
     assert values["estimate_valid"] == "true"
     assert values["coulomb_friction verdict"] == "weak"
     assert float(values["fit [%]"]) == pytest.approx(100 * expected.fit, rel=1e-8)
@@ -62,7 +62,7 @@ def test_another_record_is_refused_with_what_it_needs(client):
 
 
 def test_the_method_can_be_changed_while_the_node_runs(client):
-    assert client.set_together(NODE, {"method": "sweep"}).successful
+    assert client.set_together(NODE, {"method": "refined"}).successful
     client.identified(quick_record())
     assert np.isfinite(client.friction("threshold")["threshold"])
-    assert values_of(client.next_status())["method"] == "sweep"
+    assert values_of(client.next_status())["method"] == "refined"

@@ -26,9 +26,9 @@ from std_msgs.msg import Float64, Header
 from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
-    assess,
     differentiate,
-    identify,
+    identify_refined,
+    published_estimate,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -51,7 +51,7 @@ def bench(shared):
     stamps = stamps_of(record)
     client.send_without_loss((stamps, record.pressure), (stamps, record.position))
     response = client.trigger("identify")
-    assessment = assess(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
+    assessment = identify_refined(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
     return client, assessment, response, early
 
 
@@ -61,7 +61,7 @@ def test_bench_record_is_identified(bench):
     client.wait_until(lambda: early, "the result")
     assert [message.data for message in early] == [assessment.values["coulomb_friction"]]
     truth = {name: getattr(LOW_FRICTION, name) for name in UNITS}
-    published = assessment.published.values
+    published = assessment.estimate.values
     assert published.pop("mass") == pytest.approx(truth.pop("mass"), rel=0.1)
     assert published == pytest.approx(truth, rel=1e-3)
     for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"):
@@ -76,7 +76,7 @@ def as_told(values):
 
 def test_late_subscriber_gets_every_number_to_the_last_bit(bench):
     client, assessment, *_ = bench
-    values, published = assessment.values, assessment.published
+    values, published = assessment.values, assessment.estimate
     assert np.isnan(values["static_friction"])  # no slip jump: F_s is F_c in the dead band
     dead_band = 2 * values["coulomb_friction"] / values["spring_constant"]
     expected = {
@@ -97,7 +97,7 @@ def test_late_subscriber_gets_every_number_to_the_last_bit(bench):
 
 def test_sweep_is_labelled_and_holds_the_estimate(bench):
     client, assessment, *_ = bench
-    estimate = assessment.published
+    estimate = assessment.estimate
     layout, columns = client.sweep()
     sweep = estimate.sweep
     rows, width = sweep.thresholds.size, len(columns)
@@ -137,7 +137,7 @@ def test_diagnostics(bench):
     assert status.name == f"{NAMESPACE}/identifier: friction"
     assert status.hardware_id == "fv_101"
     values = values_of(status)
-    published = assessment.published
+    published = assessment.estimate
     for name, one in assessment.parameters.items():
         key = f"{name} [{UNITS[name]}]"
         assert float(values[key]) == pytest.approx(one.value, rel=1e-8, nan_ok=True)
@@ -229,7 +229,7 @@ def test_signals_of_different_rates(live):
 
     both = slice(1, int(late[-1] // 1_000_000) + 1)  # the grid: positions that pressure surrounds
     together = Recording(1e-3, record.pressure[both], record.position[both])
-    expected = identify(together, BENCH_VALVE, IdentificationSettings(fixed=settings))
+    expected = published_estimate(together, BENCH_VALVE, IdentificationSettings(fixed=settings))
     derivatives = differentiate(together.position, 1e-3)
     velocity = derivatives.velocity
     fast = np.abs(velocity) > settings["limit_velocity"]

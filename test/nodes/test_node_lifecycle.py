@@ -8,7 +8,7 @@ from records import quick_record, simulated
 from slow_identifier import FINISH, SCRIPT
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.identification import identify
+from valve_friction_ros.identification import published_estimate
 from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
 
 IDENTIFY = f"{NAMESPACE}/identifier/identify"
@@ -120,10 +120,12 @@ def test_long_identification_loses_no_sample(live, tmp_path):
     (tmp_path / FINISH).touch()
     response = client.wait_until_answered(running)
     assert response.success, response.message
-    half = identify(Recording(0.01, whole.pressure[begin], whole.position[begin]), BENCH_VALVE)
+    half = published_estimate(
+        Recording(0.01, whole.pressure[begin], whole.position[begin]), BENCH_VALVE
+    )
     assert client.friction("sigma") == {"sigma": half.sigma}
     assert client.trigger("identify").success
-    sigma = identify(whole, BENCH_VALVE).sigma
+    sigma = published_estimate(whole, BENCH_VALVE).sigma
     assert sigma != half.sigma
     assert client.friction("sigma") == {"sigma": sigma}
 

@@ -44,7 +44,7 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"low_ratio": 1.0}, "low_ratio < 1"),
     ({"assumed_mass": -1.0}, "assumed_mass"),
     ({"position_bias": 1e-3, "fixed.spring_preload": 200.0}, "exclude each other"),
-    ({"method": "guess"}, "unknown method 'guess'; choose from sweep, force_balance"),
+    ({"method": "guess"}, "there is no method 'guess': choose from refined, published, signature"),
     ({"joint": "arm"}, "joint"),
     ({"valve_tag": "FV-102"}, "valve_tag"),
 ]

@@ -7,12 +7,12 @@ from records import quick_record
 from rosgraph_msgs.msg import Clock
 
 from valve_friction_ros.history import HistoryFile
-from valve_friction_ros.identification import assess
+from valve_friction_ros.identification import identify_refined
 from valve_friction_ros.model import BENCH_VALVE, Recording
 
 NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
-EXPECTED = assess(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
+EXPECTED = identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
 
 
 @pytest.fixture

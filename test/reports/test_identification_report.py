@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-
 from valve_friction_ros.figures.comparison import Comparison
+
 from valve_friction_ros.figures.report_figures import chosen_region
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Verdict
@@ -68,15 +68,15 @@ def test_the_time_of_a_record_is_told_where_its_clock_is_that_of_the_world(ident
 
 
 def test_notes_of_the_record_come_before_those_of_the_estimate(identified):
-    warned = dataclasses.replace(identified.assessment, warnings=("clocks differ",))
-    record = dataclasses.replace(identified, assessment=warned, notes=("cut off",))
+    warned = dataclasses.replace(identified.result, warnings=("clocks differ",))
+    record = dataclasses.replace(identified, result=warned, notes=("cut off",))
     notes = [block.text for block in section(identification_report(record), "Notes").blocks]
     assert notes[:2] == ["cut off.", "clocks differ."]
 
 
 def test_the_region_holds_the_choice_and_ends_where_sigma_leaves_its_tenth(identified):
     sweep = dataclasses.replace(
-        identified.assessment.sweep,
+        identified.result.sweep,
         thresholds=np.arange(1.0, 8.0),
         sigma=np.array([9.0, 1.2, 1.05, 1.0, 0.95, 0.8, 1.0]),
     )

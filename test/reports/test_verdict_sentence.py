@@ -113,7 +113,7 @@ def test_an_impossible_friction_names_the_signals(with_friction):
 
 
 def test_a_model_that_does_not_describe_the_valve_comes_first(with_friction, identified):
-    misfit = dataclasses.replace(identified.assessment.misfit, systematic=40e-6, tolerated=10e-6)
+    misfit = dataclasses.replace(identified.result.misfit, systematic=40e-6, tolerated=10e-6)
     doubt = (
         "To be taken with caution, since the model does not describe this valve (40 µm of the "
         "stem's motion remain unexplained): the friction "

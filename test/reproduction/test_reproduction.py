@@ -6,7 +6,11 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, assess_force_balance, identify
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    identify_signature,
+    published_estimate,
+)
 from valve_friction_ros.model import (
     BENCH_VALVE,
     GRAPHITE_PACKING,
@@ -85,12 +89,12 @@ def test_without_noise_model_1_is_the_truth(name):
     silent = bench(name, SensorNoise())
     triangle = run(silent, TRIANGLE, 2.5 * TRIANGLE.period)
     np.testing.assert_array_equal(triangle.measured.position, triangle.clean.position)
-    signature = assess_force_balance(triangle.measured, silent.valve).signature
+    signature = identify_signature(triangle.measured, silent.valve).signature
     bias = rounded_bias(signature.position_bias)
     assert bias == 1.13e-3
     square = run(silent, silent.square, 3 * silent.square.period)
     settings = IdentificationSettings(position_bias=bias, assumed_mass=1.6)
-    found = identify(square.measured, silent.valve, settings).values
+    found = published_estimate(square.measured, silent.valve, settings).values
     for key in ("viscous_friction", "coulomb_friction", "static_friction", "spring_constant"):
         assert found[key] == pytest.approx(getattr(silent.truth, key), rel=1e-4)
 
@@ -178,7 +182,7 @@ def test_a_wrong_winner_would_be_noticed(reproduced):
 
 def test_graphite_is_told_from_teflon(reproduced):
     for name, result in reproduced.programme.results.items():
-        model = result.identified.force_balance.model()
+        model = result.identified.force_balance.model
         assert (model.static_friction > model.coulomb_friction) == (name == "graphite")
 
 

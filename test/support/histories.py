@@ -11,7 +11,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.history import HistoryEntry, KeptValve
 from valve_friction_ros.history.entry import Fit, Span, settings_text
-from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.model import BENCH_VALVE
 
 SECOND = 1_000_000_000
@@ -24,7 +24,7 @@ _SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
 
 
 def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""):
-    return AssessedParameter(name, value, half_width / 2, half_width, verdict, reason)
+    return Parameter(name, value, half_width / 2, half_width, verdict, reason)
 
 
 def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
@@ -38,7 +38,7 @@ def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
             "time": time,
             "valve": valve,
             "span": Span(time - 60 * SECOND, time),
-            "method": "sweep",
+            "method": "refined",
             "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, "friction normal: so", ratio),
             "limits": FrictionLimits(),
             "baseline": None,
@@ -62,7 +62,7 @@ def refused(time=START, reason="the stem does not move: move the valve", valve=V
             "time": time,
             "valve": valve,
             "span": None,
-            "method": "sweep",
+            "method": "refined",
             "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None),
             "limits": FrictionLimits(),
             "baseline": None,

@@ -1,6 +1,7 @@
 """Problems of the refinement with a known solution."""
 
-from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START, OutputError
+from valve_friction_ros.identification.refined.output_error import SLIP, START, OutputError
+from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.signals.conditioned_record import ConditionedRecord
 
 FREE = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", START)
@@ -11,7 +12,7 @@ def true_coordinates(parameters, start=0.0):
     values = dict(vars(parameters))
     values[SLIP] = values.pop("static_friction") - values["coulomb_friction"]
     del values["limit_velocity"]
-    return {**values, OFFSET: 0.0, START: float(start)}
+    return {**values, CLOCK_OFFSET: 0.0, START: float(start)}
 
 
 def perfect_record(recording):

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from valve_friction_ros.identification import ASSESSED_UNITS
+from valve_friction_ros.identification import PARAMETER_UNITS
 
 __all__ = ["read_estimate"]
 
@@ -49,6 +49,6 @@ def read_estimate(path: Path) -> dict[str, float]:
             f"{path}: there are no parameters: give what `identify_recording --json` wrote"
         )
     for name in parameters:
-        if name not in ASSESSED_UNITS:
+        if name not in PARAMETER_UNITS:
             raise ValueError(f"{path}: unknown parameter {name!r}")
     return {name: _value(path, name, entry) for name, entry in parameters.items()}

@@ -56,7 +56,6 @@ def _plan(found: FoundRecording, options: argparse.Namespace, reading: ReadingOp
                 reading,
                 options.method,
                 identification_settings(options, description.known),
-                options.window,
             ),
         )
     except (ValueError, OSError) as error:

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
-from valve_friction_ros.identification import ASSESSED_UNITS
+from valve_friction_ros.identification import PARAMETER_UNITS
 
 __all__ = ["as_json", "print_table", "write_csv"]
 
@@ -77,7 +77,7 @@ def _entry_as_json(entry: HistoryEntry) -> dict[str, Any]:
                 "value": json_number(one.value),
                 "standard_error": json_number(one.standard_error),
                 "half_width": json_number(one.half_width),
-                "unit": ASSESSED_UNITS.get(name, ""),
+                "unit": PARAMETER_UNITS.get(name, ""),
                 "verdict": one.verdict.value,
                 "reason": one.reason,
             }
@@ -118,7 +118,7 @@ def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
 def _parameter_cells(entry: HistoryEntry) -> dict[str, object]:
     cells: dict[str, object] = {}
     for name, one in entry.parameters.items():
-        unit = _COLUMN_UNITS.get(ASSESSED_UNITS.get(name, "1"), "")
+        unit = _COLUMN_UNITS.get(PARAMETER_UNITS.get(name, "1"), "")
         cells[f"{name}{unit}"] = json_number(one.value)
         cells[f"{name}_standard_error{unit}"] = json_number(one.standard_error)
         cells[f"{name}_half_width{unit}"] = json_number(one.half_width)

@@ -20,7 +20,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=[*METHODS],
         default=DEFAULT_METHOD,
-        help="sweep: several fast strokes; force_balance: a valve signature, two periods or more "
+        help="refined, published: several fast strokes; signature: two periods or more "
         "of a slow triangle (%(default)s)",
     )
     parser.add_argument(
@@ -39,9 +39,8 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--window",
         type=int,
-        help=f"derivative window d, samples, for both estimates of the sweep; by default "
-        f"{defaults.window} for the published one, and chosen from the noise of the record for the "
-        "refined one and for the force balance",
+        help=f"derivative window d, samples; by default {defaults.published_window} for the "
+        "published method, and chosen by the noise of the record for the others",
     )
     parser.add_argument(
         "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
@@ -81,7 +80,7 @@ def identification_settings(
     """
     defaults = IdentificationSettings()
     return IdentificationSettings(
-        window=defaults.window if options.window is None else options.window,
+        derivative_window=options.window,
         order=options.order,
         fixed=_fixed(options.fix, known),
         position_bias=options.position_bias,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from valve_friction_ros.commands.recording_arguments import DIRECT_DRIVE, require_one
 from valve_friction_ros.health import Baseline
-from valve_friction_ros.identification import Assessment, IdentificationSettings
+from valve_friction_ros.identification import Result
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.valve_file import ValveFile
 
@@ -72,9 +72,7 @@ class IdentificationFiles(NamedTuple):
         self,
         recorded: RecordedValve,
         description: ValveFile,
-        assessment: Assessment,
-        settings: IdentificationSettings,
-        window: int | None,
+        result: Result,
         baseline: Baseline | None,
     ) -> None:
         """Write them; raises OSError where that fails."""
@@ -83,10 +81,9 @@ class IdentificationFiles(NamedTuple):
 
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
-        recording = recorded.recording()
         drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
         if self.plot is not None:
-            figure = figures.identification_figure(recording, description.valve, assessment, drive)
+            figure = figures.identification_figure(result, drive)
             figure.savefig(self.plot)
         if self.report is not None:
             from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
@@ -94,11 +91,7 @@ class IdentificationFiles(NamedTuple):
             record = reports.IdentifiedRecord(
                 name=recorded.name.strip("/") or recorded.path.name,
                 source=recorded.label,
-                recording=recording,
-                valve=description.valve,
-                assessment=assessment,
-                settings=settings,
-                derivative_window=window,
+                result=result,
                 baseline=baseline,
                 drive=drive,
                 notes=recorded.notes,

@@ -26,10 +26,10 @@ from valve_friction_ros.commands.recording_arguments import (
 from valve_friction_ros.health import Diagnosis, diagnose
 from valve_friction_ros.identification import (
     METHODS,
-    Assessment,
     IdentificationSettings,
     Method,
     RefusalError,
+    Result,
 )
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.recorded_valve import RecordedValve
@@ -45,7 +45,7 @@ class _Result(NamedTuple):
     """A valve of the file, what came of it, and its diagnosis where it has a baseline."""
 
     recorded: RecordedValve
-    outcome: Assessment | RefusalError
+    outcome: Result | RefusalError
     diagnosis: Diagnosis | None = None
 
 
@@ -68,20 +68,19 @@ def _identified(
     valve: Valve,
     identify: Method,
     settings: IdentificationSettings,
-    window: int | None,
-) -> Assessment | RefusalError:
+) -> Result | RefusalError:
     """Identify one valve, or return why not, with its name."""
     try:
         recording = recorded.recording()
     except RefusalError as refusal:
         return refusal
     try:
-        return identify(recording, valve, settings, window)
+        return identify(recording, valve, settings)
     except RefusalError as refusal:
         return recorded.refused(refusal)
 
 
-def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:
+def _results(options: argparse.Namespace) -> list[_Result]:
     """Read and identify the valves of the file, and write the files that are to be written."""
     reading = reading_options(options)
     description = described_valve(options, reading)
@@ -95,13 +94,13 @@ def _results(options: argparse.Namespace) -> tuple[Valve, list[_Result]]:
         require_one(recorded, "--baseline-coulomb-friction is of")
     results = []
     for each in recorded:
-        outcome = _identified(each, valve, method, settings, options.window)
+        outcome = _identified(each, valve, method, settings)
         diagnosis = None
-        if isinstance(outcome, Assessment):
-            files.write(each, description, outcome, settings, options.window, baseline)
+        if isinstance(outcome, Result):
+            files.write(each, description, outcome, baseline)
             diagnosis = diagnose(outcome, valve, baseline) if baseline is not None else None
         results.append(_Result(each, outcome, diagnosis))
-    return valve, results
+    return results
 
 
 def _print_json(results: Sequence[_Result]) -> None:
@@ -116,14 +115,14 @@ def _print_json(results: Sequence[_Result]) -> None:
     print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
 
 
-def _print_tables(results: Sequence[_Result], valve: Valve) -> None:
+def _print_tables(results: Sequence[_Result]) -> None:
     printed = 0
     for recorded, outcome, diagnosis in results:
         if isinstance(outcome, RefusalError):
             continue
         if len(results) > 1:
             print("\n" * (printed > 0) + recorded.name)
-        print_table(outcome, valve, recorded.notes, diagnosis)
+        print_table(outcome, recorded.notes, diagnosis)
         printed += 1
 
 
@@ -131,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     options = _parser().parse_args(arguments)
     try:
-        valve, results = _results(options)
+        results = _results(options)
     except (ValueError, RefusalError, OSError) as error:
         complain("identify_recording", error)
         return _EXIT_REFUSED
@@ -139,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json and (len(results) > 1 or not refusals):
         _print_json(results)
     elif not options.json:
-        _print_tables(results, valve)
+        _print_tables(results)
     for refusal in refusals:
         complain("identify_recording", refusal)
     if not refusals:

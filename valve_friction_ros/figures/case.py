@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import AssessedParameter, SweepAssessment
+from valve_friction_ros.identification import Parameter, Result
 from valve_friction_ros.model import Recording
 
 __all__ = ["FORCE", "PRESSURE", "Case", "DriveScale"]
@@ -44,7 +44,7 @@ class Case:
         σ_s at each threshold, N.
     threshold : float
         The chosen threshold, m/s.
-    friction : AssessedParameter
+    friction : Parameter
         The refined Coulomb friction with its interval and verdict.
     drive : DriveScale
         How the pressure is shown.
@@ -58,7 +58,7 @@ class Case:
     coulomb_friction: NDArray[np.float64] = field(repr=False)
     sigma: NDArray[np.float64] = field(repr=False)
     threshold: float
-    friction: AssessedParameter
+    friction: Parameter
     drive: DriveScale = PRESSURE
     simulated: NDArray[np.float64] | None = field(default=None, repr=False)
 
@@ -66,22 +66,23 @@ class Case:
     def of(
         cls,
         label: str,
-        recording: Recording,
-        assessment: SweepAssessment,
+        result: Result,
         drive: DriveScale = PRESSURE,
     ) -> "Case":
-        """Gather a case from an assessment; the sweep is the published one, if there is one."""
-        estimate = assessment.published or assessment.start
+        """Gather a case from a result with a sweep."""
+        estimate = result.estimate
+        if estimate is None:
+            raise ValueError(f"the method {result.method} has no sweep to draw")
         return cls(
             label,
-            recording,
+            result.recording,
             estimate.sweep.thresholds,
             estimate.sweep.estimates["coulomb_friction"],
             estimate.sweep.sigma,
             estimate.threshold,
-            assessment.parameters["coulomb_friction"],
+            result.parameters["coulomb_friction"],
             drive,
-            assessment.simulated,
+            None if result.stem is None else result.stem.simulated,
         )
 
     @property

@@ -17,13 +17,11 @@ from valve_friction_ros.figures.panels import (
 from valve_friction_ros.figures.signature_figure import signature_figure
 from valve_friction_ros.health import dead_band, percentage
 from valve_friction_ros.identification import (
-    ASSESSED_UNITS,
-    AssessedParameter,
-    Assessment,
-    ForceBalanceAssessment,
-    SweepAssessment,
+    PARAMETER_UNITS,
+    Parameter,
+    Result,
 )
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.model import Valve
 
 __all__ = ["friction_figure", "identification_figure"]
 
@@ -72,36 +70,32 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
     return figure
 
 
-def identification_figure(
-    recording: Recording, valve: Valve, assessment: Assessment, drive: DriveScale = PRESSURE
-) -> Figure:
+def identification_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
     """Draw a recording and its identification, each number with its verdict."""
-    verdict = _verdict(assessment, valve)
-    if isinstance(assessment, SweepAssessment):
-        return friction_figure([Case.of("recording", recording, assessment, drive)], verdict)
-    if isinstance(assessment, ForceBalanceAssessment):
-        return signature_figure(recording, valve, assessment, verdict, drive)
-    raise NotImplementedError(type(assessment))
+    verdict = _verdict(result, result.valve)
+    if result.signature is not None:
+        return signature_figure(result, verdict, drive)
+    return friction_figure([Case.of("recording", result, drive)], verdict)
 
 
-def _verdict(assessment: Assessment, valve: Valve) -> str:
+def _verdict(result: Result, valve: Valve) -> str:
     told = [
-        _told(symbol, assessment.parameters[name], ASSESSED_UNITS[name])
+        _told(symbol, result.parameters[name], PARAMETER_UNITS[name])
         for symbol, name in (
             ("F_c", "coulomb_friction"),
             ("F_v", "viscous_friction"),
             ("k", "spring_constant"),
         )
     ]
-    share = dead_band(assessment, valve)
+    share = dead_band(result, valve)
     if math.isfinite(share):
         told.append(f"dead band {percentage(share)} of travel")
-    if math.isfinite(assessment.rms):
-        told.append(f"fit {100 * assessment.fit:.2f} %")
-    return "; ".join((*told, *assessment.warnings))
+    if math.isfinite(result.rms):
+        told.append(f"fit {100 * result.fit:.2f} %")
+    return "; ".join((*told, *result.warnings))
 
 
-def _told(symbol: str, parameter: AssessedParameter, unit: str) -> str:
+def _told(symbol: str, parameter: Parameter, unit: str) -> str:
     if math.isnan(parameter.value):
         return f"{symbol} {parameter.verdict.value}"
     return f"{symbol} {parameter.value:.4g} {unit} ({parameter.verdict.value})"

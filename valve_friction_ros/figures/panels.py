@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from valve_friction_ros.figures.case import Case, DriveScale
-from valve_friction_ros.identification import AssessedParameter
+from valve_friction_ros.identification import Parameter
 from valve_friction_ros.model import Recording
 
 __all__ = [
@@ -89,7 +89,7 @@ def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
     axes.set_title("valve signature")
 
 
-def _told(friction: AssessedParameter) -> str:
+def _told(friction: Parameter) -> str:
     """Refined Coulomb friction in words, its verdict with it."""
     if math.isnan(friction.value):
         return f"$F_c$ {friction.verdict.value}"

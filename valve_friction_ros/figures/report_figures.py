@@ -8,7 +8,6 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from valve_friction_ros.figures.case import PRESSURE, Case, DriveScale
-from valve_friction_ros.figures.comparison import Comparison
 from valve_friction_ros.figures.page import dress
 from valve_friction_ros.figures.panels import (
     COLOURS,
@@ -19,12 +18,11 @@ from valve_friction_ros.figures.panels import (
 )
 from valve_friction_ros.figures.signature_figure import draw_signature_loop
 from valve_friction_ros.identification import (
-    Assessment,
-    ForceBalanceAssessment,
+    Result,
+    StemComparison,
     Sweep,
-    SweepAssessment,
 )
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.model import Recording
 
 __all__ = [
     "SETTLED_SHARE",
@@ -66,17 +64,12 @@ def record_figure(recording: Recording, drive: DriveScale = PRESSURE) -> Figure:
     return figure
 
 
-def signature_loop_figure(
-    recording: Recording,
-    valve: Valve,
-    assessment: Assessment,
-    drive: DriveScale = PRESSURE,
-) -> Figure:
+def signature_loop_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
     """Draw stem position over pressure; by the force balance with P1, P2 and the sliding lines."""
     figure = _paper_figure(3.4)
-    axes = figure.subplots()
-    if isinstance(assessment, ForceBalanceAssessment):
-        draw_signature_loop(axes, recording, valve, assessment.signature, drive)
+    axes, recording = figure.subplots(), result.recording
+    if result.signature is not None:
+        draw_signature_loop(axes, recording, result.valve, result.signature, drive)
     else:
         some = thinned(len(recording))
         pressure = recording.pressure[some] / drive.pascals
@@ -99,11 +92,11 @@ def chosen_region(sweep: Sweep, threshold: float) -> tuple[float, float]:
     return float(sweep.thresholds[min(first, choice)]), float(sweep.thresholds[max(last, choice)])
 
 
-def sweep_figure(
-    recording: Recording, assessment: SweepAssessment, drive: DriveScale = PRESSURE
-) -> Figure:
+def sweep_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
     """Draw F_c, σ_s and R²_s over the threshold δv, the chosen region shaded."""
-    case = Case.of("recording", recording, assessment, drive)
+    if result.estimate is None:
+        raise ValueError(f"the method {result.method} has no sweep to draw")
+    case, sweep = Case.of("recording", result, drive), result.estimate.sweep
     figure = _paper_figure(4.5)
     coulomb, sigma, r_squared = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
     draw_coulomb_sweep(coulomb, [case])
@@ -113,18 +106,18 @@ def sweep_figure(
     sigma.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     sigma.yaxis.set_major_formatter("{x:g}")
     sigma.yaxis.set_minor_formatter(NullFormatter())
-    r_squared.plot(case.thresholds, assessment.sweep.r_squared, color=COLOURS[0], lw=1.2)
+    r_squared.plot(case.thresholds, sweep.r_squared, color=COLOURS[0], lw=1.2)
     r_squared.axvline(case.threshold, color=COLOURS[0], ls=":", lw=1.2)
     r_squared.set_ylabel("$R^2_s$ [-]")
     r_squared.set_xlabel("threshold δv [m/s]")
-    low, high = chosen_region(assessment.sweep, case.threshold)
+    low, high = chosen_region(sweep, case.threshold)
     for axes in (coulomb, sigma, r_squared):
         axes.axvspan(low, high, color="black", alpha=0.12, lw=0, zorder=0)
     dress((coulomb, sigma, r_squared))
     return figure
 
 
-def comparison_figure(comparison: Comparison) -> Figure:
+def comparison_figure(comparison: StemComparison) -> Figure:
     """Draw the measured stem over the time, and dotted upon it the simulated one."""
     figure = _paper_figure(2.7)
     axes = figure.subplots()
@@ -139,7 +132,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def residual_figure(comparison: Comparison) -> Figure:
+def residual_figure(comparison: StemComparison) -> Figure:
     """Draw the residual over the time, its histogram, and its autocorrelation."""
     figure = _paper_figure(4.0)
     panels = figure.subplot_mosaic([["time", "time"], ["histogram", "correlation"]])

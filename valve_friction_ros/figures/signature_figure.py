@@ -8,7 +8,7 @@ from valve_friction_ros.figures.case import PRESSURE, DriveScale
 from valve_friction_ros.figures.page import dress, titled_figure
 from valve_friction_ros.figures.panels import COLOURS, draw_pressure, draw_stem, thinned
 from valve_friction_ros.identification import (
-    ForceBalanceAssessment,
+    Result,
     SignatureStroke,
     ValveSignature,
 )
@@ -79,23 +79,13 @@ def draw_signature_loop(
     axes.legend(loc="upper left", frameon=False)
 
 
-def signature_figure(
-    recording: Recording,
-    valve: Valve,
-    assessment: ForceBalanceAssessment,
-    title: str,
-    drive: DriveScale = PRESSURE,
-) -> Figure:
+def signature_figure(result: Result, title: str, drive: DriveScale = PRESSURE) -> Figure:
     """Draw a recording, its valve signature with P1 and P2, and the lines of the sliding stem.
 
     Parameters
     ----------
-    recording : Recording
-        Pressure and stem position.
-    valve : Valve
-        Turns forces into pressures.
-    assessment : ForceBalanceAssessment
-        What was identified from it.
+    result : Result
+        What was identified; it holds a valve signature.
     title : str
         Printed above the panels.
     drive : DriveScale
@@ -111,10 +101,12 @@ def signature_figure(
         [["pressure"], ["stem"], ["signature"]], height_ratios=[1, 1.2, 2.8]
     )
     panels["stem"].sharex(panels["pressure"])
-    signature = assessment.signature
+    recording, signature = result.recording, result.signature
+    if signature is None or result.stem is None:
+        raise ValueError(f"the method {result.method} has no valve signature to draw")
     draw_pressure(panels["pressure"], recording, drive, COLOURS[0])
     panels["pressure"].tick_params(labelbottom=False)
-    draw_stem(panels["stem"], recording, assessment.simulated)
+    draw_stem(panels["stem"], recording, result.stem.simulated)
     points = [stroke.breakaway for stroke in signature.strokes if stroke.breakaway is not None]
     panels["stem"].plot(
         [point.time for point in points],
@@ -125,7 +117,7 @@ def signature_figure(
         zorder=4,
     )
     panels["stem"].set_title("stem (dotted: model; ●: breakaway)", loc="right", fontsize="small")
-    draw_signature_loop(panels["signature"], recording, valve, signature, drive)
+    draw_signature_loop(panels["signature"], recording, result.valve, signature, drive)
     dress(panels.values())
     return figure
 

@@ -29,15 +29,12 @@ class Options:
         Name of the method, as in `METHODS`.
     settings : IdentificationSettings
         Its settings.
-    window : int or None
-        Derivative window that is asked for, samples; None: chosen from the noise.
     """
 
     valve: Valve
     reading: ReadingOptions
     method: str
     settings: IdentificationSettings
-    window: int | None
 
     def fingerprint(self) -> str:
         """Return a digest of all options and of the version of the package."""
@@ -53,7 +50,6 @@ class Options:
             self.method,
             settings,
             sorted(self.settings.fixed.items()),
-            self.window,
         )
         return hashlib.blake2b(repr(everything).encode(), digest_size=8).hexdigest()
 
@@ -71,10 +67,10 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
     try:
         recording = recorded.recording()
         identify = method_named(options.method)
-        assessment = identify(recording, options.valve, options.settings, options.window)
+        result = identify(recording, options.valve, options.settings)
     except RefusalError as refusal:
         return error_cells(recorded.name, str(refusal), job.path)
-    return result_cells(recorded.name, assessment, recording, recorded.notes)
+    return result_cells(recorded.name, result, recording, recorded.notes)
 
 
 def identify_job(job: Job) -> list[Mapping[str, Cell]]:

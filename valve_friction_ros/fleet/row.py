@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Assessment
+from valve_friction_ros.identification import PARAMETER_UNITS, Parameter, Result
 from valve_friction_ros.model import Recording
 
 __all__ = ["COLUMNS", "Cell", "error_cells", "key_cells", "result_cells"]
@@ -23,7 +23,7 @@ _SUFFIXES = {
 
 
 def _parameter_columns(name: str) -> tuple[str, str, str]:
-    suffix = _SUFFIXES[ASSESSED_UNITS[name]]
+    suffix = _SUFFIXES[PARAMETER_UNITS[name]]
     return f"{name}{suffix}", f"{name}_half_width{suffix}", f"{name}_verdict"
 
 
@@ -34,7 +34,7 @@ COLUMNS: tuple[str, ...] = (
     "content",
     "settings",
     "method",
-    *(column for name in ASSESSED_UNITS for column in _parameter_columns(name)),
+    *(column for name in PARAMETER_UNITS for column in _parameter_columns(name)),
     "fit",
     "rms_um",
     "samples",
@@ -53,7 +53,7 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _parameter_cells(name: str, parameter: AssessedParameter | None) -> Mapping[str, Cell]:
+def _parameter_cells(name: str, parameter: Parameter | None) -> Mapping[str, Cell]:
     columns = _parameter_columns(name)
     if parameter is None:
         return dict.fromkeys(columns)
@@ -62,7 +62,7 @@ def _parameter_cells(name: str, parameter: AssessedParameter | None) -> Mapping[
 
 
 def result_cells(
-    valve: str, assessment: Assessment, recording: Recording, notes: Sequence[str]
+    valve: str, result: Result, recording: Recording, notes: Sequence[str]
 ) -> Mapping[str, Cell]:
     """Fill the cells of an identified valve.
 
@@ -70,20 +70,20 @@ def result_cells(
     ----------
     valve : str
         Its name in the recording.
-    assessment : Assessment
+    result : Result
         What was identified; a parameter that it does not hold leaves its cells empty.
     recording : Recording
         What it was identified from.
     notes : sequence of str
         Notes of the reading, which join the warnings.
     """
-    cells: dict[str, Cell] = {"valve": _one_line(valve), "method": assessment.method}
-    for name in ASSESSED_UNITS:
-        cells |= _parameter_cells(name, assessment.parameters.get(name))
-    warnings = "; ".join(map(_one_line, (*notes, *assessment.warnings)))
+    cells: dict[str, Cell] = {"valve": _one_line(valve), "method": result.method}
+    for name in PARAMETER_UNITS:
+        cells |= _parameter_cells(name, result.parameters.get(name))
+    warnings = "; ".join(map(_one_line, (*notes, *result.warnings)))
     return cells | {
-        "fit": _number(assessment.fit),
-        "rms_um": _number(1e6 * assessment.rms),
+        "fit": _number(result.fit),
+        "rms_um": _number(1e6 * result.rms),
         "samples": len(recording),
         "duration_s": round((len(recording) - 1) * recording.sample_period, 9),
         "warnings": warnings or None,

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from valve_friction_ros.identification import AssessedParameter
+from valve_friction_ros.identification import Parameter
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 
 __all__ = ["Baseline", "Ratio"]
@@ -38,7 +38,7 @@ class Baseline:
         require_positive("baseline_coulomb_friction", self.coulomb_friction)
         require_non_negative("half_width", self.half_width)
 
-    def compared_with(self, friction: AssessedParameter) -> Ratio:
+    def compared_with(self, friction: Parameter) -> Ratio:
         """Ratio of an assessed friction to the baseline; nan where it is not identifiable.
 
         The relative half widths of two independent estimates add in squares, and the interval

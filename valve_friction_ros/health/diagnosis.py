@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
 from valve_friction_ros.health.baseline import Baseline, Ratio
-from valve_friction_ros.identification import AssessedParameter, Assessment
+from valve_friction_ros.identification import Parameter, Result
+from valve_friction_ros.identification.trust.misfit import percentage
 from valve_friction_ros.model.valve import Valve
 
 __all__ = [
@@ -95,7 +96,7 @@ class Diagnosis:
     ratio: Ratio | None
 
 
-def dead_band(assessment: Assessment, valve: Valve) -> float:
+def dead_band(result: Result, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.
 
     After a move the sliding friction F_c still holds the spring off balance; to move back, the
@@ -103,7 +104,7 @@ def dead_band(assessment: Assessment, valve: Valve) -> float:
     stem by (F_c + F_s)/k. Where no slip jump was seen, F_s is F_c. The result is nan without a
     spring, without travel stops, or where F_c or k is not identifiable.
     """
-    values = assessment.values
+    values = result.values
     if not values["spring_constant"] > 0:
         return float("nan")
     coulomb_friction, static_friction = values["coulomb_friction"], values["static_friction"]
@@ -113,16 +114,10 @@ def dead_band(assessment: Assessment, valve: Valve) -> float:
     return valve.share_of_travel(force / values["spring_constant"])
 
 
-def percentage(share: float) -> str:
-    """Write a share in percent for people: two digits, or whole percents from 100 % on."""
-    percent = 100 * share
-    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
-
-
-def _consequence(assessment: Assessment, valve: Valve) -> str:
-    share = dead_band(assessment, valve)
+def _consequence(result: Result, valve: Valve) -> str:
+    share = dead_band(result, valve)
     if math.isnan(share):
-        friction = assessment.parameters["coulomb_friction"]
+        friction = result.parameters["coulomb_friction"]
         return f"coulomb friction {friction.value:.4g} ± {friction.half_width:.2g} N"
     return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
 
@@ -132,7 +127,7 @@ def _figures(ratio: Ratio) -> str:
 
 
 def diagnose(
-    assessment: Assessment,
+    result: Result,
     valve: Valve,
     baseline: Baseline | None = None,
     limits: FrictionLimits | None = None,
@@ -141,7 +136,7 @@ def diagnose(
 
     Parameters
     ----------
-    assessment : Assessment
+    result : Result
         The latest identification.
     valve : Valve
         Tells the travel, for the dead band.
@@ -160,7 +155,7 @@ def diagnose(
         is WARN at least.
     """
     limits = limits or FrictionLimits()
-    friction = assessment.parameters["coulomb_friction"]
+    friction = result.parameters["coulomb_friction"]
     if math.isnan(friction.value):
         message = f"coulomb friction is not identifiable: {friction.reason}"
         verdict = Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
@@ -171,29 +166,29 @@ def diagnose(
                 f"{baseline.coulomb_friction:.4g} N"
             )
             verdict = Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, message, None)
-        return _with_model_doubt(verdict, assessment)
+        return _with_model_doubt(verdict, result)
     if friction.value < 0:
         message = (
             f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, which cannot "
             "be: check the direction of both signals"
         )
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
-    effect = _consequence(assessment, valve)
+    effect = _consequence(result, valve)
     if baseline is None:
         verdict = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
     else:
         verdict = _against(baseline.compared_with(friction), limits, effect)
-    return _with_model_doubt(verdict, assessment)
+    return _with_model_doubt(verdict, result)
 
 
-def _has_vanished(friction: AssessedParameter, baseline: Baseline, limits: FrictionLimits) -> bool:
+def _has_vanished(friction: Parameter, baseline: Baseline, limits: FrictionLimits) -> bool:
     """Tell whether a friction too small for a number of its own is surely below the low limit."""
     least = baseline.coulomb_friction - baseline.half_width
     return friction.magnitude_bound <= limits.low_ratio * least
 
 
-def _with_model_doubt(verdict: Diagnosis, assessment: Assessment) -> Diagnosis:
-    misfit = assessment.misfit
+def _with_model_doubt(verdict: Diagnosis, result: Result) -> Diagnosis:
+    misfit = result.misfit
     if misfit is None or misfit.describes:
         return verdict
     doubt = (

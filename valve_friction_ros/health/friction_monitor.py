@@ -13,9 +13,9 @@ from valve_friction_ros.health.diagnosis import (
 )
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
-    Assessment,
     IdentificationSettings,
     RefusalError,
+    Result,
     method_named,
 )
 from valve_friction_ros.model.checks import require_positive
@@ -37,8 +37,6 @@ class MonitorSettings:
         How records are identified.
     method : str
         Name of the method of identification, among `METHODS`.
-    derivative_window : int or None
-        Derivative window of the assessment, samples; None: each record's noise chooses it.
     limits : FrictionLimits
         When friction is out of bounds.
     baseline : Baseline or None
@@ -50,7 +48,6 @@ class MonitorSettings:
     valve: Valve
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
     method: str = DEFAULT_METHOD
-    derivative_window: int | None = None
     limits: FrictionLimits = field(default_factory=FrictionLimits)
     baseline: Baseline | None = None
     window: float = 60.0
@@ -59,11 +56,9 @@ class MonitorSettings:
         """Refuse windows that cannot be, and methods that there are not."""
         method_named(self.method)
         require_positive("window", self.window)
-        if self.derivative_window is not None:
-            replace(self.identification, window=self.derivative_window)
 
 
-def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Assessment:
+def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
     """Identify a snapshot of the buffer; needs nothing of the monitor, so any thread may run it.
 
     Raises
@@ -76,7 +71,6 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Assessme
             snapshot.recording(),
             settings.valve,
             settings.identification,
-            settings.derivative_window,
         )
     except RefusalError as refusal:
         if snapshot.cleared_because is None:
@@ -98,7 +92,7 @@ class FrictionMonitor:
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
         self._baseline = settings.baseline
-        self._assessment: Assessment | None = None
+        self._assessment: Result | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
@@ -114,13 +108,13 @@ class FrictionMonitor:
         return self._baseline
 
     @property
-    def assessment(self) -> Assessment | None:
-        """The latest assessment; a refusal leaves the one before it in place."""
+    def result(self) -> Result | None:
+        """The latest result; a refusal leaves the one before it in place."""
         return self._assessment
 
     @property
     def stamp(self) -> int | None:
-        """When the latest assessment was made, ns."""
+        """When the latest result was made, ns."""
         return self._stamp
 
     @property
@@ -137,9 +131,9 @@ class FrictionMonitor:
             self._baseline = settings.baseline
         self._settings = settings
 
-    def accept(self, assessment: Assessment, stamp: int) -> None:
-        """Remember an assessment made at `stamp` (ns)."""
-        self._assessment, self._stamp, self._refusal = assessment, stamp, None
+    def accept(self, result: Result, stamp: int) -> None:
+        """Remember an result made at `stamp` (ns)."""
+        self._assessment, self._stamp, self._refusal = result, stamp, None
 
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""

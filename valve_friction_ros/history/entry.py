@@ -11,7 +11,7 @@ from valve_friction_ros import __version__
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
-from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.streams.record_buffer import Snapshot
 
 __all__ = [
@@ -116,7 +116,7 @@ class HistoryEntry:
         The baseline in force.
     settings : str
         Settings of the identification, an object of JSON (`settings_text`).
-    parameters : mapping of str to AssessedParameter
+    parameters : mapping of str to Parameter
         What was identified; empty for a refusal.
     fit : Fit
         How well the model reproduces the record.
@@ -136,7 +136,7 @@ class HistoryEntry:
     limits: FrictionLimits
     baseline: Baseline | None
     settings: str
-    parameters: Mapping[str, AssessedParameter] = field(default_factory=dict)
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     fit: Fit = field(default_factory=Fit)
     warnings: tuple[str, ...] = ()
     refusal: str = ""
@@ -149,7 +149,7 @@ class HistoryEntry:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
 
     @property
-    def friction(self) -> AssessedParameter | None:
+    def friction(self) -> Parameter | None:
         """The Coulomb friction; None for a refusal."""
         return self.parameters.get("coulomb_friction")
 
@@ -187,7 +187,6 @@ def settings_text(settings: MonitorSettings) -> str:
     content = {
         "valve": vars(settings.valve),
         "identification": vars(settings.identification),
-        "derivative_window": settings.derivative_window,
         "window": settings.window,
     }
     return json.dumps(_plain(content), sort_keys=True, allow_nan=False)
@@ -215,17 +214,17 @@ def entry_of(
     time : int
         Now, ns.
     """
-    assessment = monitor.assessment
+    result = monitor.result
     outcome: dict[str, Any] = {"refusal": monitor.refusal}
-    if monitor.refusal is None and assessment is not None:
+    if monitor.refusal is None and result is not None:
         outcome = {
-            "parameters": assessment.parameters,
+            "parameters": result.parameters,
             "fit": Fit(
-                assessment.fit,
-                assessment.rms,
-                math.nan if assessment.misfit is None else assessment.misfit.systematic,
+                result.fit,
+                result.rms,
+                math.nan if result.misfit is None else result.misfit.systematic,
             ),
-            "warnings": assessment.warnings,
+            "warnings": result.warnings,
         }
     return HistoryEntry(
         time=time,

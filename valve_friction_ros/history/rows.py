@@ -14,7 +14,7 @@ from valve_friction_ros.history.entry import (
     KeptValve,
     Span,
 )
-from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Verdict
+from valve_friction_ros.identification import PARAMETER_UNITS, Parameter, Verdict
 
 __all__ = ["entries_in", "insert_baseline", "insert_entry", "valve_id"]
 
@@ -106,14 +106,14 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _place(parameter: AssessedParameter) -> int:
-    """Place of a parameter in an assessment."""
-    names = [*ASSESSED_UNITS]
+def _place(parameter: Parameter) -> int:
+    """Place of a parameter in an result."""
+    names = [*PARAMETER_UNITS]
     return names.index(parameter.name) if parameter.name in names else len(names)
 
 
-def _parameter(row: sqlite3.Row) -> AssessedParameter:
-    return AssessedParameter(
+def _parameter(row: sqlite3.Row) -> Parameter:
+    return Parameter(
         row["name"],
         _number(row["value"]),
         _number(row["standard_error"]),
@@ -123,7 +123,7 @@ def _parameter(row: sqlite3.Row) -> AssessedParameter:
     )
 
 
-def _entry(row: sqlite3.Row, parameters: Sequence[AssessedParameter]) -> HistoryEntry:
+def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
     ratio = Ratio(*(_number(row[name]) for name in ("ratio", "ratio_low", "ratio_high")))
     baseline = row["baseline"]
     return HistoryEntry(
@@ -164,7 +164,7 @@ def entries_in(
 def _entries_of_valve(
     connection: sqlite3.Connection, choice: tuple[str, int, int]
 ) -> Iterator[HistoryEntry]:
-    parameters: defaultdict[int, list[AssessedParameter]] = defaultdict(list)
+    parameters: defaultdict[int, list[Parameter]] = defaultdict(list)
     for row in connection.execute(
         "SELECT parameter.* FROM parameter JOIN identification ON identification.id = "
         "identification_id JOIN valve ON valve.id = valve_id "

@@ -1,19 +1,23 @@
 """Identification of the Karnopp model from recordings; no ROS."""
 
-from valve_friction_ros.identification.assessment import ASSESSED_UNITS, Assessment
 from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
-from valve_friction_ros.identification.methods import DEFAULT_METHOD, METHODS, Method, method_named
-from valve_friction_ros.identification.published.derivatives import Derivatives, differentiate
-from valve_friction_ros.identification.published.estimate import UNITS, Estimate
-from valve_friction_ros.identification.published.identify import identify
-from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
-from valve_friction_ros.identification.refined.method import SweepAssessment, assess
-from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
-from valve_friction_ros.identification.signature.force_balance import (
-    ForceBalanceAssessment,
-    assess_force_balance,
+from valve_friction_ros.identification.methods import (
+    DEFAULT_METHOD,
+    METHODS,
+    Method,
+    identify,
+    method_named,
 )
+from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.published.identify import published_estimate
+from valve_friction_ros.identification.published.method import identify_published
+from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
+from valve_friction_ros.identification.refined.method import identify_refined
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.rendering import parameter_mapping, plain, two_digits
+from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
+from valve_friction_ros.identification.signature.force_balance import identify_signature
 from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
 from valve_friction_ros.identification.signature.valve_signature import (
     ValveSignature,
@@ -27,42 +31,48 @@ from valve_friction_ros.identification.steps.step_response import (
     step_test,
 )
 from valve_friction_ros.identification.steps.validation import Validation, validate
-from valve_friction_ros.identification.trust.verdict import AssessedParameter, Verdict
+from valve_friction_ros.identification.trust.misfit import Misfit, percentage
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS
 
 __all__ = [
-    "ASSESSED_UNITS",
     "DEFAULT_METHOD",
     "FIXABLE",
     "METHODS",
+    "PARAMETER_UNITS",
     "UNITS",
-    "AssessedParameter",
-    "Assessment",
     "Bracket",
     "BreakawayPoint",
-    "Derivatives",
     "Estimate",
-    "ForceBalanceAssessment",
     "IdentificationSettings",
     "IdentifiedModel",
     "Method",
+    "Misfit",
+    "Parameter",
     "RefusalError",
+    "Result",
     "SignatureStroke",
+    "StemComparison",
     "StepMetrics",
     "StepTest",
     "Sweep",
-    "SweepAssessment",
     "Validation",
     "ValveSignature",
     "Verdict",
-    "assess",
-    "assess_force_balance",
-    "differentiate",
     "find_steps",
     "identified_model",
     "identify",
+    "identify_published",
+    "identify_refined",
+    "identify_signature",
     "method_named",
+    "parameter_mapping",
+    "percentage",
+    "plain",
+    "published_estimate",
     "step_test",
     "sweep_thresholds",
+    "two_digits",
     "validate",
     "valve_signature",
 ]

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import NamedTuple
 
-from valve_friction_ros.identification.published.estimate import UNITS
-from valve_friction_ros.identification.refined.output_error import OFFSET
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.units import CLOCK_OFFSET, UNITS
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 
 __all__ = ["IdentifiedModel", "identified_model"]
@@ -95,7 +94,9 @@ def identified_model(
             "taken equal to it"
         )
         found["static_friction"] = found["coulomb_friction"]
-    if found.get(OFFSET):
-        notes.append(f"{OFFSET} is left out: it belongs to the clocks of the identified record")
+    if found.get(CLOCK_OFFSET):
+        notes.append(
+            f"{CLOCK_OFFSET} is left out: it belongs to the clocks of the identified record"
+        )
     model = {name: value for name, value in found.items() if name in _NAMES}
     return IdentifiedModel(KarnoppParameters(**model), tuple(notes))

@@ -4,38 +4,38 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Protocol
 
-from valve_friction_ros.identification.assessment import Assessment
-from valve_friction_ros.identification.refined.method import SweepAssessment, assess
+from valve_friction_ros.identification.published import method as published
+from valve_friction_ros.identification.refined import method as refined
+from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.signature.force_balance import (
-    ForceBalanceAssessment,
-    assess_force_balance,
-)
+from valve_friction_ros.identification.signature import force_balance as signature
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "method_named"]
+__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "identify", "method_named"]
 
 
 class Method(Protocol):
     """A method of identification: from a record to parameters with verdicts."""
 
     def __call__(
-        self,
-        recording: Recording,
-        valve: Valve,
-        settings: IdentificationSettings | None = None,
-        window: int | None = None,
-    ) -> Assessment:
+        self, recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+    ) -> Result:
         """Identify a record; raises RefusalError for one that cannot tell."""
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
-    {SweepAssessment.method: assess, ForceBalanceAssessment.method: assess_force_balance}
+    {
+        refined.METHOD: refined.identify_refined,
+        published.METHOD: published.identify_published,
+        signature.METHOD: signature.identify_signature,
+    }
 )
-"""``sweep``: the paper's model 1, refined. ``force_balance``: its model 2, from a signature."""
+"""``refined``: the best; ``published``: the paper's model 1; ``signature``: its model 2."""
 
-DEFAULT_METHOD = SweepAssessment.method
+DEFAULT_METHOD = refined.METHOD
+
+_FORMER_NAMES = {"sweep": refined.METHOD, "force_balance": signature.METHOD}
 
 
 def method_named(name: str) -> Method:
@@ -47,5 +47,42 @@ def method_named(name: str) -> Method:
         If there is none; the message lists them.
     """
     if name not in METHODS:
-        raise ValueError(f"unknown method {name!r}; choose from {', '.join(METHODS)}")
+        former = _FORMER_NAMES.get(name)
+        hint = f"it is now called {former!r}" if former else f"choose from {', '.join(METHODS)}"
+        raise ValueError(f"there is no method {name!r}: {hint}")
     return METHODS[name]
+
+
+def identify(
+    recording: Recording,
+    valve: Valve,
+    settings: IdentificationSettings | None = None,
+    method: str = DEFAULT_METHOD,
+) -> Result:
+    """Identify the friction of a valve from a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position, several strokes in both directions.
+    valve : Valve
+        Geometry.
+    settings : IdentificationSettings, optional
+        What is known beforehand, and the settings of the sweep.
+    method : str
+        ``refined``, the best, with intervals; ``published``, the paper's model 1 as it is; or
+        ``signature``, its model 2, from a slow triangular wave.
+
+    Returns
+    -------
+    Result
+        Parameters with intervals and verdicts.
+
+    Raises
+    ------
+    RefusalError
+        If the record cannot tell; the message says what to do.
+    ValueError
+        If there is no such method.
+    """
+    return method_named(name=method)(recording, valve, settings)

@@ -1,4 +1,4 @@
-"""Settings of the published identification."""
+"""Settings of an identification."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -11,7 +11,10 @@ from valve_friction_ros.model.checks import (
     require_positive,
 )
 
-__all__ = ["FIXABLE", "REGRESSED", "IdentificationSettings"]
+__all__ = ["FIXABLE", "PUBLISHED_WINDOW", "REGRESSED", "IdentificationSettings"]
+
+PUBLISHED_WINDOW = 31
+"""Derivative window d of the paper, samples (Appendix A)."""
 
 REGRESSED = (
     "mass",
@@ -35,8 +38,9 @@ class IdentificationSettings:
 
     Attributes
     ----------
-    window : int
-        Length d of the derivative window, samples, odd (Appendix A).
+    derivative_window : int, optional
+        Length d of the derivative window, samples, odd (Appendix A). By default the published
+        method takes the paper's, and the other methods choose it by the noise of the record.
     order : int
         Order n of the polynomial fitted to each window, at least 2 (Appendix A).
     steps : int
@@ -58,7 +62,7 @@ class IdentificationSettings:
         If a setting is impossible; the message names it.
     """
 
-    window: int = 31
+    derivative_window: int | None = None
     order: int = 3
     steps: int = 330
     resolution: int = 350
@@ -70,9 +74,11 @@ class IdentificationSettings:
         """Refuse settings that contradict each other."""
         if self.order < 2:
             raise ValueError(f"order must be at least 2 for an acceleration, got {self.order}")
-        if self.window % 2 == 0 or self.window < self.order + 2:
+        window = self.published_window
+        if window % 2 == 0 or window < self.order + 2:
             raise ValueError(
-                f"window must be odd and at least order + 2 = {self.order + 2}, got {self.window}"
+                f"derivative_window must be odd and at least order + 2 = {self.order + 2}, "
+                f"got {window}"
             )
         if not 0 < self.steps < self.resolution:
             raise ValueError(
@@ -84,6 +90,11 @@ class IdentificationSettings:
             require_finite("position_bias", self.position_bias)
             if "spring_preload" in self.fixed:
                 raise ValueError("position_bias and a fixed spring_preload exclude each other")
+
+    @property
+    def published_window(self) -> int:
+        """Derivative window of the published method, samples."""
+        return PUBLISHED_WINDOW if self.derivative_window is None else self.derivative_window
 
     def __reduce__(self) -> tuple[type["IdentificationSettings"], tuple[Any, ...]]:
         """Tell pickle how to build it again in another process; it cannot copy `fixed`."""

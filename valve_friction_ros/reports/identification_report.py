@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 
-from valve_friction_ros.figures.comparison import Comparison, comparison_of
 from valve_friction_ros.figures.report_figures import (
     SETTLED_SHARE,
     chosen_region,
@@ -14,7 +13,7 @@ from valve_friction_ros.figures.report_figures import (
     sweep_figure,
 )
 from valve_friction_ros.health import percentage
-from valve_friction_ros.identification import ForceBalanceAssessment, SweepAssessment
+from valve_friction_ros.identification import Estimate, StemComparison
 from valve_friction_ros.reports.identification_tables import (
     friction_table,
     parameter_table,
@@ -45,7 +44,7 @@ def identification_report(record: IdentifiedRecord) -> Page:
     Parameters
     ----------
     record : IdentifiedRecord
-        Record, assessment, and what to judge it by.
+        Record, result, and what to judge it by.
 
     Returns
     -------
@@ -58,20 +57,20 @@ def identification_report(record: IdentifiedRecord) -> Page:
 
 
 def _sections(record: IdentifiedRecord) -> Iterator[Section]:
-    assessment = record.assessment
+    result = record.result
     yield Section("Parameters", (parameter_table(record), Paragraph(_VERDICTS)))
     yield _friction(record)
     yield _record(record)
     yield _signature(record)
-    if isinstance(assessment, SweepAssessment):
-        yield _sweep(record, assessment)
-    comparison = comparison_of(assessment)
+    if result.estimate is not None:
+        yield _sweep(record, result.estimate)
+    comparison = result.stem
     if comparison is None:
         yield Section("Measured and simulated position", (Paragraph(_NO_STEM),))
     else:
         yield _comparison(record, comparison)
         yield _residual(record, comparison)
-    notes = (*record.notes, *assessment.all_warnings)
+    notes = (*record.notes, *result.warnings)
     if notes:
         yield Section("Notes", tuple(Paragraph(f"{note}.") for note in notes))
     yield Section("Settings and versions", (settings_table(record),))
@@ -99,26 +98,24 @@ def _record(record: IdentifiedRecord) -> Section:
 
 
 def _signature(record: IdentifiedRecord) -> Section:
-    assessment, drive = record.assessment, record.drive.label.partition(" [")[0]
+    result, drive = record.result, record.drive.label.partition(" [")[0]
     caption = f"Stem position over {drive}: the wider the loop, the more friction."
-    if isinstance(assessment, ForceBalanceAssessment):
-        signature = assessment.signature
-        share = percentage(signature.dead_zone_share)
+    if result.signature is not None:
+        share = percentage(result.signature.dead_zone_share)
         caption += (
             f" P₁ and P₂ are where the stem breaks away upwards and downwards, the dashed lines "
             f"its sliding. The dead zone, the loop's width, is {share} of the pressure's span."
         )
     picture = Picture(
-        signature_loop_figure(record.recording, record.valve, assessment, record.drive),
+        signature_loop_figure(result, record.drive),
         caption,
         f"A loop of stem position over {drive}.",
     )
     return Section("Valve signature", (picture,))
 
 
-def _sweep(record: IdentifiedRecord, assessment: SweepAssessment) -> Section:
-    estimate = assessment.published or assessment.start
-    low, high = chosen_region(assessment.sweep, estimate.threshold)
+def _sweep(record: IdentifiedRecord, estimate: Estimate) -> Section:
+    low, high = chosen_region(estimate.sweep, estimate.threshold)
     caption = (
         f"The friction force balance, fitted to the samples faster than each threshold δv. Chosen: "
         f"{estimate.threshold * 1e3:.3g} mm/s, with {estimate.samples} samples above it, "
@@ -127,7 +124,7 @@ def _sweep(record: IdentifiedRecord, assessment: SweepAssessment) -> Section:
         f"{100 * SETTLED_SHARE:.0f} % of that."
     )
     picture = Picture(
-        sweep_figure(record.recording, assessment, record.drive),
+        sweep_figure(record.result, record.drive),
         caption,
         "Coulomb friction, standard deviation and correlation over the velocity threshold, with "
         "the chosen threshold and the region around it marked.",
@@ -135,22 +132,22 @@ def _sweep(record: IdentifiedRecord, assessment: SweepAssessment) -> Section:
     return Section("Sweep of the velocity threshold δv", (picture,))
 
 
-def _comparison(record: IdentifiedRecord, comparison: Comparison) -> Section:
-    assessment = record.assessment
-    share = record.valve.share_of_travel(assessment.rms)
+def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section:
+    result = record.result
+    share = record.valve.share_of_travel(result.rms)
     of_travel = f", {percentage(share)} of the travel" if math.isfinite(share) else ""
     picture = Picture(
         comparison_figure(comparison),
         f"The measured stem, and dotted upon it the stem of the identified model under the same "
-        f"{record.drive.label.partition(' [')[0]}. Fit {100 * assessment.fit:.2f} %, rms "
-        f"{assessment.rms * 1e6:.3g} µm{of_travel}.",
+        f"{record.drive.label.partition(' [')[0]}. Fit {100 * result.fit:.2f} %, rms "
+        f"{result.rms * 1e6:.3g} µm{of_travel}.",
         "Measured and simulated stem position over the time, one upon the other.",
     )
     return Section("Measured and simulated position", (picture,))
 
 
-def _residual(record: IdentifiedRecord, comparison: Comparison) -> Section:
-    misfit = record.assessment.misfit
+def _residual(record: IdentifiedRecord, comparison: StemComparison) -> Section:
+    misfit = record.result.misfit
     caption = (
         "What the model does not explain: simulated less measured position over the time, its "
         "histogram, and its autocorrelation. Noise alone would keep the latter within the grey "

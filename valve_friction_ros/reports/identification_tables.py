@@ -11,7 +11,7 @@ import scipy
 
 import valve_friction_ros
 from valve_friction_ros.health import Baseline, dead_band, percentage
-from valve_friction_ros.identification import ASSESSED_UNITS, AssessedParameter, Verdict
+from valve_friction_ros.identification import PARAMETER_UNITS, Parameter, Verdict
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
 
@@ -49,19 +49,19 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
 
 
-def _interval(parameter: AssessedParameter) -> str:
+def _interval(parameter: Parameter) -> str:
     if math.isnan(parameter.value) or parameter.verdict is Verdict.FIXED:
         return _NOTHING
     return " to ".join(map(_number, parameter.interval))
 
 
-def _judged(parameter: AssessedParameter) -> str:
+def _judged(parameter: Parameter) -> str:
     return ": ".join(filter(None, (parameter.verdict.value, parameter.reason)))
 
 
 def parameter_table(record: IdentifiedRecord) -> Table:
     """Return each parameter with interval and verdict, and its published value if there is one."""
-    parameters, published = record.assessment.parameters, record.assessment.published
+    parameters = record.result.parameters
     columns = [
         Column("parameter"),
         Column("value", is_number=True),
@@ -70,7 +70,7 @@ def parameter_table(record: IdentifiedRecord) -> Table:
     ]
     rows = [
         (
-            f"{_WORDS.get(name, name.replace('_', ' '))} [{ASSESSED_UNITS[name]}]",
+            f"{_WORDS.get(name, name.replace('_', ' '))} [{PARAMETER_UNITS[name]}]",
             _number(one.value),
             _interval(one),
             _judged(one),
@@ -78,9 +78,9 @@ def parameter_table(record: IdentifiedRecord) -> Table:
         for name, one in parameters.items()
     ]
     marked = (list(parameters).index("coulomb_friction"),)
-    if published is None:
+    if all(math.isnan(one.published) for one in parameters.values()):
         return Table(tuple(columns), tuple(rows), marked=marked)
-    beside = (_number(published.values.get(name, math.nan)) for name in parameters)
+    beside = (_number(one.published) for one in parameters.values())
     return Table(
         (*columns, Column("published method", is_number=True)),
         tuple((*row, value) for row, value in zip(rows, beside, strict=True)),
@@ -92,14 +92,14 @@ def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
     return Table((Column(first), Column(second)), tuple(rows))
 
 
-def _excess(friction: AssessedParameter, baseline: Baseline) -> str:
+def _excess(friction: Parameter, baseline: Baseline) -> str:
     width = math.hypot(friction.half_width, baseline.half_width)
     return f"{friction.value - baseline.coulomb_friction:+.4g} ± {width:.2g} N"
 
 
 def friction_table(record: IdentifiedRecord) -> Table:
     """Return the Coulomb friction beside its baseline, and the diagnosis."""
-    friction = record.assessment.parameters["coulomb_friction"]
+    friction = record.result.parameters["coulomb_friction"]
     baseline, diagnosis, limits = record.baseline, record.diagnosis, record.limits
     rows = []
     if baseline is not None:
@@ -121,7 +121,7 @@ def friction_table(record: IdentifiedRecord) -> Table:
                 "a limit counts as passed when the whole interval lies beyond it",
             ),
         ]
-    share = dead_band(record.assessment, record.valve)
+    share = dead_band(record.result, record.valve)
     if math.isfinite(share):
         rows.append(("dead band (F_c + F_s)/k", f"{percentage(share)} of the travel"))
     signal = diagnosis.status_signal.value
@@ -151,23 +151,24 @@ def record_table(record: IdentifiedRecord) -> Table:
 
 def settings_table(record: IdentifiedRecord) -> Table:
     """Return with what settings, valve and software the record was identified."""
-    settings, valve, assessment = record.settings, record.valve, record.assessment
+    result, valve = record.result, record.valve
+    settings = result.settings
     fixed = ", ".join(f"{name} = {value:g}" for name, value in settings.fixed.items())
-    window = record.derivative_window
+    window = settings.derivative_window
     bias = settings.position_bias
     rows = [
-        ("method", assessment.method),
+        ("method", result.method),
         (
             "derivative window",
-            f"{assessment.window} samples, "
+            f"{result.derivative_window} samples, "
             + ("chosen from the noise of the record" if window is None else "as given"),
         ),
     ]
-    if assessment.published is not None:
+    if result.estimate is not None:
         rows.append(
             (
                 "of the published method",
-                f"window {assessment.published.settings.window} samples, polynomial order "
+                f"window {settings.published_window} samples, polynomial order "
                 f"{settings.order}, {settings.steps} thresholds",
             )
         )

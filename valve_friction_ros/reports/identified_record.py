@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from valve_friction_ros.figures import PRESSURE, DriveScale
 from valve_friction_ros.health import Baseline, Diagnosis, FrictionLimits, diagnose
-from valve_friction_ros.identification import Assessment, IdentificationSettings
+from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
 
 __all__ = ["IdentifiedRecord"]
@@ -20,16 +20,8 @@ class IdentifiedRecord:
         What to call the valve.
     source : str
         Where the record comes from.
-    recording : Recording
-        Pressure and stem position.
-    valve : Valve
-        Geometry that it was identified with.
-    assessment : Assessment
-        What came of it.
-    settings : IdentificationSettings
-        How it was identified.
-    derivative_window : int or None
-        Derivative window that was asked for, samples; None: the noise of the record chose it.
+    result : Result
+        What was identified.
     baseline : Baseline or None
         Friction of the healthy valve.
     limits : FrictionLimits
@@ -42,17 +34,23 @@ class IdentifiedRecord:
 
     name: str
     source: str
-    recording: Recording = field(repr=False)
-    valve: Valve
-    assessment: Assessment = field(repr=False)
-    settings: IdentificationSettings
-    derivative_window: int | None = None
+    result: Result = field(repr=False)
     baseline: Baseline | None = None
     limits: FrictionLimits = field(default_factory=FrictionLimits)
     drive: DriveScale = PRESSURE
     notes: tuple[str, ...] = ()
 
     @property
+    def recording(self) -> Recording:
+        """Pressure and stem position."""
+        return self.result.recording
+
+    @property
+    def valve(self) -> Valve:
+        """Geometry that it was identified with."""
+        return self.result.valve
+
+    @property
     def diagnosis(self) -> Diagnosis:
         """The verdict on the friction."""
-        return diagnose(self.assessment, self.valve, self.baseline, self.limits)
+        return diagnose(self.result, self.valve, self.baseline, self.limits)

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from valve_friction_ros.health import StatusSignal, dead_band, percentage
-from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
 __all__ = ["verdict_sentence"]
@@ -37,7 +37,7 @@ def verdict_sentence(record: IdentifiedRecord) -> str:
 
     It says in plain words what the diagnosis of the monitor says.
     """
-    friction = record.assessment.parameters["coulomb_friction"]
+    friction = record.result.parameters["coulomb_friction"]
     alarm = _ALARMS.get(record.diagnosis.status_signal)
     if math.isnan(friction.value) and alarm is not None:
         size = f"{friction.magnitude_bound:.2g} N at the most, too small to be told"
@@ -60,7 +60,7 @@ def verdict_sentence(record: IdentifiedRecord) -> str:
 
 
 def _found(record: IdentifiedRecord) -> _Finding:
-    friction, diagnosis = record.assessment.parameters["coulomb_friction"], record.diagnosis
+    friction, diagnosis = record.result.parameters["coulomb_friction"], record.diagnosis
     if diagnosis.ratio is None:
         size = f"{friction.value:.4g}"
         if friction.verdict is not Verdict.FIXED:
@@ -85,7 +85,7 @@ def _found(record: IdentifiedRecord) -> _Finding:
     return _Finding(f"the friction is normal, {ratio}", advice)
 
 
-def _sureness(friction: AssessedParameter) -> str:
+def _sureness(friction: Parameter) -> str:
     """Say what stands behind the number, unless it is identified."""
     words = {
         Verdict.IDENTIFIED: "",
@@ -96,7 +96,7 @@ def _sureness(friction: AssessedParameter) -> str:
 
 
 def _doubt(record: IdentifiedRecord) -> str:
-    misfit = record.assessment.misfit
+    misfit = record.result.misfit
     if misfit is None or misfit.describes:
         return ""
     return (
@@ -106,7 +106,7 @@ def _doubt(record: IdentifiedRecord) -> str:
 
 
 def _consequence(record: IdentifiedRecord) -> str:
-    share = dead_band(record.assessment, record.valve)
+    share = dead_band(record.result, record.valve)
     if math.isnan(share) or share < 0:
         return ""
     return f", and the stem ignores reversals smaller than {percentage(share)} of its travel"

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification import differentiate
 from valve_friction_ros.reproduction.programme import BenchResult
+from valve_friction_ros.signals import differentiate
 
 __all__ = ["ForceTerms", "force_terms"]
 

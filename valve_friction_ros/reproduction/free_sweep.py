@@ -7,12 +7,12 @@ import numpy as np
 from valve_friction_ros.identification import (
     IdentificationSettings,
     Sweep,
-    differentiate,
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published.regression import force_balance_regression
 from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.signals import differentiate
 
 __all__ = ["FreeSweep", "free_sweep"]
 
@@ -62,11 +62,13 @@ class FreeSweep(NamedTuple):
 def free_sweep(recording: Recording, valve: Valve, settings: IdentificationSettings) -> FreeSweep:
     """Sweep (3) to (8) with (17) and (18), nothing assumed."""
     derivatives = differentiate(
-        recording.position, recording.sample_period, settings.window, settings.order
+        recording.position, recording.sample_period, settings.published_window, settings.order
     )
     force = valve.actuator_force(recording.pressure)
     regression = force_balance_regression(force, recording.position, derivatives, settings)
     first = float(regression.speed.max()) / settings.resolution
     steps = np.arange(1, settings.steps + 1, dtype=np.float64)
     sweep = sweep_thresholds(regression, np.multiply(first, steps, dtype=np.float64))
-    return FreeSweep(sweep, choose_threshold(sweep, settings.window), settings.window)
+    return FreeSweep(
+        sweep, choose_threshold(sweep, settings.published_window), settings.published_window
+    )

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification import (
     Estimate,
-    ForceBalanceAssessment,
     IdentificationSettings,
     RefusalError,
+    Result,
     StepTest,
-    SweepAssessment,
     Validation,
-    assess,
-    assess_force_balance,
-    identify,
+    ValveSignature,
+    identify_refined,
+    identify_signature,
+    published_estimate,
     step_test,
     validate,
 )
@@ -27,6 +27,7 @@ from valve_friction_ros.model import KarnoppParameters, Recording, StemState, si
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.bench import Bench
 from valve_friction_ros.reproduction.experiments import Experiment, Experiments, Plan, run_all
+from valve_friction_ros.reproduction.found import model_of, signature_of
 from valve_friction_ros.reproduction.free_sweep import FreeSweep, free_sweep
 from valve_friction_ros.reproduction.scatter import Scatter, measure_scatter
 
@@ -59,20 +60,25 @@ class Identified:
         Model 1, the sweep, from the square wave.
     free : FreeSweep
         The same with the mass as it is regressed, for Figs. 3 and 4.
-    force_balance : ForceBalanceAssessment
+    force_balance : Result
         Model 2, from the triangle.
-    refined : SweepAssessment
+    refined : Result
         Model 1 refined by simulation, from the square wave.
-    own_preload : SweepAssessment
+    own_preload : Result
         The same with F_0 a parameter of its own in place of x̄, and the nominal mass given.
     """
 
     position_bias: float
     published: Estimate
     free: FreeSweep
-    force_balance: ForceBalanceAssessment
-    refined: SweepAssessment
-    own_preload: SweepAssessment
+    force_balance: Result
+    refined: Result
+    own_preload: Result
+
+    @property
+    def signature(self) -> ValveSignature:
+        """The valve signature behind model 2."""
+        return signature_of(self.force_balance)
 
     @property
     def top_speed(self) -> float:
@@ -84,9 +90,9 @@ class Identified:
         """Return the models to simulate, by name, with DV = 0."""
         return {
             "model 1": self.published.parameters(),
-            "model 2": self.force_balance.model(),
-            "refined": self.refined.model(),
-            "refined, own F_0": self.own_preload.model(),
+            "model 2": model_of(self.force_balance),
+            "refined": model_of(self.refined),
+            "refined, own F_0": model_of(self.own_preload),
         }
 
 
@@ -181,7 +187,7 @@ def rounded_bias(*biases: float) -> float:
 def identified(
     bench: Bench,
     experiments: Experiments,
-    force_balance: ForceBalanceAssessment,
+    force_balance: Result,
     position_bias: float,
 ) -> Identified:
     """Identify the square wave: model 1 with x̄ from the triangle, and the refined model."""
@@ -190,11 +196,11 @@ def identified(
     square = experiments.square.measured
     return Identified(
         position_bias,
-        identify(square, bench.valve, settings),
+        published_estimate(square, bench.valve, settings),
         free_sweep(square, bench.valve, settings),
         force_balance,
-        assess(square, bench.valve, settings),
-        assess(square, bench.valve, own_preload),
+        identify_refined(square, bench.valve, settings),
+        identify_refined(square, bench.valve, own_preload),
     )
 
 
@@ -283,10 +289,10 @@ def run_programme(
         experiments[name] = run_all(bench, plan)
         settings = IdentificationSettings(assumed_mass=bench.assumed_mass)
         with _named(name):
-            balances[name] = assess_force_balance(
+            balances[name] = identify_signature(
                 experiments[name].triangle.measured, bench.valve, settings
             )
-    biases = {name: each.signature.position_bias for name, each in balances.items()}
+    biases = {name: signature_of(each).position_bias for name, each in balances.items()}
     shared = rounded_bias(*(biases[name] for name in paper.PACKINGS))
     results = {}
     for name, bench in benches.items():
@@ -298,7 +304,7 @@ def run_programme(
     published = [benches[name] for name in paper.PACKINGS]
     progress("without noise")
     without_noise = {
-        bench.name: identify(
+        bench.name: published_estimate(
             experiments[bench.name].square.clean,
             bench.valve,
             IdentificationSettings(

@@ -7,10 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from valve_friction_ros.identification import IdentificationSettings, assess_force_balance, identify
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    identify_signature,
+    published_estimate,
+)
 from valve_friction_ros.model import KarnoppParameters, SensorNoise, StemState, simulate
 from valve_friction_ros.reproduction.bench import Bench
 from valve_friction_ros.reproduction.experiments import SINE, TRIANGLE, Experiment, Plan, run
+from valve_friction_ros.reproduction.found import model_of, signature_of
 from valve_friction_ros.reproduction.free_sweep import free_sweep
 
 __all__ = ["NOISE_LEVELS", "Level", "Rivals", "Scatter", "measure_scatter", "true_rms"]
@@ -120,19 +125,19 @@ def _rivals(bench: Bench, plan: Plan, seeds: int) -> list[Rivals]:
         noisy = _seeded(bench, bench.noise, number)
         square = run(noisy, noisy.square, plan.square_periods * noisy.square.period, 0)
         triangle = run(noisy, TRIANGLE, plan.triangle_periods * TRIANGLE.period, 1)
-        balance = assess_force_balance(
+        balance = identify_signature(
             triangle.measured,
             noisy.valve,
             IdentificationSettings(assumed_mass=noisy.assumed_mass),
         )
-        bias = round(balance.signature.position_bias, 5)
+        bias = round(signature_of(balance).position_bias, 5)
         settings = replace(_settings(noisy), position_bias=bias)
-        sweep = identify(square.measured, noisy.valve, settings)
+        sweep = published_estimate(square.measured, noisy.valve, settings)
         for name, experiment in validations.items():
             errors[name].append(
                 (
                     true_rms(bench, experiment, sweep.parameters()),
-                    true_rms(bench, experiment, balance.model()),
+                    true_rms(bench, experiment, model_of(balance)),
                 )
             )
     return [

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from valve_friction_ros.identification import AssessedParameter, StepMetrics
+from valve_friction_ros.identification import Parameter, StepMetrics
 from valve_friction_ros.reports import Column, Table
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.checks.check import Check, written
@@ -44,7 +44,7 @@ def signature_table(results: Sequence[BenchResult]) -> Table:
     """Show k, x̄ and dead zone of valve signatures with standard errors."""
     rows = []
     for one in results:
-        signature = one.identified.force_balance.signature
+        signature = one.identified.signature
         errors = signature.standard_errors
         rows.append(
             (
@@ -74,7 +74,7 @@ def signature_table(results: Sequence[BenchResult]) -> Table:
     return Table(columns, tuple(rows), "(14) to (16); ± one standard error, between the strokes")
 
 
-def _interval(parameter: AssessedParameter) -> str:
+def _interval(parameter: Parameter) -> str:
     if math.isnan(parameter.value):
         return parameter.verdict.value
     if parameter.half_width == 0:

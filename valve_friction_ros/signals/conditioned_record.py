@@ -6,21 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.signals.noise import sensor_noise
+from valve_friction_ros.signals.measured_record import measured
 from valve_friction_ros.signals.smoothing import (
-    find_corners,
     independent_halves,
-    longest_faithful_window,
     smooth_between,
 )
 
 __all__ = ["ConditionedRecord", "condition", "smoothed_pressure"]
 
-_CORNER_TIME = 0.04
-_CORNER_SAMPLES = 8
-"""Time and samples over which the slopes on both sides of a corner are compared, at least."""
-
-_LONGEST_SMOOTHING = 0.5
 _SAMPLES_A_WINDOW = 32
 _LONGEST_PERIOD = 5e-3
 """Longest sample period to thin out to, s: within it a corner of the pressure may lie."""
@@ -64,8 +57,9 @@ def condition(recording: Recording) -> ConditionedRecord:
     The noise of the sensors sets the window (`longest_faithful_window`); a 32nd of it, or 5 ms, is
     a sample period that loses nothing. A noiseless record passes unchanged.
     """
-    pressure, period = recording.pressure, recording.sample_period
-    corners, window = _smoothing(recording)
+    record = measured(recording)
+    pressure, period = record.pressure, record.sample_period
+    corners, window = record.pressure_smoothing
     stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / period)), 1)
     if window == 1:
         whole = pressure[::stride]
@@ -74,13 +68,13 @@ def condition(recording: Recording) -> ConditionedRecord:
         whole = smooth_between(pressure, corners, window)[::stride]
         one, two = independent_halves(pressure, corners, window)
         halves = one[::stride], two[::stride]
-    position, kept = _averaged(recording.position, stride)
+    position, kept = _averaged(record.position, stride)
     return ConditionedRecord(
         stride * period,
         whole,
         halves,
         position,
-        kept * sensor_noise(recording.position),
+        kept * record.position_noise,
         window,
         stride,
     )
@@ -88,19 +82,10 @@ def condition(recording: Recording) -> ConditionedRecord:
 
 def smoothed_pressure(recording: Recording) -> NDArray[np.float64]:
     """Smooth the pressure between its corners as far as its noise asks for, Pa, shape (n,)."""
-    corners, window = _smoothing(recording)
+    corners, window = measured(recording).pressure_smoothing
     if window == 1:
         return recording.pressure
     return smooth_between(recording.pressure, corners, window)
-
-
-def _smoothing(recording: Recording) -> tuple[NDArray[np.intp], int]:
-    """Return the corners of the pressure, and the window to smooth it over between them."""
-    pressure, period = recording.pressure, recording.sample_period
-    noise = sensor_noise(pressure)
-    corners = find_corners(pressure, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
-    longest = max(round(_LONGEST_SMOOTHING / period), 1)
-    return corners, longest_faithful_window(pressure, corners, noise, longest)
 
 
 def _averaged(signal: NDArray[np.float64], stride: int) -> tuple[NDArray[np.float64], float]:

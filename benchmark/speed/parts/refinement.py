@@ -6,7 +6,7 @@ from typing import Any
 from benchmark.plants import PLANTS
 from benchmark.speed.records import PERIOD, SAMPLES, pressure
 from benchmark.speed.rows import Row, Settings, medians
-from valve_friction_ros.identification import RefusalError, assess, identify
+from valve_friction_ros.identification import RefusalError, identify_refined, published_estimate
 from valve_friction_ros.model import Recording, SensorNoise, Valve
 
 __all__ = ["measure"]
@@ -38,8 +38,12 @@ def measure(settings: Settings) -> Iterator[Row]:
             settings.say(f"refinement, {item}")
             seconds = medians(
                 {
-                    "refined": lambda one=record, valve=plant.valve: _tries(assess, one, valve),
-                    "published": lambda one=record, valve=plant.valve: _tries(identify, one, valve),
+                    "refined": lambda one=record, valve=plant.valve: _tries(
+                        identify_refined, one, valve
+                    ),
+                    "published": lambda one=record, valve=plant.valve: _tries(
+                        published_estimate, one, valve
+                    ),
                 },
                 settings.repeats,
             )

@@ -43,7 +43,7 @@ def _regression(valve_name: str, samples: int) -> ForceBalanceRegression:
     record = noisy_record(VALVES[valve_name], SensorNoise(10e-6, 100.0, 1), samples)
     settings = IdentificationSettings()
     derivatives = differentiate(
-        record.position, record.sample_period, settings.window, settings.order
+        record.position, record.sample_period, settings.published_window, settings.order
     )
     force = BENCH_VALVE.actuator_force(record.pressure)
     return force_balance_regression(force, record.position, derivatives, settings)

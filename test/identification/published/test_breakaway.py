@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, differentiate, identify
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    differentiate,
+    published_estimate,
+)
 from valve_friction_ros.identification.published.breakaway import find_breakaways
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
 
@@ -44,7 +48,9 @@ def test_directions_alternate(record):
 
 def test_static_friction(record, benches):
     """The pull (9) changes by up to 0.0445 m² · 99 kPa/1.3 s: 3.4 N, 0.36 %, in a sample."""
-    estimate = identify(record, benches["graphite"].valve, IdentificationSettings(assumed_mass=1.6))
+    estimate = published_estimate(
+        record, benches["graphite"].valve, IdentificationSettings(assumed_mass=1.6)
+    )
     assert estimate.static_friction == pytest.approx(GRAPHITE_PACKING.static_friction, rel=0.005)
     assert estimate.coulomb_friction == pytest.approx(GRAPHITE_PACKING.coulomb_friction, rel=0.001)
     assert not any("breakaway" in warning for warning in estimate.warnings)
@@ -56,7 +62,7 @@ def test_static_friction_under_noise(bench_record, benches, seed):
     noisy = bench_record("graphite", SquareWave(), 52.0, SensorNoise(10e-6, 100.0, seed))
     bias = GRAPHITE_PACKING.spring_preload / GRAPHITE_PACKING.spring_constant
     settings = IdentificationSettings(fixed={"mass": 1.6}, position_bias=bias)
-    estimate = identify(noisy, benches["graphite"].valve, settings)
+    estimate = published_estimate(noisy, benches["graphite"].valve, settings)
     assert estimate.static_friction == pytest.approx(GRAPHITE_PACKING.static_friction, rel=0.05)
 
 

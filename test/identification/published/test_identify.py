@@ -11,7 +11,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
     differentiate,
-    identify,
+    published_estimate,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -51,7 +51,9 @@ class TestNoiseFree:
     @pytest.mark.parametrize("duration", [20.8, 52.0])
     def test_square_wave_in_the_four_column_form(self, benches, bench_record, name, duration):
         """The paper's experiment: two periods and more, bias from (16)."""
-        estimate = identify(bench_record(name, SquareWave(), duration), BENCH_VALVE, FOUR_COLUMNS)
+        estimate = published_estimate(
+            bench_record(name, SquareWave(), duration), BENCH_VALVE, FOUR_COLUMNS
+        )
         assert_identified(estimate, benches[name].parameters, NOISE_FREE)
         assert estimate.spring_preload == estimate.spring_constant * 1.13e-3
         assert estimate.fixed == ()
@@ -61,7 +63,7 @@ class TestNoiseFree:
         ("excitation", "duration"), [(SineWave(), 71.0), (IsaSteps(), 370.0)], ids=["sine", "isa"]
     )
     def test_preload_as_a_regressor(self, benches, bench_record, name, excitation, duration):
-        estimate = identify(bench_record(name, excitation, duration), BENCH_VALVE)
+        estimate = published_estimate(bench_record(name, excitation, duration), BENCH_VALVE)
         tolerances = NOISE_FREE | {"spring_preload": 1e-3}
         assert_identified(estimate, benches[name].parameters, tolerances)
         assert estimate.fixed == ()
@@ -70,7 +72,7 @@ class TestNoiseFree:
     def test_square_wave_does_not_tell_the_mass(self, benches, bench_record, name):
         """Two exponentials and a level each way: four equations for five parameters."""
         record = bench_record(name, SquareWave(), 20.8)
-        estimate = identify(record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
+        estimate = published_estimate(record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
         assert estimate.mass == 1.6
         assert estimate.fixed == ("mass",)
         assert estimate.settings.fixed == {"mass": 1.6}
@@ -85,7 +87,9 @@ class TestNoiseFree:
 
     def test_static_friction(self, benches, bench_record, name):
         """F_s = F_c here; in a sample the pull grows by 0.0445 m² · 99 kPa/1.3 s: 3.4 N."""
-        estimate = identify(bench_record(name, SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS)
+        estimate = published_estimate(
+            bench_record(name, SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS
+        )
         assert estimate.static_friction >= estimate.coulomb_friction
         assert estimate.static_friction == pytest.approx(
             benches[name].parameters.static_friction, abs=3.4
@@ -97,7 +101,9 @@ def test_noise_does_not_pass_for_a_mass(bench_record, seed):
     """Noise in the acceleration gives a positive mass, but another one by another window."""
     noise = SensorNoise(position=10e-6, pressure=100.0, seed=seed)
     settings = dataclasses.replace(FOUR_COLUMNS, assumed_mass=1.6)
-    estimate = identify(bench_record("high", SquareWave(), 52.0, noise), BENCH_VALVE, settings)
+    estimate = published_estimate(
+        bench_record("high", SquareWave(), 52.0, noise), BENCH_VALVE, settings
+    )
     assert estimate.mass == 1.6
     assert estimate.fixed == ("mass",)
     assert any("with half the derivative window" in warning for warning in estimate.warnings)
@@ -106,7 +112,7 @@ def test_noise_does_not_pass_for_a_mass(bench_record, seed):
 def test_estimated_model_repeats_the_record(bench_record):
     """Simulated with the estimate, the stem is where it was, to 0.1 % of its stroke."""
     record = bench_record("low", SineWave(), 71.0)
-    parameters = identify(record, BENCH_VALVE).parameters()
+    parameters = published_estimate(record, BENCH_VALVE).parameters()
     found = simulate(BENCH_VALVE, parameters, record.pressure, record.sample_period)
     error = np.abs(found.position - record.position).max()
     assert error < 1e-3 * np.ptp(record.position)
@@ -114,7 +120,9 @@ def test_estimated_model_repeats_the_record(bench_record):
 
 class TestEstimate:
     def test_round_trip_of_the_parameters(self, bench_record):
-        estimate = identify(bench_record("low", SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS)
+        estimate = published_estimate(
+            bench_record("low", SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS
+        )
         assert list(estimate.values) == list(UNITS)
         parameters = estimate.parameters()
         assert isinstance(parameters, KarnoppParameters)
@@ -124,14 +132,16 @@ class TestEstimate:
         assert KarnoppParameters(**estimate.values) == parameters
 
     def test_an_impossible_value_is_shown_but_no_model(self, bench_record):
-        estimate = identify(bench_record("low", SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS)
+        estimate = published_estimate(
+            bench_record("low", SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS
+        )
         impossible = dataclasses.replace(estimate, viscous_friction=-1.0)
         assert impossible.values["viscous_friction"] == -1.0
         with pytest.raises(ValueError, match=r"^viscous_friction must not be negative"):
             impossible.parameters()
 
     def test_figures_are_those_of_the_chosen_step(self, bench_record):
-        estimate = identify(bench_record("high", SquareWave(), 20.8, NOISE), BENCH_VALVE)
+        estimate = published_estimate(bench_record("high", SquareWave(), 20.8, NOISE), BENCH_VALVE)
         sweep = estimate.sweep
         (chosen,) = np.flatnonzero(sweep.thresholds == estimate.threshold)
         assert estimate.samples == sweep.samples[chosen]
@@ -143,7 +153,7 @@ class TestEstimate:
     def test_thresholds_of_the_paper(self, bench_record):
         """(8) with S = 330 and Z = 350."""
         record = bench_record("low", SquareWave(), 20.8)
-        estimate = identify(record, BENCH_VALVE, FOUR_COLUMNS)
+        estimate = published_estimate(record, BENCH_VALVE, FOUR_COLUMNS)
         thresholds = estimate.sweep.thresholds
         assert thresholds.size == 330
         np.testing.assert_allclose(thresholds, thresholds[0] * np.arange(1, 331), rtol=1e-14)
@@ -151,7 +161,9 @@ class TestEstimate:
         assert 350 * thresholds[0] == pytest.approx(np.abs(speed).max(), rel=0.02)
 
     def test_frozen(self, bench_record):
-        estimate = identify(bench_record("low", SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS)
+        estimate = published_estimate(
+            bench_record("low", SquareWave(), 20.8), BENCH_VALVE, FOUR_COLUMNS
+        )
         with pytest.raises(dataclasses.FrozenInstanceError):
             estimate.mass = 1.0
         with pytest.raises(TypeError):
@@ -163,7 +175,9 @@ class TestFixed:
     def test_returned_exactly(self, bench_record, name):
         value = 1.1 * getattr(LOW_FRICTION, name)
         record = bench_record("low", SineWave(), 71.0)
-        estimate = identify(record, BENCH_VALVE, IdentificationSettings(fixed={name: value}))
+        estimate = published_estimate(
+            record, BENCH_VALVE, IdentificationSettings(fixed={name: value})
+        )
         assert getattr(estimate, name) == value
         assert name in estimate.fixed
         free = {other for other in UNITS if other not in estimate.fixed}
@@ -176,7 +190,7 @@ class TestFixed:
     def test_the_others_stay_true(self, bench_record, name):
         fixed = {name: getattr(LOW_FRICTION, name)}
         record = bench_record("low", SineWave(), 71.0)
-        estimate = identify(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+        estimate = published_estimate(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
         tolerances = NOISE_FREE | {"spring_preload": 1e-3}
         assert_identified(estimate, LOW_FRICTION, tolerances)
         assert estimate.warnings == ()
@@ -184,7 +198,7 @@ class TestFixed:
     def test_a_fixed_mass_makes_the_square_wave_enough(self, bench_record):
         record = bench_record("low", SquareWave(), 20.8)
         settings = IdentificationSettings(fixed={"mass": LOW_FRICTION.mass})
-        estimate = identify(record, BENCH_VALVE, settings)
+        estimate = published_estimate(record, BENCH_VALVE, settings)
         assert estimate.warnings == ()
         tolerances = NOISE_FREE | {"spring_preload": 1e-3}
         assert_identified(estimate, LOW_FRICTION, tolerances)
@@ -192,7 +206,7 @@ class TestFixed:
     def test_limit_velocity_sets_the_threshold(self, bench_record):
         record = bench_record("low", SineWave(), 71.0)
         settings = IdentificationSettings(fixed={"limit_velocity": 1e-3})
-        estimate = identify(record, BENCH_VALVE, settings)
+        estimate = published_estimate(record, BENCH_VALVE, settings)
         assert estimate.threshold == 1e-3
         assert estimate.sweep.thresholds.tolist() == [1e-3]
         assert_identified(estimate, LOW_FRICTION, NOISE_FREE)
@@ -201,7 +215,7 @@ class TestFixed:
 class TestRefusals:
     def refused(self, record, settings=None):
         with pytest.raises(RefusalError) as refusal:
-            identify(record, BENCH_VALVE, settings)
+            published_estimate(record, BENCH_VALVE, settings)
         return str(refusal.value)
 
     def test_too_short(self, bench_record):
@@ -244,14 +258,14 @@ class TestRefusals:
         speed = np.abs(differentiate(record.position, record.sample_period, 301).velocity)
         limit = np.partition(speed, -left - 1)[-left - 1]  # the speed that `left` are above
         settings = IdentificationSettings(
-            window=301, position_bias=1.13e-3, fixed={"limit_velocity": limit}
+            derivative_window=301, position_bias=1.13e-3, fixed={"limit_velocity": limit}
         )
         if left < 4 * 301:
             message = self.refused(record, settings)
             assert message.startswith("no threshold leaves enough moving samples")
             assert "4 parameters" in message
         else:
-            assert identify(record, BENCH_VALVE, settings).samples == left
+            assert published_estimate(record, BENCH_VALVE, settings).samples == left
 
     def test_a_refusal_is_no_value_error(self):
         """So that a caller tells a poor record from a wrong call."""
@@ -286,7 +300,7 @@ class TestSettings:
 
     def test_paper_defaults(self):
         settings = IdentificationSettings()
-        assert (settings.window, settings.order) == (31, 3)
+        assert (settings.published_window, settings.order) == (31, 3)
         assert (settings.steps, settings.resolution) == (330, 350)
         assert settings.fixed == {}
         assert settings.position_bias is None
@@ -305,5 +319,5 @@ def test_force_counts_from_the_reference(bench_record, benches):
     record = bench_record("low", SquareWave(), 20.8)
     shifted = Recording(record.sample_period, record.pressure + 101325.0, record.position)
     valve = Valve(0.0445, pressure_reference=BENCH_VALVE.pressure_reference + 101325.0)
-    estimate = identify(shifted, valve, FOUR_COLUMNS)
+    estimate = published_estimate(shifted, valve, FOUR_COLUMNS)
     assert_identified(estimate, benches["low"].parameters, NOISE_FREE)

@@ -6,10 +6,10 @@ from problems import FREE, perfect_problem, true_coordinates
 
 from valve_friction_ros.identification import IdentificationSettings, Verdict
 from valve_friction_ros.identification.refined.judgement import judge_refinement
-from valve_friction_ros.identification.refined.model_test import Misfit
 from valve_friction_ros.identification.refined.output_error import SLIP
 from valve_friction_ros.identification.refined.refinement import refine
 from valve_friction_ros.identification.trust.limits import FALL_SPEED, FEWEST_STROKES
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.uncertainty import worst_case
 from valve_friction_ros.model import (
     BENCH_VALVE,

@@ -1,4 +1,4 @@
-"""What the assessment must reach: a quick slice of the benchmark, with its bounds."""
+"""What the result must reach: a quick slice of the benchmark, with its bounds."""
 
 import math
 
@@ -13,8 +13,8 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     Verdict,
-    assess,
-    identify,
+    identify_refined,
+    published_estimate,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -26,6 +26,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
+from valve_friction_ros.signals import condition
 
 CASES = [
     *(Case(plant, "square", "28.6 µm", "1 kHz") for plant in ("low", "high", "graphite")),
@@ -63,7 +64,7 @@ def noisy():
 
 @pytest.fixture(scope="module")
 def found(noisy):
-    return assess(noisy, BENCH_VALVE, SETTINGS)
+    return identify_refined(noisy, BENCH_VALVE, SETTINGS)
 
 
 def test_every_parameter_has_a_verdict(found):
@@ -76,23 +77,23 @@ def test_every_parameter_has_a_verdict(found):
 
 
 def test_published_estimate_beside_it_is_the_published_method(found, noisy):
-    plain = identify(noisy, BENCH_VALVE, SETTINGS)
-    assert found.published.values == plain.values
-    assert found.published.settings.window == 31
-    assert found.start.settings.window > 31  # as the noise asks for
+    plain = published_estimate(noisy, BENCH_VALVE, SETTINGS)
+    assert found.estimate.values == plain.values
+    assert found.estimate.settings.published_window == 31
+    assert found.derivative_window > 31  # as the noise asks for
 
 
-def test_model_reproduces_the_record_to_its_noise(found):
-    record = found.refinement.problem.record
-    assert found.misfit.rms == pytest.approx(record.noise, rel=0.2)
+def test_model_reproduces_the_record_to_its_noise(found, noisy):
+    noise = condition(noisy).noise
+    assert found.misfit.rms == pytest.approx(noise, rel=0.2)
     assert found.misfit.fit > 0.998
-    model = found.model()
+    model = found.model
     assert model.coulomb_friction == found.values["coulomb_friction"]
     assert model.spring_constant == found.values["spring_constant"]
 
 
 def test_same_record_same_answer(found, noisy):
-    again = assess(noisy, BENCH_VALVE, SETTINGS)
+    again = identify_refined(noisy, BENCH_VALVE, SETTINGS)
     np.testing.assert_equal(again.values, found.values)
 
 
@@ -100,17 +101,17 @@ class TestMass:
     @pytest.mark.parametrize("plant", ["low", "high", "graphite"])
     def test_refused_on_noisy_records_and_taken_as_assumed(self, plant):
         case = Case(plant, "square", "10 µm", "1 kHz")
-        found = assess(case.record(0), case.plant.valve, SETTINGS)
+        found = identify_refined(case.record(0), case.plant.valve, SETTINGS)
         mass = found.parameters["mass"]
         assert mass.verdict is Verdict.NOT_IDENTIFIABLE
         assert mass.reason.endswith("1.6 kg assumed")
-        assert found.model().mass == 1.6
+        assert found.model.mass == 1.6
 
     def test_fixed_is_fixed(self, noisy):
-        found = assess(noisy, BENCH_VALVE, IdentificationSettings(fixed={"mass": 2.0}))
+        found = identify_refined(noisy, BENCH_VALVE, IdentificationSettings(fixed={"mass": 2.0}))
         mass = found.parameters["mass"]
         assert (mass.verdict, mass.value) == (Verdict.FIXED, 2.0)
-        assert found.model().mass == 2.0
+        assert found.model.mass == 2.0
 
     def test_recovered_where_it_is_in_the_data(self):
         """150 kg, thrown about on a soft spring."""
@@ -123,7 +124,7 @@ class TestMass:
         pressure = (force + 400) / valve.diaphragm_area
         noise = np.random.default_rng(0).standard_normal((2, time.size))
         position = simulate(valve, truth, pressure, 1e-3).position + 5e-6 * noise[0]
-        found = assess(Recording(1e-3, pressure + 10 * noise[1], position), valve)
+        found = identify_refined(Recording(1e-3, pressure + 10 * noise[1], position), valve)
         mass = found.parameters["mass"]
         assert mass.verdict is Verdict.IDENTIFIED
         assert mass.value == pytest.approx(150.0, rel=0.02)
@@ -148,7 +149,7 @@ class TestRealMachine:
         time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
         settings = IdentificationSettings(fixed={"spring_constant": 0.0})
         record = Recording(float(np.median(np.diff(time))), force, position)
-        found = assess(record, Valve(1.0), settings)
+        found = identify_refined(record, Valve(1.0), settings)
         verdicts = {name: one.verdict for name, one in found.parameters.items()}
         assert verdicts["mass"] is Verdict.IDENTIFIED
         shown = {Verdict.IDENTIFIED, Verdict.WEAK}
@@ -157,8 +158,8 @@ class TestRealMachine:
         assert verdicts["static_friction"] is Verdict.NOT_IDENTIFIABLE
         assert verdicts["spring_constant"] is Verdict.FIXED
         assert found.misfit is None
-        assert found.refinement is None
-        assert found.force_fit > 0.9
+        assert found.stem is None
+        assert found.fit > 0.9
 
 
 @pytest.mark.parametrize(("name", "waiting"), [("closed", 41_740.0), ("open", 230_000.0)])
@@ -172,6 +173,6 @@ def test_record_that_begins_at_a_travel_stop(name, waiting):
     record = Recording(1e-3, pressure, motion.position)
     for seed in range(4):
         noisy = SensorNoise(28.6e-6, 165.0, seed).applied_to(record)
-        friction = assess(noisy, BENCH_VALVE).parameters["coulomb_friction"]
+        friction = identify_refined(noisy, BENCH_VALVE).parameters["coulomb_friction"]
         assert friction.verdict is Verdict.IDENTIFIED
         assert friction.value == pytest.approx(LOW_FRICTION.coulomb_friction, rel=0.02)

@@ -7,11 +7,11 @@ import pytest
 
 from benchmark.cases import Case
 from valve_friction_ros.identification import (
-    ASSESSED_UNITS,
+    PARAMETER_UNITS,
     UNITS,
     IdentificationSettings,
     Verdict,
-    assess,
+    identify_refined,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -28,8 +28,8 @@ SETTINGS = IdentificationSettings(assumed_mass=1.6)
 NOISE = SensorNoise(28.6e-6, 165.0)
 
 
-def extras(assessment):
-    return assessment.parameters.keys() - UNITS.keys()
+def extras(result):
+    return result.parameters.keys() - UNITS.keys()
 
 
 def high_record(parameters=HIGH_FRICTION, seed=0, late=0.0):
@@ -46,7 +46,7 @@ def high_record(parameters=HIGH_FRICTION, seed=0, late=0.0):
 
 
 def test_what_can_be_found_has_a_unit():
-    assert ASSESSED_UNITS.keys() - UNITS.keys() == {
+    assert PARAMETER_UNITS.keys() - UNITS.keys() == {
         "stribeck_velocity",
         "coulomb_asymmetry",
         "viscous_asymmetry",
@@ -58,7 +58,7 @@ def test_what_can_be_found_has_a_unit():
 @pytest.mark.parametrize("plant", ["low", "high", "graphite"])
 def test_plain_valves_demand_nothing(plant, seed):
     case = Case(plant, "square", "28.6 µm", "1 kHz")
-    found = assess(case.record(seed), case.plant.valve, SETTINGS)
+    found = identify_refined(case.record(seed), case.plant.valve, SETTINGS)
     assert extras(found) == set()
     assert not found.warnings or "published" in found.warnings[0]
     slips = plant == "graphite"
@@ -70,7 +70,7 @@ def test_plain_valves_demand_nothing(plant, seed):
 @pytest.mark.parametrize("noise", ["28.6 µm"])
 def test_stribeck_fall_is_demanded_where_it_is(noise):
     case = Case("stribeck", "square", noise, "1 kHz")
-    found = assess(case.record(0), case.plant.valve, SETTINGS)
+    found = identify_refined(case.record(0), case.plant.valve, SETTINGS)
     truth = case.plant.parameters
     assert extras(found) == {"stribeck_velocity"}
     for name in ("stribeck_velocity", "coulomb_friction", "static_friction"):
@@ -87,7 +87,9 @@ def test_viscous_asymmetry(asymmetry):
     time = 1e-3 * np.arange(71_000)
     pressure = converter_response(SineWave().sample(time), 1e-3)
     position = simulate(BENCH_VALVE, skew, pressure, 1e-3).position
-    found = assess(NOISE.applied_to(Recording(1e-3, pressure, position)), BENCH_VALVE, SETTINGS)
+    found = identify_refined(
+        NOISE.applied_to(Recording(1e-3, pressure, position)), BENCH_VALVE, SETTINGS
+    )
     assert extras(found) == {"viscous_asymmetry"}
     assert found.values["viscous_asymmetry"] == pytest.approx(asymmetry, abs=0.01)
     assert found.values["viscous_friction"] == pytest.approx(4.48e4, rel=0.05)
@@ -96,7 +98,7 @@ def test_viscous_asymmetry(asymmetry):
 def test_coulomb_asymmetry_where_the_preload_is_known():
     skew = replace(HIGH_FRICTION, coulomb_asymmetry=0.1)
     settings = replace(SETTINGS, position_bias=1.13e-3)
-    found = assess(high_record(skew), BENCH_VALVE, settings)
+    found = identify_refined(high_record(skew), BENCH_VALVE, settings)
     assert extras(found) == {"coulomb_asymmetry"}
     assert found.values["coulomb_asymmetry"] == pytest.approx(0.1, abs=0.005)
 
@@ -104,7 +106,7 @@ def test_coulomb_asymmetry_where_the_preload_is_known():
 def test_coulomb_asymmetry_is_preload_where_that_is_free():
     """F_c·(1 ± a) with F_0 is F_c with F_0 + a·F_c."""
     skew = replace(HIGH_FRICTION, coulomb_asymmetry=0.1)
-    found = assess(high_record(skew), BENCH_VALVE, SETTINGS)
+    found = identify_refined(high_record(skew), BENCH_VALVE, SETTINGS)
     assert extras(found) == set()
     expected = HIGH_FRICTION.spring_preload + 0.1 * HIGH_FRICTION.coulomb_friction
     assert found.values["spring_preload"] == pytest.approx(expected, rel=0.02)
@@ -113,7 +115,7 @@ def test_coulomb_asymmetry_is_preload_where_that_is_free():
 
 @pytest.mark.parametrize("late", [0.05, -0.05, 1.0])
 def test_clock_offset_is_found_and_reported(late):
-    found = assess(high_record(late=late), BENCH_VALVE, SETTINGS)
+    found = identify_refined(high_record(late=late), BENCH_VALVE, SETTINGS)
     assert found.values["clock_offset"] == pytest.approx(late, abs=2e-3)
     side = "late" if late > 0 else "early"
     (warning,) = [one for one in found.warnings if "stamps" in one]
@@ -123,7 +125,7 @@ def test_clock_offset_is_found_and_reported(late):
 
 def test_stem_a_second_early_is_told_though_not_measured():
     """The search ends 0.19 s short of it, with a misfit: nothing may be called identified."""
-    found = assess(high_record(late=-1.0), BENCH_VALVE, SETTINGS)
+    found = identify_refined(high_record(late=-1.0), BENCH_VALVE, SETTINGS)
     assert any("early against those of the pressure" in one for one in found.warnings)
     assert not found.misfit.describes
     assert found.parameters["coulomb_friction"].verdict is not Verdict.IDENTIFIED

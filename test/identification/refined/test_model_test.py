@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification.refined.model_test import Misfit, misfit_of
+from valve_friction_ros.identification.refined.model_test import misfit_of
 from valve_friction_ros.identification.refined.output_error import OutputError
 from valve_friction_ros.identification.refined.refinement import Refinement
 from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.model import Valve
 from valve_friction_ros.signals.conditioned_record import ConditionedRecord
 

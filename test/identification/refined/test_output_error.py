@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from problems import FREE, perfect_problem, true_coordinates
 
-from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START
+from valve_friction_ros.identification.refined.output_error import SLIP, START
+from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model import (
     GRAPHITE_PACKING,
     GRAPHITE_VALVE,
@@ -59,7 +60,7 @@ def analytic():
         "spring_preload": np.full(TIME.size, -1 / k),
         "mass": np.zeros(TIME.size),
         START: np.zeros(TIME.size),
-        OFFSET: np.full(TIME.size, -speed),
+        CLOCK_OFFSET: np.full(TIME.size, -speed),
     }
 
 
@@ -89,7 +90,7 @@ def test_truth_leaves_no_residual(bench_trajectory):
 
 def test_late_stamps_are_an_early_pressure(problem, at):
     """x(t) of a clock that lags by 40 ms is x(t − 40 ms)."""
-    moved = problem.simulated({**at, OFFSET: 0.04}, PRESSURE)
+    moved = problem.simulated({**at, CLOCK_OFFSET: 0.04}, PRESSURE)
     here = problem.simulated(at, PRESSURE)
     np.testing.assert_allclose(moved[4000:], here[3960:-40], rtol=0, atol=1e-12)
 
@@ -136,7 +137,7 @@ class TestModel:
 
 
 def test_units_are_forces_for_forces_and_the_play_for_the_start(problem, at):
-    units = problem.units((*FREE, SLIP, OFFSET), at)
+    units = problem.units((*FREE, SLIP, CLOCK_OFFSET), at)
     assert units == {
         "coulomb_friction": 50.0,
         "viscous_friction": 3000.0,
@@ -144,7 +145,7 @@ def test_units_are_forces_for_forces_and_the_play_for_the_start(problem, at):
         "spring_preload": 50.0,
         START: 50.0 / 1.5e5,
         SLIP: 50.0,
-        OFFSET: 1.0,
+        CLOCK_OFFSET: 1.0,
     }
 
 

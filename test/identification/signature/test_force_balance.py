@@ -9,7 +9,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
     Verdict,
-    assess_force_balance,
+    identify_signature,
 )
 from valve_friction_ros.identification.signature.valve_signature import valve_signature
 from valve_friction_ros.model import (
@@ -102,7 +102,7 @@ def test_high_friction_has_three_times_the_dead_zone_of_low(bench_record):
 def test_every_interval_holds_the_truth(bench, bench_record, noise):
     name, plant = bench
     record = bench_record(name, TriangleWave(), FIVE_STROKES, noise)
-    found = assess_force_balance(record, plant.valve, IdentificationSettings(assumed_mass=1.6))
+    found = identify_signature(record, plant.valve, IdentificationSettings(assumed_mass=1.6))
     for parameter in JUDGED:
         low, high = found.parameters[parameter].interval
         assert low < getattr(plant.parameters, parameter) < high, parameter
@@ -114,16 +114,16 @@ def test_every_interval_holds_the_truth(bench, bench_record, noise):
     assert friction.half_width < 0.05 * friction.value
     mass = found.parameters["mass"]
     assert (mass.verdict, mass.reason[-14:]) == (Verdict.NOT_IDENTIFIABLE, "1.6 kg assumed")
-    assert found.model().mass == 1.6
+    assert found.model.mass == 1.6
     noise_level = noise.position if noise else 0.0
     assert found.rms == pytest.approx(noise_level, abs=15e-6)
     assert found.fit > 0.995
-    assert (found.published, found.misfit, found.sweep) == (None, None, None)
+    assert (found.estimate, found.misfit) == (None, None)
 
 
 def test_without_a_jump_coulomb_is_static_friction(bench_record):
     record = bench_record("high", TriangleWave(), FIVE_STROKES)
-    values = assess_force_balance(record, BENCH_VALVE).values
+    values = identify_signature(record, BENCH_VALVE).values
     assert values["coulomb_friction"] == values["static_friction"]
 
 
@@ -134,17 +134,17 @@ class TestGiven:
 
     def test_values_stay(self, record):
         fixed = {"mass": 1.75, "spring_constant": 2e5, "coulomb_friction": 600.0}
-        found = assess_force_balance(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+        found = identify_signature(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
         for name, value in fixed.items():
             parameter = found.parameters[name]
             assert (parameter.verdict, parameter.value) == (Verdict.FIXED, value)
 
     def test_coulomb_friction_moves_the_viscous_one(self, record):
         """(19): 6.9 N less of F_c are 6.9 N more of F_v·ẋ."""
-        free = assess_force_balance(record, BENCH_VALVE)
+        free = identify_signature(record, BENCH_VALVE)
         less = free.values["coulomb_friction"] - 6.9
         settings = IdentificationSettings(fixed={"coulomb_friction": less})
-        found = assess_force_balance(record, BENCH_VALVE, settings)
+        found = identify_signature(record, BENCH_VALVE, settings)
         strokes = free.signature.strokes
         inverse = np.mean([np.mean(1 / np.abs(one.sliding.velocity)) for one in strokes])
         more = found.values["viscous_friction"] - free.values["viscous_friction"]
@@ -152,13 +152,13 @@ class TestGiven:
 
     def test_position_bias(self, record):
         settings = IdentificationSettings(position_bias=1.13e-3)
-        values = assess_force_balance(record, BENCH_VALVE, settings).values
+        values = identify_signature(record, BENCH_VALVE, settings).values
         assert values["spring_preload"] == pytest.approx(1.13e-3 * values["spring_constant"])
 
     def test_no_spring(self, record):
         settings = IdentificationSettings(fixed={"spring_constant": 0.0})
-        with pytest.raises(RefusalError, match="needs a spring: use the method sweep"):
-            assess_force_balance(record, BENCH_VALVE, settings)
+        with pytest.raises(RefusalError, match="needs a spring: use the method refined"):
+            identify_signature(record, BENCH_VALVE, settings)
 
 
 @pytest.mark.parametrize("noise", NOISES, ids=["clean", "noisy"])
@@ -176,7 +176,7 @@ class TestRefusals:
     def test_no_constant_speed(self, bench_record, excitation, duration, noise):
         record = bench_record("high", excitation, duration, noise)
         with pytest.raises(RefusalError) as refusal:
-            assess_force_balance(record, BENCH_VALVE)
+            identify_signature(record, BENCH_VALVE)
         message = str(refusal.value)
         assert "does not slide at a constant speed" in message
         assert "slow triangular wave of pressure, such as 60 s a period" in message
@@ -189,13 +189,13 @@ class TestRefusals:
     def test_too_few_strokes(self, bench_record, period, duration, cause, noise):
         record = bench_record("high", TriangleWave(period=period), duration, noise)
         with pytest.raises(RefusalError, match=f"{cause}: excite the valve by a slow triangular"):
-            assess_force_balance(record, BENCH_VALVE)
+            identify_signature(record, BENCH_VALVE)
 
     def test_a_record_that_begins_in_a_stroke_is_served(self, bench_record, noise):
         """The first stroke has no breakaway, and takes no part."""
         whole = bench_record("high", TriangleWave(), FIVE_STROKES + 30.0, noise)
         late = Recording(whole.sample_period, whole.pressure[15_000:], whole.position[15_000:])
-        found = assess_force_balance(late, BENCH_VALVE)
+        found = identify_signature(late, BENCH_VALVE)
         assert found.signature.strokes[0].breakaway is None
         assert found.values["static_friction"] == pytest.approx(606.0, rel=0.02)
 
@@ -206,7 +206,7 @@ def test_pressure_and_stem_against_each_other(bench_record):
         record.sample_period, record.pressure, BENCH_VALVE.travel - record.position
     )
     with pytest.raises(RefusalError, match="the stem moves against the pressure"):
-        assess_force_balance(mirrored, BENCH_VALVE)
+        identify_signature(mirrored, BENCH_VALVE)
 
 
 class TestContradictions:
@@ -225,15 +225,15 @@ class TestContradictions:
     )
     def test_refused(self, record, fixed, cause):
         with pytest.raises(RefusalError, match=cause):
-            assess_force_balance(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
+            identify_signature(record, BENCH_VALVE, IdentificationSettings(fixed=fixed))
 
     def test_too_large_a_coulomb_friction_leaves_no_viscous_one(self, record):
         settings = IdentificationSettings(fixed={"coulomb_friction": 700.0})
-        found = assess_force_balance(record, BENCH_VALVE, settings)
+        found = identify_signature(record, BENCH_VALVE, settings)
         viscous = found.parameters["viscous_friction"]
         assert viscous.verdict is Verdict.NOT_IDENTIFIABLE
         assert viscous.reason.startswith("it came out negative (-")
-        assert found.model().viscous_friction > 0
+        assert found.model.viscous_friction > 0
         assert any("viscous_friction is not identified" in note for note in found.warnings)
 
 
@@ -243,6 +243,6 @@ def test_slow_sampling_and_a_converter_without_lag(benches):
     for lag in (0.0, 1.3):
         pressure = converter_response(TriangleWave().sample(time), 0.01, lag)
         position = simulate(*benches["high"], pressure, 0.01).position
-        found = assess_force_balance(Recording(0.01, pressure, position), BENCH_VALVE)
+        found = identify_signature(Recording(0.01, pressure, position), BENCH_VALVE)
         assert found.values["coulomb_friction"] == pytest.approx(606.0, rel=5e-3)
         assert math.isclose(found.values["viscous_friction"], 4.48e4, rel_tol=0.05)

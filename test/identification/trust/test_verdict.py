@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.identification import AssessedParameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.identification.trust.verdict import fixed, judged, not_identifiable
 
 
@@ -60,7 +60,7 @@ def test_a_withheld_value_is_nowhere():
 
 
 def test_fixed_has_no_width():
-    assert fixed("mass", 1.6) == AssessedParameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED, "given")
+    assert fixed("mass", 1.6) == Parameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED, "given")
     assert fixed("mass", 1.6).interval == (1.6, 1.6)
 
 

@@ -25,7 +25,7 @@ from valve_friction_ros.figures import Case, friction_figure, require_picture_fi
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
     UNITS,
-    AssessedParameter,
+    Parameter,
     RefusalError,
     Verdict,
 )
@@ -68,7 +68,7 @@ class _Outcome(NamedTuple):
     label: str
     truth: KarnoppParameters
     published: Mapping[str, float]
-    refined: Mapping[str, AssessedParameter]
+    refined: Mapping[str, Parameter]
     case: Case
 
     def errors(self) -> dict[str, float]:
@@ -154,10 +154,10 @@ def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Out
     return _Outcome(label, truth, published, refined, case)
 
 
-def _refined(name: str, values: Mapping[str, str]) -> AssessedParameter:
+def _refined(name: str, values: Mapping[str, str]) -> Parameter:
     """Read a parameter with its verdict from a diagnostic."""
     half_width = float(values[f"{name} half width [{UNITS[name]}]"])
-    return AssessedParameter(
+    return Parameter(
         name,
         float(values[f"{name} [{UNITS[name]}]"]),
         float("nan"),

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.derivatives import Derivatives
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.signals.noise import position_noise, velocity_noise
+from valve_friction_ros.signals.measured_record import measured
+from valve_friction_ros.signals.noise import velocity_noise
 
 __all__ = ["Breakaway", "find_breakaways"]
 
@@ -62,9 +62,7 @@ def _onset(displacement: NDArray[np.float64], spread: float) -> int | None:
     return onset if onset >= 0 else None
 
 
-def find_breakaways(
-    recording: Recording, derivatives: Derivatives, settings: IdentificationSettings
-) -> list[Breakaway]:
+def find_breakaways(recording: Recording, settings: IdentificationSettings) -> list[Breakaway]:
     """Find the instants at which the stem leaves a rest.
 
     A rest is a stretch of at least two derivative windows without a speed that the noise cannot
@@ -78,21 +76,19 @@ def find_breakaways(
     ----------
     recording : Recording
         Stem position and pressure.
-    derivatives : Derivatives
-        Velocity of the stem.
     settings : IdentificationSettings
-        Window and order that gave the derivatives.
+        Window and order of the derivatives.
 
     Returns
     -------
     list of Breakaway
         In the order of time; indices into the samples of `recording`.
     """
-    window = settings.window
+    window = settings.published_window
+    record = measured(recording)
+    derivatives = record.derivatives(window, settings.order)
     speed = np.abs(derivatives.velocity)
-    noise = velocity_noise(
-        position_noise(recording.position), recording.sample_period, window, settings.order
-    )
+    noise = velocity_noise(record.white_noise, record.sample_period, window, settings.order)
     moving = speed > max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
     for begin, end in zip(*_runs(moving), strict=True):
         # The filter spreads any true motion over a window: a shorter burst is noise.

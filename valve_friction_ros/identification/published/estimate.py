@@ -1,23 +1,13 @@
-"""The result of an identification."""
+"""What the published method finds."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from valve_friction_ros.identification.published.sweep import Sweep
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 
-__all__ = ["UNITS", "Estimate"]
-
-UNITS: Mapping[str, str] = {
-    "mass": "kg",
-    "viscous_friction": "N·s/m",
-    "coulomb_friction": "N",
-    "static_friction": "N",
-    "spring_constant": "N/m",
-    "spring_preload": "N",
-}
-"""Unit of each identified parameter, in the order in which they are shown."""
+__all__ = ["Estimate", "possible_model"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,3 +68,11 @@ class Estimate:
             If an identified value is impossible; the message names it.
         """
         return KarnoppParameters(**self.values)
+
+
+def possible_model(estimate: Estimate) -> KarnoppParameters | None:
+    """Return the regressed values as a model, None where one of them is impossible."""
+    try:
+        return estimate.parameters()
+    except ValueError:
+        return None

@@ -1,13 +1,17 @@
 """Identification of the Karnopp parameters from a recording, as published."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from valve_friction_ros.identification.published.breakaway import find_breakaways
-from valve_friction_ros.identification.published.derivatives import Derivatives, differentiate
 from valve_friction_ros.identification.published.estimate import Estimate
-from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.published.regression import (
+    ForceBalanceRegression,
+    force_balance_regression,
+)
 from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
 from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -18,19 +22,24 @@ from valve_friction_ros.identification.trust.excitation import (
 )
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
-__all__ = ["identify"]
+__all__ = ["PublishedFit", "published_estimate", "published_fit"]
 
 _MASS_TOLERANCE = 0.25
 
 
+class PublishedFit(NamedTuple):
+    """An estimate with the regression that it solves."""
+
+    estimate: Estimate
+    regression: ForceBalanceRegression
+
+
 def _sweep(
-    recording: Recording, valve: Valve, settings: IdentificationSettings, derivatives: Derivatives
+    regression: ForceBalanceRegression, settings: IdentificationSettings
 ) -> tuple[Sweep, int]:
     """Sweep the thresholds (8), or take the one that is given; return the sweep and the choice."""
-    regression = force_balance_regression(
-        valve.actuator_force(recording.pressure), recording.position, derivatives, settings
-    )
     given = settings.fixed.get("limit_velocity")
     if given is not None:
         thresholds = np.array([given])
@@ -38,19 +47,19 @@ def _sweep(
         step = float(regression.speed.max()) / settings.resolution
         thresholds = step * np.arange(1, settings.steps + 1)
     sweep = sweep_thresholds(regression, thresholds)
-    return sweep, choose_threshold(sweep, settings.window)
+    return sweep, choose_threshold(sweep, settings.published_window)
 
 
 def _mass_by_shorter_window(
-    recording: Recording, valve: Valve, settings: IdentificationSettings, threshold: float
+    record: MeasuredRecord,
+    force: NDArray[np.float64],
+    settings: IdentificationSettings,
+    threshold: float,
 ) -> float:
     """Mass at `threshold` with about half the derivative window; nan if that cannot be solved."""
-    window = max((settings.window // 2) | 1, (settings.order + 2) | 1)
-    shorter = replace(settings, window=window)
-    derivatives = differentiate(recording.position, recording.sample_period, window, settings.order)
-    regression = force_balance_regression(
-        valve.actuator_force(recording.pressure), recording.position, derivatives, shorter
-    )
+    window = max((settings.published_window // 2) | 1, (settings.order + 2) | 1)
+    derivatives = record.derivatives(window, settings.order)
+    regression = force_balance_regression(force, record.position, derivatives, settings)
     return float(sweep_thresholds(regression, np.array([threshold])).estimates["mass"][0])
 
 
@@ -64,15 +73,14 @@ def _why_mass_is_not_told(mass: float, other: float) -> str | None:
 
 
 def _static_friction(
-    recording: Recording,
-    valve: Valve,
-    derivatives: Derivatives,
+    record: MeasuredRecord,
+    force: NDArray[np.float64],
     settings: IdentificationSettings,
     values: dict[str, float],
     warnings: list[str],
 ) -> float:
     """F_s by (9): the median over all breakaways, not below F_c."""
-    breakaways = find_breakaways(recording, derivatives, settings)
+    breakaways = find_breakaways(record, settings)
     coulomb_friction = values["coulomb_friction"]
     if not breakaways:
         warnings.append(
@@ -82,14 +90,14 @@ def _static_friction(
     samples = np.array([breakaway.sample for breakaway in breakaways])
     directions = np.array([breakaway.direction for breakaway in breakaways])
     pull = (
-        valve.actuator_force(recording.pressure[samples])
-        - values["spring_constant"] * recording.position[samples]
+        force[samples]
+        - values["spring_constant"] * record.position[samples]
         - values["spring_preload"]
     )
     return max(float(np.median(directions * pull)), coulomb_friction)
 
 
-def identify(
+def published_estimate(
     recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
 ) -> Estimate:
     """Identify the friction of a valve from a recording, as the paper does.
@@ -125,19 +133,25 @@ def identify(
     window is halved. Otherwise `assumed_mass` takes its place, with a warning; inertia is about
     0.01 N in 5000 N on the bench valve, so the other parameters hardly notice.
     """
-    settings = settings or IdentificationSettings()
+    return published_fit(measured(recording), valve, settings or IdentificationSettings()).estimate
+
+
+def published_fit(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
+) -> PublishedFit:
+    """Identify as `published_estimate` does, and return the regression too."""
     warnings: list[str] = []
-    require_enough_samples(recording, settings.window)
-    derivatives = differentiate(
-        recording.position, recording.sample_period, settings.window, settings.order
-    )
-    require_motion(recording)
-    require_two_directions(recording, settings.window)
-    sweep, chosen = _sweep(recording, valve, settings, derivatives)
+    require_enough_samples(record, settings.published_window)
+    derivatives = record.derivatives(settings.published_window, settings.order)
+    require_motion(record)
+    require_two_directions(record, settings.published_window)
+    force = valve.actuator_force(record.pressure)
+    regression = force_balance_regression(force, record.position, derivatives, settings)
+    sweep, chosen = _sweep(regression, settings)
     if "mass" not in settings.fixed:
         reason = _why_mass_is_not_told(
             float(sweep.estimates["mass"][chosen]),
-            _mass_by_shorter_window(recording, valve, settings, float(sweep.thresholds[chosen])),
+            _mass_by_shorter_window(record, force, settings, float(sweep.thresholds[chosen])),
         )
         if reason is not None:
             warnings.append(
@@ -145,7 +159,8 @@ def identify(
                 f"{settings.assumed_mass:g} kg is assumed"
             )
             settings = replace(settings, fixed={**settings.fixed, "mass": settings.assumed_mass})
-            sweep, chosen = _sweep(recording, valve, settings, derivatives)
+            regression = regression.fixing("mass", settings.assumed_mass)
+            sweep, chosen = _sweep(regression, settings)
     values = {name: float(column[chosen]) for name, column in sweep.estimates.items()}
     threshold = float(sweep.thresholds[chosen])
     for name, value in values.items():
@@ -153,15 +168,13 @@ def identify(
             warnings.append(f"{name} came out negative ({value:.4g}): the model does not fit")
     static_friction = settings.fixed.get("static_friction")
     if static_friction is None:
-        static_friction = _static_friction(
-            recording, valve, derivatives, settings, values, warnings
-        )
+        static_friction = _static_friction(record, force, settings, values, warnings)
     elif static_friction < values["coulomb_friction"]:
         warnings.append(
             f"the fixed static_friction ({static_friction:.4g} N) lies below the identified "
             f"coulomb_friction ({values['coulomb_friction']:.4g} N)"
         )
-    return Estimate(
+    estimate = Estimate(
         **values,
         static_friction=static_friction,
         threshold=threshold,
@@ -173,3 +186,4 @@ def identify(
         settings=settings,
         sweep=sweep,
     )
+    return PublishedFit(estimate, regression)

@@ -11,7 +11,7 @@ from valve_friction_ros.identification.trust.limits import (
     too_few_strokes,
 )
 from valve_friction_ros.identification.trust.verdict import (
-    AssessedParameter,
+    Parameter,
     fixed,
     judged,
     not_identifiable,
@@ -22,7 +22,7 @@ __all__ = ["judge_regression"]
 
 def judge_regression(
     estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
-) -> dict[str, AssessedParameter]:
+) -> dict[str, Parameter]:
     """Judge every parameter of a regression, for a machine without a spring."""
     covariance = regression.covariance
     few = too_few_strokes(regression.strokes)

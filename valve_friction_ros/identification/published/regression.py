@@ -1,13 +1,13 @@
 """The force balance of the sliding stem as a linear regression, equations (3) to (7)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.derivatives import Derivatives
 from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.signals.derivatives import Derivatives
 
 __all__ = ["ForceBalanceRegression", "force_balance_regression"]
 
@@ -49,6 +49,17 @@ class ForceBalanceRegression:
         if self.position_bias is not None:
             named["spring_preload"] = named["spring_constant"] * self.position_bias
         return {name: named[name] for name in REGRESSED}
+
+    def fixing(self, name: str, value: float) -> "ForceBalanceRegression":
+        """Take a free parameter as known: its share of the force leaves the regression."""
+        index = self.names.index(name)
+        return replace(
+            self,
+            names=tuple(each for each in self.names if each != name),
+            columns=np.delete(self.columns, index, axis=1),
+            force=self.force - value * self.columns[:, index],
+            fixed={**self.fixed, name: value},
+        )
 
 
 def force_balance_regression(

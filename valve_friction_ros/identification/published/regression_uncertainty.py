@@ -5,17 +5,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.derivatives import differentiate
-from valve_friction_ros.identification.published.estimate import Estimate
-from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.published.identify import PublishedFit
 from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.trust.uncertainty import (
     Covariance,
     block_covariance,
     stroke_length,
 )
-from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import MeasuredRecord
 
 __all__ = ["RegressionUncertainty", "regression_uncertainty"]
 
@@ -41,31 +38,25 @@ class RegressionUncertainty(NamedTuple):
     strokes: int
 
 
-def regression_uncertainty(
-    recording: Recording, valve: Valve, estimate: Estimate
-) -> RegressionUncertainty:
+def regression_uncertainty(record: MeasuredRecord, fit: PublishedFit) -> RegressionUncertainty:
     """Scatter of the regression's normal equations between strokes.
 
     Without a spring nothing calls the stem back, and a simulation drifts away from the record
     whatever the parameters, so the regression is all there is. Its scores are the residual times
     the regressors, φ_t·(F_t − φ_tᵀθ), at the samples above the chosen threshold.
     """
+    estimate, regression = fit
     settings = estimate.settings
-    derivatives = differentiate(
-        recording.position, recording.sample_period, settings.window, settings.order
-    )
-    regression = force_balance_regression(
-        valve.actuator_force(recording.pressure), recording.position, derivatives, settings
-    )
+    velocity = record.derivatives(settings.published_window, settings.order).velocity
     moving = regression.speed > estimate.threshold
     values = np.array([estimate.values[name] for name in regression.names])
     residual: NDArray[np.float64] = regression.columns @ values - regression.force
     columns = regression.columns * moving[:, None]
     equation = EstimatingEquation.of_least_squares(columns, residual)
-    stroke = stroke_length(np.cumsum(derivatives.velocity * moving))
+    stroke = stroke_length(np.cumsum(velocity * moving))
     covariance = block_covariance(equation, stroke)
     force = regression.force[moving]
-    fit = 1 - float(np.linalg.norm(residual[moving]) / np.linalg.norm(force - force.mean()))
+    share = 1 - float(np.linalg.norm(residual[moving]) / np.linalg.norm(force - force.mean()))
     return RegressionUncertainty(
-        regression.names, covariance, fit, max(residual.size // max(stroke, 1), 1)
+        regression.names, covariance, share, max(residual.size // max(stroke, 1), 1)
     )

@@ -6,9 +6,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.estimate import UNITS
-from valve_friction_ros.identification.refined.model_test import Misfit
-from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START
+from valve_friction_ros.identification.refined.output_error import SLIP, START
 from valve_friction_ros.identification.refined.refinement import Refinement, estimating_equation
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.limits import (
@@ -17,20 +15,22 @@ from valve_friction_ros.identification.trust.limits import (
     finest_half_share,
     too_few_strokes,
 )
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.uncertainty import (
     CONFIDENCE,
     worst_case,
 )
 from valve_friction_ros.identification.trust.verdict import (
-    AssessedParameter,
+    Parameter,
     fixed,
     judged,
     not_identifiable,
 )
+from valve_friction_ros.identification.units import CLOCK_OFFSET, UNITS
 
 __all__ = ["judge_refinement"]
 
-_SPRING = ("mass", "spring_constant", "spring_preload", OFFSET)
+_SPRING = ("mass", "spring_constant", "spring_preload", CLOCK_OFFSET)
 """What is told as well where the model of the friction is doubted."""
 
 _RECTANGLE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) / math.sqrt(3)
@@ -39,7 +39,7 @@ _RECTANGLE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) / math.sqrt(3)
 
 def judge_refinement(
     refinement: Refinement, misfit: Misfit, settings: IdentificationSettings
-) -> dict[str, AssessedParameter]:
+) -> dict[str, Parameter]:
     """Judge every parameter of a refined model.
 
     The half width of an interval is the standard error by the scatter between strokes, times
@@ -54,7 +54,7 @@ def judge_refinement(
     by_mass = _shift_by_assumed_mass(refinement, settings)
     values = {
         **vars(refinement.problem.model(refinement.coordinates)),
-        OFFSET: refinement.coordinates[OFFSET],
+        CLOCK_OFFSET: refinement.coordinates[CLOCK_OFFSET],
     }
     few = too_few_strokes(samples // max(refinement.stroke, 1))
     doubt = _doubt(refinement, misfit)

@@ -1,27 +1,30 @@
-"""Method "sweep": the published sweep, refined, with intervals, verdicts, a test of the model."""
+"""Method "refined": the published sweep, refined, with intervals, verdicts, a test of the model."""
 
 import math
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from valve_friction_ros.identification.assessment import Assessment
-from valve_friction_ros.identification.published.estimate import Estimate
-from valve_friction_ros.identification.published.identify import identify
+from valve_friction_ros.identification.published.estimate import Estimate, possible_model
+from valve_friction_ros.identification.published.evidence import (
+    sweep_evidence,
+    sweep_finding,
+    with_published,
+)
+from valve_friction_ros.identification.published.identify import published_fit
 from valve_friction_ros.identification.published.judgement import judge_regression
 from valve_friction_ros.identification.published.regression_uncertainty import (
+    RegressionUncertainty,
     regression_uncertainty,
 )
-from valve_friction_ros.identification.published.sweep import Sweep
 from valve_friction_ros.identification.refined.judgement import judge_refinement
 from valve_friction_ros.identification.refined.model_selection import with_demanded
 from valve_friction_ros.identification.refined.model_test import misfit_of
-from valve_friction_ros.identification.refined.output_error import OFFSET, SLIP, START, OutputError
-from valve_friction_ros.identification.refined.refinement import Refinement
+from valve_friction_ros.identification.refined.output_error import SLIP, START, OutputError
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (
     require_enough_samples,
@@ -31,82 +34,27 @@ from valve_friction_ros.identification.trust.excitation import (
     require_travel,
     require_two_directions,
 )
+from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.conditioned_record import condition
-from valve_friction_ros.signals.derivative_window import fitting_window
+from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
-__all__ = ["SweepAssessment", "assess"]
+__all__ = ["METHOD", "identify_refined"]
 
 _START_TIME = 0.02
+"""Time, s, whose median position is where the refinement begins."""
+
+METHOD = "refined"
+"""Name of this method."""
 
 
-@dataclass(frozen=True, eq=False)
-class SweepAssessment(Assessment):
-    """The refined model, beside the published sweep.
-
-    Attributes
-    ----------
-    start : Estimate
-        The published method with the derivative window that the record asks for.
-    force_fit : float
-        Share of the force that `start` reproduces.
-    refinement : Refinement or None
-        The refined model and its residual; None without a spring, where the stem cannot be
-        simulated.
-    """
-
-    method: ClassVar[str] = "sweep"
-
-    start: Estimate
-    force_fit: float
-    refinement: Refinement | None = field(repr=False)
-
-    @property
-    def fit(self) -> float:
-        """Share of the stem's movement that is reproduced; without a spring, of the force."""
-        return self.force_fit if self.misfit is None else self.misfit.fit
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of simulated less measured position, m; nan without a spring."""
-        return math.nan if self.misfit is None else self.misfit.rms
-
-    @property
-    def window(self) -> int:
-        """Derivative window that the record asks for, samples."""
-        return self.start.settings.window
-
-    @property
-    def sweep(self) -> Sweep:
-        """The published sweep; where it has no answer, that of the start."""
-        return (self.published or self.start).sweep
-
-    @property
-    def simulated(self) -> NDArray[np.float64] | None:
-        """Position of the refined model's stem, m, None without a spring."""
-        return None if self.refinement is None else self.refinement.simulated
-
-    def model(self) -> KarnoppParameters:
-        """Return the refined model, or without a spring the regressed one, to simulate.
-
-        Raises
-        ------
-        ValueError
-            If a regressed value is impossible; the message names it.
-        """
-        if self.refinement is None:
-            return self.start.parameters()
-        return self.refinement.problem.model(self.refinement.coordinates)
-
-
-def assess(
-    recording: Recording,
-    valve: Valve,
-    settings: IdentificationSettings | None = None,
-    window: int | None = None,
-) -> SweepAssessment:
+def identify_refined(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
     """Identify a record and say how far each number can be trusted.
 
     The published method starts it, with a derivative window that fits the noise. The model is
@@ -120,14 +68,13 @@ def assess(
     valve : Valve
         Geometry.
     settings : IdentificationSettings, optional
-        As for `identify`; the refinement takes the fixed parameters and the position bias.
-    window : int, optional
-        Derivative window of the start, samples; by default the record's noise and bandwidth
-        choose it (`fitting_window`). The published estimate takes that of `settings`.
+        As for `published_estimate`; the refinement takes the fixed parameters and the position
+        bias. Without a `derivative_window` the start takes one that fits the noise and the
+        bandwidth of the record (`MeasuredRecord.fitting_window`).
 
     Returns
     -------
-    SweepAssessment
+    Result
         Parameters with intervals and verdicts.
 
     Raises
@@ -136,32 +83,75 @@ def assess(
         If the record cannot tell; the message says what to do.
     """
     settings = settings or IdentificationSettings()
-    require_enough_samples(recording, settings.window)
-    require_motion(recording)
-    require_two_directions(recording, settings.window)
-    require_travel(recording, valve)
-    require_stem_between_stops(recording, valve)
+    record = measured(recording)
+    require_enough_samples(record, settings.published_window)
+    require_motion(record)
+    require_two_directions(record, settings.published_window)
+    require_travel(record, valve)
+    require_stem_between_stops(record, valve)
     has_spring = settings.fixed.get("spring_constant") != 0.0
     if has_spring:
-        require_related_signals(recording)
-    published, warnings = _published(recording, valve, settings)
-    start_settings = replace(settings, window=window or fitting_window(recording, settings.order))
-    if not has_spring:
-        return _without_spring(recording, valve, start_settings, published, warnings)
-    mass = settings.fixed.get("mass", settings.assumed_mass)
-    start_settings = replace(start_settings, fixed={**settings.fixed, "mass": mass})
-    start = identify(recording, valve, start_settings)
+        require_related_signals(record)
+    published, warnings = _published(record, valve, settings)
+    window = settings.derivative_window or record.fitting_window(settings.order)
+    start_settings = replace(settings, derivative_window=window)
+    if has_spring:
+        mass = settings.fixed.get("mass", settings.assumed_mass)
+        start_settings = replace(start_settings, fixed={**settings.fixed, "mass": mass})
+    start = published_fit(record, valve, start_settings)
+    regression = regression_uncertainty(record, start)
+    outcome = (
+        _refined(record, valve, settings, start.estimate)
+        if has_spring
+        else _regressed(start.estimate, regression, start_settings)
+    )
+    estimate = published or start.estimate
+    beside = () if published is None else published.warnings
+    notes = [f"published estimate: {warning}" for warning in beside]
+    return Result(
+        method=METHOD,
+        recording=recording,
+        valve=valve,
+        settings=settings,
+        parameters=with_published(outcome.parameters, published),
+        fit=regression.fit if outcome.misfit is None else outcome.misfit.fit,
+        rms=math.nan if outcome.misfit is None else outcome.misfit.rms,
+        misfit=outcome.misfit,
+        derivative_window=window,
+        warnings=tuple(dict.fromkeys([*warnings, *outcome.warnings, *notes])),
+        evidence=sweep_evidence(estimate),
+        findings=(
+            _finding(outcome.misfit, regression.fit, valve),
+            f"{sweep_finding(estimate)}; refined from {window}",
+        ),
+        model=outcome.model,
+        estimate=estimate,
+        stem=outcome.stem,
+    )
+
+
+class _Outcome(NamedTuple):
+    """What a refinement, or without a spring a regression, comes to."""
+
+    parameters: Mapping[str, Parameter]
+    misfit: Misfit | None
+    warnings: Sequence[str]
+    model: KarnoppParameters | None
+    stem: StemComparison | None
+
+
+def _refined(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings, start: Estimate
+) -> _Outcome:
+    """Refine the model from `start` on, and test it."""
     problem = OutputError(
-        condition(recording),
+        condition(record),
         valve,
         settings.position_bias,
         settings.fixed.get("static_friction"),
     )
     refinement = with_demanded(
-        problem,
-        _coordinates(start, recording),
-        _free_names(settings),
-        _candidates(settings),
+        problem, _coordinates(start, record), _free_names(settings), _candidates(settings)
     )
     misfit = misfit_of(refinement)
     if misfit.is_gross:
@@ -170,55 +160,52 @@ def assess(
             f"{misfit.systematic * 1e3:.2g} mm of misfit): check for the wrong valve, clocks far "
             "apart, or a packing that changed meanwhile (then clear the buffer and record anew)"
         )
+    warnings = []
     if not misfit.describes:
         warnings.append(
             f"the Karnopp model does not describe this valve: {misfit.systematic * 1e6:.3g} µm "
             "between the simulated and the measured stem are not noise"
         )
-    if OFFSET in refinement.names:
-        offset = refinement.coordinates[OFFSET]
+    if CLOCK_OFFSET in refinement.names:
+        offset = refinement.coordinates[CLOCK_OFFSET]
         warnings.append(
             f"the stamps of the stem are {abs(offset) * 1e3:.3g} ms "
             f"{'late' if offset > 0 else 'early'} against those of the pressure: check the clocks"
         )
-    return SweepAssessment(
-        MappingProxyType(judge_refinement(refinement, misfit, settings)),
-        published,
+    conditioned = problem.record
+    return _Outcome(
+        judge_refinement(refinement, misfit, settings),
         misfit,
-        tuple(warnings),
-        start,
-        regression_uncertainty(recording, valve, start).fit,
-        refinement,
+        warnings,
+        problem.model(refinement.coordinates),
+        StemComparison(conditioned.sample_period, conditioned.position, refinement.simulated),
     )
 
 
+def _regressed(
+    estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
+) -> _Outcome:
+    """Take the regression as it is: without a spring nothing calls a simulated stem back."""
+    parameters = judge_regression(estimate, regression, settings)
+    return _Outcome(parameters, None, estimate.warnings, possible_model(estimate), None)
+
+
 def _published(
-    recording: Recording, valve: Valve, settings: IdentificationSettings
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
 ) -> tuple[Estimate | None, list[str]]:
     """Identify as published; a refusal there is no more than a warning here."""
     try:
-        return identify(recording, valve, settings), []
+        return published_fit(record, valve, settings).estimate, []
     except RefusalError as refusal:
         return None, [f"the published method has no answer: {refusal}"]
 
 
-def _without_spring(
-    recording: Recording,
-    valve: Valve,
-    settings: IdentificationSettings,
-    published: Estimate | None,
-    warnings: list[str],
-) -> SweepAssessment:
-    estimate = identify(recording, valve, settings)
-    regression = regression_uncertainty(recording, valve, estimate)
-    return SweepAssessment(
-        MappingProxyType(judge_regression(estimate, regression, settings)),
-        published,
-        None,
-        (*warnings, *estimate.warnings),
-        estimate,
-        regression.fit,
-        None,
+def _finding(misfit: Misfit | None, force_fit: float, valve: Valve) -> str:
+    if misfit is None:
+        return f"the regression reproduces {100 * force_fit:.2f} % of the force"
+    return (
+        f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
+        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it are not noise"
     )
 
 
@@ -234,7 +221,7 @@ def _coordinates(start: Estimate, recording: Recording) -> dict[str, float]:
         "stribeck_velocity": 0.0,
         "coulomb_asymmetry": 0.0,
         "viscous_asymmetry": 0.0,
-        OFFSET: 0.0,
+        CLOCK_OFFSET: 0.0,
         START: float(np.median(recording.position[:first])),
     }
 
@@ -262,6 +249,6 @@ def _candidates(settings: IdentificationSettings) -> tuple[str, ...]:
         SLIP: "static_friction" not in settings.fixed,
         "coulomb_asymmetry": known_preload,
         "viscous_asymmetry": True,
-        OFFSET: True,
+        CLOCK_OFFSET: True,
     }
     return tuple(name for name, wanted in candidates.items() if wanted)

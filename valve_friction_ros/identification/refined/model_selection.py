@@ -7,7 +7,6 @@ import numpy as np
 
 from valve_friction_ros.identification.refined.model_test import misfit_of
 from valve_friction_ros.identification.refined.output_error import (
-    OFFSET,
     SLIP,
     Coordinates,
     OutputError,
@@ -20,6 +19,7 @@ from valve_friction_ros.identification.refined.refinement import (
     refine,
 )
 from valve_friction_ros.identification.trust.uncertainty import plain_sandwich
+from valve_friction_ros.identification.units import CLOCK_OFFSET
 
 __all__ = ["with_demanded"]
 
@@ -38,7 +38,7 @@ _SUSPICION = 1.8
 _FRICTIONS = ((1.0, 1.0), (0.7, 1.4), (1.4, 0.7), (1.0, 0.3), (1.0, 2.0))
 """Factors of F_c and F_v to start from."""
 
-_LIKE_PRESLIDING = (OFFSET, "mass")
+_LIKE_PRESLIDING = (CLOCK_OFFSET, "mass")
 """A stem that creeps before it breaks away, as where friction falls it does, looks like one that
 is early, or heavy."""
 
@@ -51,7 +51,7 @@ _SLIP_BIAS = 0.2
 _STRIBECK_SHARES = (0.5, 0.7)
 """Starts for the Stribeck velocity, as shares of the top speed."""
 
-_NEUTRAL = frozenset({SLIP, OFFSET, "coulomb_asymmetry", "viscous_asymmetry"})
+_NEUTRAL = frozenset({SLIP, CLOCK_OFFSET, "coulomb_asymmetry", "viscous_asymmetry"})
 """Parts of the model that are absent at zero."""
 
 _PROMISING = 0.9
@@ -156,7 +156,7 @@ def with_demanded(
         refinement = _slipping(refinement, start)
     if not misfit_of(refinement).describes:
         refinement = _from_elsewhere(problem, {**start, SLIP: 0.0}, names)
-        if OFFSET in candidates:
+        if CLOCK_OFFSET in candidates:
             refinement = _with_offset(refinement, start)
         if may_slip:
             refinement = _with_slip(refinement, start)
@@ -208,7 +208,7 @@ def _is_sure(trial: Refinement, name: str, before: float) -> bool:
     change = abs(value - before)
     deviation = _deviation(trial, name)
     error = abs(value / deviation) if deviation else math.inf
-    needed = _OFFSET_SIGNIFICANCE if name == OFFSET else _SIGNIFICANCE
+    needed = _OFFSET_SIGNIFICANCE if name == CLOCK_OFFSET else _SIGNIFICANCE
     return change > needed * error and change > _least(trial, name)
 
 
@@ -241,7 +241,7 @@ def _is_slip(refinement: Refinement) -> bool:
 
 def _least(refinement: Refinement, name: str) -> float:
     """Return the size below which a part of the model is of no consequence, however sure."""
-    if name == OFFSET:
+    if name == CLOCK_OFFSET:
         return max(_LEAST_OFFSET, 0.5 * refinement.problem.record.sample_period)
     if name == SLIP:
         return _LEAST_SLIP * refinement.coordinates["coulomb_friction"]
@@ -285,19 +285,19 @@ def _nearest(problem: OutputError, candidates: Sequence[Coordinates]) -> list[Co
 def _with_offset(plain: Refinement, start: Coordinates) -> Refinement:
     """Try clocks that differ; keep the best if it halves the misfit and surely is there."""
     problem = plain.problem
-    starts = _nearest(problem, [{**start, SLIP: 0.0, OFFSET: offset} for offset in _OFFSETS])
-    names = (*plain.names, OFFSET)
+    starts = _nearest(problem, [{**start, SLIP: 0.0, CLOCK_OFFSET: offset} for offset in _OFFSETS])
+    names = (*plain.names, CLOCK_OFFSET)
     fitted = [least_squares_fit(problem, one, names) for one in starts[:_OFFSETS_TRIED]]
     trial = refine(problem, _nearest(problem, fitted)[0], names)
     improved = misfit_of(trial).systematic < _IMPROVEMENT * misfit_of(plain).systematic
-    return trial if improved and _is_sure(trial, OFFSET, 0.0) else plain
+    return trial if improved and _is_sure(trial, CLOCK_OFFSET, 0.0) else plain
 
 
 def _slipping(plain: Refinement, start: Coordinates) -> Refinement:
     """Try a slip jump; keep it if it surely is there."""
     problem = plain.problem
     names = (*plain.names, SLIP)
-    offset = {OFFSET: plain.coordinates[OFFSET]}
+    offset = {CLOCK_OFFSET: plain.coordinates[CLOCK_OFFSET]}
     starts = [
         {**start, **offset},
         *_falling_starts(plain.coordinates, plain.top_speed, 0.0),

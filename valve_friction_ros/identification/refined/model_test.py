@@ -1,58 +1,16 @@
 """Whether the identified model describes the valve at all."""
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 
 from valve_friction_ros.identification.refined.refinement import Refinement
+from valve_friction_ros.identification.trust.misfit import Misfit
 
-__all__ = ["Misfit", "misfit_of"]
+__all__ = ["misfit_of"]
 
 _NOISE_SHARE = 0.2
 _MOVED_SHARE = 1.0
-_EXPECTED_SHARE = 0.75
-_GROSS = 0.9
 _LEAST = 2e-4
 """Misfit tolerated in any case, as a share of the stem's movement."""
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How well the simulated stem follows the measured one.
-
-    Attributes
-    ----------
-    fit : float
-        Share of the movement that is reproduced, at most 1.
-    rms : float
-        Root mean square of the whole residual, sensor noise included, m.
-    systematic : float
-        What of it the sensors' noise does not explain, m.
-    tolerated : float
-        The largest systematic misfit that still counts as the noise's doing, m.
-    """
-
-    fit: float
-    rms: float
-    systematic: float
-    tolerated: float
-
-    @property
-    def excess(self) -> float:
-        """Systematic misfit beyond what chance makes of it, m."""
-        expected = _EXPECTED_SHARE * self.tolerated
-        return math.sqrt(max(self.systematic**2 - expected**2, 0.0))
-
-    @property
-    def is_gross(self) -> bool:
-        """Whether so little of the movement is reproduced that no number means anything."""
-        return self.fit < _GROSS and not self.describes
-
-    @property
-    def describes(self) -> bool:
-        """Whether the model describes the valve."""
-        return self.systematic <= self.tolerated
 
 
 def misfit_of(refinement: Refinement) -> Misfit:

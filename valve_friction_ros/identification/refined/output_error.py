@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.simulation import StemState, simulate
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.conditioned_record import ConditionedRecord
 
-__all__ = ["OFFSET", "SLIP", "START", "Coordinates", "OutputError"]
+__all__ = ["SLIP", "START", "Coordinates", "OutputError"]
 
 SLIP = "slip_force"
 """F_s − F_c, in whose terms F_s is refined: it cannot be negative."""
@@ -19,17 +20,16 @@ SLIP = "slip_force"
 START = "start_position"
 """Position at the first sample, refined beside the parameters."""
 
-OFFSET = "clock_offset"
-"""Time by which the stem's stamps lag behind the pressure's, s."""
-
 Coordinates = Mapping[str, float]
-"""Value of every parameter of the model, with `SLIP` in place of F_s, of `START` and `OFFSET`."""
+"""Value of every parameter of the model, `SLIP` in place of F_s, `START` and `CLOCK_OFFSET`."""
 
 _STEP = 1e-2
 """Step of the differences, over the natural size: wide enough to look past single stick events."""
-_SIGNED = frozenset({"spring_preload", "coulomb_asymmetry", "viscous_asymmetry", START, OFFSET})
+_SIGNED = frozenset(
+    {"spring_preload", "coulomb_asymmetry", "viscous_asymmetry", START, CLOCK_OFFSET}
+)
 _FORCES = frozenset({"coulomb_friction", "spring_preload", SLIP})
-_UNITY = frozenset({"coulomb_asymmetry", "viscous_asymmetry", OFFSET})
+_UNITY = frozenset({"coulomb_asymmetry", "viscous_asymmetry", CLOCK_OFFSET})
 _LARGEST_ASYMMETRY = 0.95
 _LEAST_MASS = 1e-3
 _UNIT_MASS = 1.0
@@ -86,9 +86,9 @@ class OutputError:
         stops = (0.0, travel) if np.isfinite(travel) else (-np.inf, np.inf)
         start = StemState(float(np.clip(at[START], *stops)))
         period = self.record.sample_period
-        if at[OFFSET] != 0:
+        if at[CLOCK_OFFSET] != 0:
             place = np.arange(pressure.size, dtype=np.float64)
-            pressure = np.interp(place - at[OFFSET] / period, place, pressure)
+            pressure = np.interp(place - at[CLOCK_OFFSET] / period, place, pressure)
         return simulate(self.valve, self.model(at), pressure, period, start).position
 
     def residual(self, at: Coordinates, pressure: NDArray[np.float64]) -> NDArray[np.float64]:

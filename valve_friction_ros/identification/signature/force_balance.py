@@ -1,17 +1,12 @@
-"""Method "force_balance": the paper's model 2, from the force balances of a valve signature."""
+"""Method "signature": the paper's model 2, from the force balances of a valve signature."""
 
 import math
-from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from valve_friction_ros.identification.assessment import Assessment
-from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
-from valve_friction_ros.identification.published.estimate import UNITS
+from valve_friction_ros.identification.identified_model import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import (
     TRIANGLE_NEEDED,
@@ -34,18 +29,23 @@ from valve_friction_ros.identification.trust.excitation import (
 )
 from valve_friction_ros.identification.trust.jackknife import Jackknife, jackknife
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
+from valve_friction_ros.identification.trust.misfit import percentage, stem_distance
 from valve_friction_ros.identification.trust.uncertainty import half_width
 from valve_friction_ros.identification.trust.verdict import (
-    AssessedParameter,
+    Parameter,
     fixed,
     judged,
     not_identifiable,
 )
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import measured
 
-__all__ = ["ForceBalanceAssessment", "assess_force_balance"]
+__all__ = ["METHOD", "identify_signature"]
+
+METHOD = "signature"
+"""Name of this method."""
 
 _FEWEST_EACH_WAY = 2
 _SURE = 4.0
@@ -60,62 +60,11 @@ _STIFFNESS_BIAS = 2e-3
 """Shares by which F_s at the breakaway points, and k, can be wrong alike in every stroke."""
 
 
-@dataclass(frozen=True, eq=False)
-class ForceBalanceAssessment(Assessment):
-    """The paper's model 2.
-
-    Attributes
-    ----------
-    signature : ValveSignature
-        The breakaway points, k, x̄ and dead zone behind it.
-    identified : IdentifiedModel
-        The model, with what stands in for numbers that are not identifiable.
-    validation : Validation
-        The same record simulated with it.
-    """
-
-    method: ClassVar[str] = "force_balance"
-
-    signature: ValveSignature
-    identified: IdentifiedModel
-    validation: Validation = field(repr=False)
-
-    @property
-    def fit(self) -> float:
-        """Share of the stem's movement in the record that the model reproduces."""
-        return self.validation.fit
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of simulated less measured position, m."""
-        return self.validation.rms
-
-    @property
-    def window(self) -> int:
-        """Derivative window of the velocity, samples."""
-        return self.signature.window
-
-    @property
-    def sweep(self) -> None:
-        """There is none."""
-        return
-
-    @property
-    def simulated(self) -> NDArray[np.float64]:
-        """Position of the model's stem, m, shape (n,)."""
-        return self.validation.simulated
-
-    def model(self) -> KarnoppParameters:
-        """Return the identified model, with what stands in for missing numbers."""
-        return self.identified.parameters
-
-
-def assess_force_balance(
+def identify_signature(
     recording: Recording,
     valve: Valve,
     settings: IdentificationSettings | None = None,
-    window: int | None = None,
-) -> ForceBalanceAssessment:
+) -> Result:
     """Identify a valve signature by force balances, as the paper's model 2.
 
     k is the mean of (15), x̄ follows from (14), F_s from (11) and (12) at the breakaway points,
@@ -130,13 +79,12 @@ def assess_force_balance(
     valve : Valve
         Geometry.
     settings : IdentificationSettings, optional
-        Fixed parameters, position bias and assumed mass; the sweep's settings do not matter here.
-    window : int, optional
-        Derivative window of the velocity, samples, odd; by default the noise chooses it.
+        Fixed parameters, position bias, assumed mass and derivative window (of the velocity; by
+        default the noise chooses it). The settings of the sweep do not matter here.
 
     Returns
     -------
-    ForceBalanceAssessment
+    Result
         Parameters with intervals and verdicts, and the signature.
 
     Raises
@@ -162,12 +110,13 @@ def assess_force_balance(
     """
     settings = settings or IdentificationSettings()
     if settings.fixed.get("spring_constant") == 0:
-        raise RefusalError("the force balance needs a spring: use the method sweep")
-    require_enough_samples(recording, settings.window)
-    require_motion(recording)
-    require_travel(recording, valve)
-    require_related_signals(recording)
-    signature = valve_signature(recording, valve, window)
+        raise RefusalError("the force balance needs a spring: use the method refined")
+    record = measured(recording)
+    require_enough_samples(record, settings.published_window)
+    require_motion(record)
+    require_travel(record, valve)
+    require_related_signals(record)
+    signature = valve_signature(record, valve, settings.derivative_window)
     ways = [[one for one in way if one.breakaway is not None] for way in signature.ways]
     if min(map(len, ways)) < _FEWEST_EACH_WAY:
         raise RefusalError(
@@ -189,20 +138,52 @@ def assess_force_balance(
         raise RefusalError(
             f"the force balances give an impossible valve: {error}; check both signals"
         ) from None
-    validation = validate(recording, valve, identified.parameters)
+    validation = validate(record, valve, identified.parameters)
     if validation.fit < _LEAST_FIT:
         raise RefusalError(
             f"the model of the force balances does not reproduce the record (fit "
             f"{100 * validation.fit:.0f} %): check what is fixed, both signals and their clocks"
         )
-    return ForceBalanceAssessment(
-        MappingProxyType(parameters),
-        published=None,
+    return Result(
+        method=METHOD,
+        recording=recording,
+        valve=valve,
+        settings=settings,
+        parameters=parameters,
+        fit=validation.fit,
+        rms=validation.rms,
         misfit=None,
+        derivative_window=signature.window,
         warnings=identified.notes,
+        evidence=_evidence(signature),
+        findings=_findings(signature, validation, valve),
+        model=identified.parameters,
         signature=signature,
-        identified=identified,
-        validation=validation,
+        stem=StemComparison(recording.sample_period, recording.position, validation.simulated),
+    )
+
+
+def _evidence(signature: ValveSignature) -> dict[str, object]:
+    return {
+        "position_bias": signature.position_bias,
+        "dead_zone": signature.dead_zone,
+        "dead_zone_share": signature.dead_zone_share,
+        "breakaway_points": [
+            {"direction": stroke.direction, **stroke.breakaway._asdict()}
+            for stroke in signature.strokes
+            if stroke.breakaway is not None
+        ],
+    }
+
+
+def _findings(signature: ValveSignature, validation: Validation, valve: Valve) -> tuple[str, ...]:
+    upward, downward = signature.upward_points, signature.downward_points
+    return (
+        f"fit {100 * validation.fit:.2f} %: the model's stem is "
+        f"{stem_distance(validation.rms, valve)}",
+        f"signature: {len(upward)} strokes up and {len(downward)} down, bias x̄ "
+        f"{signature.position_bias * 1e3:.4g} mm, dead zone {signature.dead_zone * 1e-3:.4g} kPa, "
+        f"{percentage(signature.dead_zone_share)} of the pressure's span",
     )
 
 
@@ -259,9 +240,7 @@ def _viscous_friction(
     return float(np.mean(means))
 
 
-def _judged(
-    found: Jackknife, ways: Ways, settings: IdentificationSettings
-) -> dict[str, AssessedParameter]:
+def _judged(found: Jackknife, ways: Ways, settings: IdentificationSettings) -> dict[str, Parameter]:
     """Judge every parameter by its scatter between strokes and the bias of the method."""
     values, errors = found.values, found.standard_errors
     speed = sliding_speed(ways)

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.derivatives import differentiate
 from valve_friction_ros.identification.signature.onset import fit_onset
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.derivative_window import fitting_window
-from valve_friction_ros.signals.noise import position_noise, velocity_noise
+from valve_friction_ros.signals.derivatives import differentiate
+from valve_friction_ros.signals.measured_record import measured
+from valve_friction_ros.signals.noise import velocity_noise
 
 __all__ = ["BreakawayPoint", "SignatureStroke", "Sliding", "find_strokes", "velocity_window"]
 
@@ -128,12 +128,12 @@ def _usual_speed(speed: NDArray[np.float64]) -> float:
 
 def velocity_window(recording: Recording) -> int:
     """Return a derivative window, samples, that leaves hardly any noise on the usual speed."""
-    noise, period = position_noise(recording.position), recording.sample_period
-    window = fitting_window(recording, _ORDER)
+    record, period = measured(recording), recording.sample_period
+    window = record.fitting_window(_ORDER)
     while window <= len(recording) // _SHORTEST_RECORD:
-        velocity = differentiate(recording.position, period, window, _ORDER).velocity
+        velocity = record.derivatives(window, _ORDER).velocity
         allowed = _VELOCITY_NOISE * _usual_speed(np.abs(velocity))
-        if velocity_noise(noise, period, window, _ORDER) <= allowed:
+        if velocity_noise(record.white_noise, period, window, _ORDER) <= allowed:
             break
         window = (3 * window // 2) | 1
     return window
@@ -164,7 +164,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
     force = valve.actuator_force(recording.pressure)
     if len(recording) < window:
         return ()
-    velocity, _, margin = differentiate(position, period, window, _ORDER)
+    velocity, _, margin = measured(recording).derivatives(window, _ORDER)
     force_rate, _, _ = differentiate(force, period, window, _ORDER)
     speed = np.abs(velocity)
     usual = _usual_speed(speed)

@@ -12,8 +12,7 @@ from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.conditioned_record import smoothed_pressure
-from valve_friction_ros.signals.derivative_window import fitting_window
-from valve_friction_ros.signals.noise import position_noise
+from valve_friction_ros.signals.measured_record import measured
 
 __all__ = ["Validation", "measured_start", "validate"]
 
@@ -70,14 +69,15 @@ def measured_start(recording: Recording, valve: Valve) -> StemState:
     A straight line through the first samples, as many as the noise asks for and 0.1 s at the
     most, gives position and velocity; a slope that the noise could make counts as rest.
     """
+    record = measured(recording)
     longest = max(round(_START_TIME / recording.sample_period), 2)
-    count = min(fitting_window(recording, _START_ORDER), longest, len(recording))
+    count = min(record.fitting_window(_START_ORDER), longest, len(recording))
     position = recording.position[:count]
     place = np.arange(count) - (count - 1) / 2
     spread = float(place @ place)
     slope = float(place @ position) / spread
     level = float(position.mean())
-    if abs(slope) <= _MOVES * position_noise(recording.position) / np.sqrt(spread):
+    if abs(slope) <= _MOVES * record.white_noise / np.sqrt(spread):
         slope = 0.0
     start = level + slope * place[0]
     stops = (0.0, valve.travel) if np.isfinite(valve.travel) else (-np.inf, np.inf)
@@ -118,12 +118,13 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
         raise RefusalError(
             "a model without a spring cannot be validated: its simulated stem drifts away"
         )
-    require_motion(recording)
+    record = measured(recording)
+    require_motion(record)
     trajectory = simulate(
         valve,
         parameters,
-        smoothed_pressure(recording),
+        smoothed_pressure(record),
         recording.sample_period,
-        measured_start(recording, valve),
+        measured_start(record, valve),
     )
     return Validation(recording, trajectory.position)

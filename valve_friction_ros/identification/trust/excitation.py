@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.noise import position_noise
+from valve_friction_ros.signals.measured_record import measured
 
 __all__ = [
     "require_enough_samples",
@@ -40,9 +40,9 @@ def require_enough_samples(recording: Recording, window: int) -> None:
 
 
 def require_motion(recording: Recording) -> None:
-    """Refuse a recording whose stem did not move beyond its own noise (`position_noise`)."""
+    """Refuse a recording whose stem did not move beyond its own noise."""
     span = float(np.ptp(recording.position))
-    noise = position_noise(recording.position)
+    noise = measured(recording).white_noise
     if span == 0 or span < _MOTION_OVER_NOISE * noise:
         raise RefusalError(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
@@ -77,7 +77,7 @@ def require_two_directions(recording: Recording, window: int) -> None:
     """
     means = len(recording) // window
     position = recording.position[: means * window].reshape(means, window).mean(axis=1)
-    noise = position_noise(recording.position) / np.sqrt(window)
+    noise = measured(recording).white_noise / np.sqrt(window)
     up, down = _distances(position, _MOTION_OVER_NOISE * noise)
     if min(up, down) < _LEAST_SHARE_OF_DIRECTION * (up + down):
         way = "up" if up > down else "down"
@@ -111,7 +111,7 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
     travel = valve.travel
     if not np.isfinite(travel):
         return
-    reach = max(5 * position_noise(recording.position), 1e-3 * travel)
+    reach = max(5 * measured(recording).white_noise, 1e-3 * travel)
     for name, distance in (
         ("lower", np.abs(recording.position)),
         ("upper", np.abs(recording.position - travel)),

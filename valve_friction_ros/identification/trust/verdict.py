@@ -4,7 +4,9 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
-__all__ = ["WEAK_SHARE", "AssessedParameter", "Verdict", "fixed", "judged", "not_identifiable"]
+from valve_friction_ros.identification.units import PARAMETER_UNITS
+
+__all__ = ["WEAK_SHARE", "Parameter", "Verdict", "fixed", "judged", "not_identifiable"]
 
 WEAK_SHARE = 0.05
 """An interval that reaches further than this share of the value makes it weak."""
@@ -20,7 +22,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True)
-class AssessedParameter:
+class Parameter:
     """A parameter with its interval and its verdict.
 
     Attributes
@@ -40,6 +42,8 @@ class AssessedParameter:
     magnitude_bound : float
         Of a value that is withheld for its wide interval the largest magnitude in that interval,
         SI unit; else nan.
+    published : float
+        What the published method finds for it, SI unit; nan where it has no answer.
     """
 
     name: str
@@ -49,6 +53,12 @@ class AssessedParameter:
     verdict: Verdict
     reason: str = ""
     magnitude_bound: float = math.nan
+    published: float = math.nan
+
+    @property
+    def unit(self) -> str:
+        """SI unit, as written for people."""
+        return PARAMETER_UNITS.get(self.name, "")
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -58,37 +68,37 @@ class AssessedParameter:
 
 def judged(
     name: str, value: float, standard_error: float, half_width: float, doubt: str = ""
-) -> AssessedParameter:
+) -> Parameter:
     """Judge a value by the width of its interval.
 
     Parameters
     ----------
     name, value, standard_error, half_width
-        As in `AssessedParameter`.
+        As in `Parameter`.
     doubt : str
         A reason, if there is one, why the value cannot be more than weak, however narrow its
         interval is; otherwise the width of the interval is the reason.
 
     Returns
     -------
-    AssessedParameter
+    Parameter
         Identified, weak beyond `WEAK_SHARE` of the value, not identifiable beyond the value.
     """
     share = half_width / abs(value) if value else math.inf
     if share <= WEAK_SHARE and not doubt:
-        return AssessedParameter(name, value, standard_error, half_width, Verdict.IDENTIFIED)
+        return Parameter(name, value, standard_error, half_width, Verdict.IDENTIFIED)
     if share < 1:
         reason = doubt or f"its interval is ±{100 * share:.2g} % of its value"
-        return AssessedParameter(name, value, standard_error, half_width, Verdict.WEAK, reason)
+        return Parameter(name, value, standard_error, half_width, Verdict.WEAK, reason)
     reason = doubt or "its interval is wider than its value"
     return replace(not_identifiable(name, reason), magnitude_bound=abs(value) + half_width)
 
 
-def not_identifiable(name: str, reason: str) -> AssessedParameter:
+def not_identifiable(name: str, reason: str) -> Parameter:
     """Withhold a value that means nothing, with the reason."""
-    return AssessedParameter(name, math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, reason)
+    return Parameter(name, math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, reason)
 
 
-def fixed(name: str, value: float, reason: str = "given") -> AssessedParameter:
+def fixed(name: str, value: float, reason: str = "given") -> Parameter:
     """Pass on a value that was given."""
-    return AssessedParameter(name, value, 0.0, 0.0, Verdict.FIXED, reason)
+    return Parameter(name, value, 0.0, 0.0, Verdict.FIXED, reason)

@@ -16,7 +16,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.health import FrictionMonitor, identify_snapshot
-from valve_friction_ros.identification import Assessment, RefusalError
+from valve_friction_ros.identification import RefusalError, Result
 from valve_friction_ros.model import compile_kernels
 from valve_friction_ros.nodes.identifier.keeping import Job, Keeping
 from valve_friction_ros.nodes.identifier.parameters import (
@@ -151,7 +151,7 @@ class Identifier(Node):
         else:
             self._begin(self._conclude_scheduled)
 
-    def _begin(self, conclude: "Callable[[ThreadFuture[Assessment], Job], None]") -> None:
+    def _begin(self, conclude: "Callable[[ThreadFuture[Result], Job], None]") -> None:
         """Identify a copy of the buffer in the worker, then conclude in the executor's thread."""
         self._inputs.flush()
         self._identifying = True
@@ -170,7 +170,7 @@ class Identifier(Node):
         submitted = self._worker.submit(guarded(work), *arguments)
         submitted.add_done_callback(lambda done: executor.create_task(conclude, done))
 
-    def _conclude(self, done: "ThreadFuture[Assessment]", job: Job, answer: Future) -> None:
+    def _conclude(self, done: "ThreadFuture[Result]", job: Job, answer: Future) -> None:
         """Take over what was asked for, and answer when it has been kept."""
         self._identifying = False
         response = Trigger.Response()
@@ -191,7 +191,7 @@ class Identifier(Node):
 
         self._keeping.keep(job, respond)
 
-    def _conclude_scheduled(self, done: "ThreadFuture[Assessment]", job: Job) -> None:
+    def _conclude_scheduled(self, done: "ThreadFuture[Result]", job: Job) -> None:
         """Take over a success; a record that cannot be identified leaves everything as it is."""
         self._identifying = False
         try:
@@ -202,7 +202,7 @@ class Identifier(Node):
             self._schedule.succeed()
             self._keeping.keep(job, self._publish_diagnostics)
 
-    def _accept(self, assessment: Assessment, job: Job) -> None:
+    def _accept(self, assessment: Result, job: Job) -> None:
         now = self.get_clock().now().nanoseconds
         self._monitor.accept(assessment, now)
         self._reporting.remember(job, assessment, now)

@@ -114,14 +114,13 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     return MonitorSettings(
         valve=valve_from(values),
         identification=IdentificationSettings(
-            window=values["derivative_window"] or _DEFAULTS.window,
+            derivative_window=values["derivative_window"] or None,
             order=values["polynomial_order"],
             fixed={name: value for name, value in fixed.items() if value is not None},
             position_bias=optional(values["position_bias"]),
             assumed_mass=values["assumed_mass"],
         ),
         method=values["method"],
-        derivative_window=values["derivative_window"] or None,
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),
         baseline=None if baseline is None else Baseline(baseline),
         window=values["window"],

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor
-from valve_friction_ros.identification import Assessment, RefusalError
+from valve_friction_ros.identification import RefusalError, Result
 from valve_friction_ros.nodes.identifier.keeping import Job
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
 from valve_friction_ros.records.data_folder import data_folder
@@ -28,7 +28,7 @@ class _Estimate(NamedTuple):
     """The last estimate, what it was identified from and how, and when (ns)."""
 
     job: Job
-    assessment: Assessment
+    result: Result
     stamp: int
 
 
@@ -48,9 +48,9 @@ class Reporting:
         self._monitor = monitor
         self._last: _Estimate | None = None
 
-    def remember(self, job: Job, assessment: Assessment, stamp: int) -> None:
+    def remember(self, job: Job, result: Result, stamp: int) -> None:
         """Keep an estimate accepted at `stamp` (ns), in place of the one before."""
-        self._last = _Estimate(job, assessment, stamp)
+        self._last = _Estimate(job, result, stamp)
 
     def writing(self) -> Callable[[], Path]:
         """Return what writes the report of the last estimate, in any thread.
@@ -84,11 +84,7 @@ class Reporting:
                 record = reports.IdentifiedRecord(
                     name=valve,
                     source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
-                    recording=last.job.snapshot.recording(),
-                    valve=last.job.settings.valve,
-                    assessment=last.assessment,
-                    settings=last.job.settings.identification,
-                    derivative_window=last.job.settings.derivative_window,
+                    result=last.result,
                     baseline=baseline,
                     limits=limits,
                     notes=() if refusal is None else (f"a later record was refused: {refusal}",),

@@ -4,7 +4,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
 
 from valve_friction_ros.health import FrictionMonitor, dead_band
-from valve_friction_ros.identification import UNITS, Assessment
+from valve_friction_ros.identification import UNITS, Result
 from valve_friction_ros.nodes.plumbing.messages import sweep_message
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
@@ -22,7 +22,7 @@ _FIGURES = (
 
 
 class ResultTopics:
-    """Publishes each number of an assessment on a topic of its own, and the sweep.
+    """Publishes each number of an result on a topic of its own, and the sweep.
 
     Parameters
     ----------
@@ -41,26 +41,25 @@ class ResultTopics:
         )
         self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
 
-    def publish(self, assessment: Assessment, monitor: FrictionMonitor) -> None:
-        """Publish an assessment that the monitor has accepted."""
+    def publish(self, result: Result, monitor: FrictionMonitor) -> None:
+        """Publish an result that the monitor has accepted."""
         ratio = monitor.diagnosis().ratio
-        published = assessment.published
+        evidence = result.evidence
         unknown = float("nan")
         figures = {
-            **assessment.values,
-            "dead_band": dead_band(assessment, monitor.settings.valve),
+            **result.values,
+            "dead_band": dead_band(result, monitor.settings.valve),
             "coulomb_friction_ratio": unknown if ratio is None else ratio.value,
-            "fit": assessment.fit,
-            "rms": assessment.rms,
-            "threshold": unknown if published is None else published.threshold,
-            "sigma": unknown if published is None else published.sigma,
-            "r_squared": unknown if published is None else published.r_squared,
+            "fit": result.fit,
+            "rms": result.rms,
+            **{name: evidence.get(name, unknown) for name in ("threshold", "sigma", "r_squared")},
         }
         for name, publisher in self._friction.items():
             publisher.publish(Float64(data=figures[name]))
         for name, publisher in self._half_width.items():
-            publisher.publish(Float64(data=assessment.parameters[name].half_width))
+            publisher.publish(Float64(data=result.parameters[name].half_width))
         for name, publisher in self._published.items():
-            value = unknown if published is None else published.values[name]
-            publisher.publish(Float64(data=value))
-        self._sweep.publish(sweep_message(assessment.sweep))
+            publisher.publish(Float64(data=result.parameters[name].published))
+        self._sweep.publish(
+            sweep_message(None if result.estimate is None else result.estimate.sweep)
+        )

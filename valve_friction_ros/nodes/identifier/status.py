@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from valve_friction_ros.health import FrictionMonitor, Level, StatusSignal, dead_band
 from valve_friction_ros.history import Trend
-from valve_friction_ros.identification import ASSESSED_UNITS, UNITS, Assessment
+from valve_friction_ros.identification import PARAMETER_UNITS, Result
 
 __all__ = ["friction_status", "trend_values"]
 
@@ -17,35 +17,35 @@ def _number(value: float) -> str:
     return f"{value:.9g}"
 
 
-def _assessed_values(assessment: Assessment, monitor: FrictionMonitor) -> dict[str, str]:
+def _assessed_values(result: Result, monitor: FrictionMonitor) -> dict[str, str]:
     values: dict[str, str] = {}
-    published = assessment.published
-    for name, one in assessment.parameters.items():
-        unit = ASSESSED_UNITS[name]
+    for name, one in result.parameters.items():
+        unit = PARAMETER_UNITS[name]
         values[f"{name} [{unit}]"] = _number(one.value)
         values[f"{name} half width [{unit}]"] = _number(one.half_width)
         values[f"{name} verdict"] = one.verdict.value
         if one.reason:
             values[f"{name} reason"] = one.reason
-        if published is not None and name in UNITS:
-            values[f"{name} published [{unit}]"] = _number(published.values[name])
-    share = dead_band(assessment, monitor.settings.valve)
+        if math.isfinite(one.published):
+            values[f"{name} published [{unit}]"] = _number(one.published)
+    share = dead_band(result, monitor.settings.valve)
     if math.isfinite(share):
         values["dead_band [%]"] = _number(100 * share)
-    if math.isfinite(assessment.rms):
-        values["fit [%]"] = _number(100 * assessment.fit)
-        values["rms [µm]"] = _number(1e6 * assessment.rms)
-    if assessment.misfit is not None:
-        values["systematic misfit [µm]"] = _number(1e6 * assessment.misfit.systematic)
-    values["method"] = assessment.method
-    values["derivative_window [samples]"] = str(assessment.window)
-    if published is not None:
-        values["threshold [m/s]"] = _number(published.threshold)
-        values["samples"] = str(published.samples)
-        values["sigma [N]"] = _number(published.sigma)
-        values["r_squared"] = _number(published.r_squared)
+    if math.isfinite(result.rms):
+        values["fit [%]"] = _number(100 * result.fit)
+        values["rms [µm]"] = _number(1e6 * result.rms)
+    if result.misfit is not None:
+        values["systematic misfit [µm]"] = _number(1e6 * result.misfit.systematic)
+    values["method"] = result.method
+    values["derivative_window [samples]"] = str(result.derivative_window)
+    estimate = result.estimate
+    if estimate is not None:
+        values["threshold [m/s]"] = _number(estimate.threshold)
+        values["samples"] = str(estimate.samples)
+        values["sigma [N]"] = _number(estimate.sigma)
+        values["r_squared"] = _number(estimate.r_squared)
     values["fixed"] = ", ".join(monitor.settings.identification.fixed)
-    values["warnings"] = "; ".join(assessment.all_warnings)
+    values["warnings"] = "; ".join(result.warnings)
     return values
 
 
@@ -108,8 +108,8 @@ def friction_status(
         level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
     elif upkeep_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
-    assessment = monitor.assessment
-    friction = None if assessment is None else assessment.parameters["coulomb_friction"]
+    result = monitor.result
+    friction = None if result is None else result.parameters["coulomb_friction"]
     valid = friction is not None and math.isfinite(friction.value) and monitor.refusal is None
     reason = monitor.refusal or ("" if friction is None or valid else friction.reason)
     values: dict[str, str] = {
@@ -117,9 +117,9 @@ def friction_status(
         "reason": reason,
         "NE 107": signal.value,
     }
-    if assessment is not None and monitor.stamp is not None:
+    if result is not None and monitor.stamp is not None:
         values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
-        values |= _assessed_values(assessment, monitor)
+        values |= _assessed_values(result, monitor)
     if monitor.baseline is not None:
         values["baseline_coulomb_friction [N]"] = _number(monitor.baseline.coulomb_friction)
         values["baseline half width [N]"] = _number(monitor.baseline.half_width)

@@ -67,7 +67,7 @@ def _excitations(low: BenchResult) -> Iterator[Check]:
 
 
 def _signature(low: BenchResult, high: BenchResult) -> Iterator[Check]:
-    zones = [one.identified.force_balance.signature.dead_zone for one in (low, high)]
+    zones = [one.identified.signature.dead_zone for one in (low, high)]
     ratio = zones[1] / zones[0]
     yield compared(
         2,
@@ -104,7 +104,7 @@ def _signature(low: BenchResult, high: BenchResult) -> Iterator[Check]:
 
 def _bias(low: BenchResult, high: BenchResult) -> Iterator[Check]:
     for one in (low, high):
-        name, signature = one.bench.name, one.identified.force_balance.signature
+        name, signature = one.bench.name, one.identified.signature
         yield within(
             3,
             f"(16), k of (15), {name}",
@@ -116,7 +116,7 @@ def _bias(low: BenchResult, high: BenchResult) -> Iterator[Check]:
             f"{100 * (2.05e5 / paper.SIGNATURE_SPRING[name] - 1):.1f} % above the paper's (16)",
         )
     for one in (low, high):
-        name, bias = one.bench.name, one.identified.force_balance.signature.position_bias
+        name, bias = one.bench.name, one.identified.signature.position_bias
         published = paper.SIGNATURE_BIAS[name]
         matched = abs(bias - published) <= 0.05e-3
         yield compared(

@@ -83,10 +83,10 @@ def input_output_figure(low: BenchResult, high: BenchResult) -> Figure:
         bottom.plot(
             time, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2, label="measured"
         )
-        if model.simulated is not None:
-            spread = np.linspace(0, recording.duration, model.simulated.size)
-            few = thinned(spread.size)
-            bottom.plot(spread[few], model.simulated[few] * 1e3, "k:", lw=1.3, label="estimated")
+        if model.stem is not None:
+            few = thinned(model.stem.simulated.size)
+            simulated = model.stem.simulated[few] * 1e3
+            bottom.plot(model.stem.time[few], simulated, "k:", lw=1.3, label="estimated")
         top.set_title(packing_name(result))
         bottom.set_xlabel("time [s]")
     panels[0, 0].set_ylabel("pressure [kPa]")
@@ -102,7 +102,7 @@ def signatures_figure(*results: BenchResult) -> Figure:
     axes = figure.subplots()
     for result, colour in zip(results, COLOURS, strict=False):
         recording = result.experiments.triangle.measured
-        signature = result.identified.force_balance.signature
+        signature = result.identified.signature
         some = thinned(len(recording))
         zone = signature.dead_zone / 1e3
         axes.plot(
@@ -126,7 +126,7 @@ def signatures_figure(*results: BenchResult) -> Figure:
 
 def _draw_dead_zone(axes: Axes, result: BenchResult, colour: str) -> None:
     """Draw an arrow across the loop in the middle of its height, as wide as the dead zone."""
-    signature = result.identified.force_balance.signature
+    signature = result.identified.signature
     position = result.experiments.triangle.measured.position
     height = 0.5 * float(position.min() + position.max())
     height += 0.05 * float(np.ptp(position)) * (1 if result.bench.name == "low" else -1)

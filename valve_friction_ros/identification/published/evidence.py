@@ -1,0 +1,42 @@
+"""What a result tells of the published sweep beside its parameters."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.identification.units import UNITS
+
+__all__ = ["sweep_evidence", "sweep_finding", "with_published"]
+
+
+def sweep_evidence(estimate: Estimate) -> dict[str, float | int]:
+    """Return the figures of the chosen threshold, SI units."""
+    return {
+        "threshold": estimate.threshold,
+        "samples": estimate.samples,
+        "sigma": estimate.sigma,
+        "r_squared": estimate.r_squared,
+        "published_window": estimate.settings.published_window,
+    }
+
+
+def sweep_finding(estimate: Estimate) -> str:
+    """Say the same in words."""
+    return (
+        f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
+        f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
+        f"{estimate.settings.published_window} samples"
+    )
+
+
+def with_published(
+    parameters: Mapping[str, Parameter], estimate: Estimate | None
+) -> dict[str, Parameter]:
+    """Put what the published method finds beside each parameter of the Karnopp model."""
+    if estimate is None:
+        return dict(parameters)
+    return {
+        name: replace(each, published=estimate.values[name]) if name in UNITS else each
+        for name, each in parameters.items()
+    }

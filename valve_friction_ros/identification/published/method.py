@@ -1,0 +1,81 @@
+"""Method "published": the paper's model 1 as it is, without intervals."""
+
+import math
+
+from valve_friction_ros.identification.published.estimate import Estimate, possible_model
+from valve_friction_ros.identification.published.evidence import (
+    sweep_evidence,
+    sweep_finding,
+    with_published,
+)
+from valve_friction_ros.identification.published.identify import published_fit
+from valve_friction_ros.identification.published.regression_uncertainty import (
+    regression_uncertainty,
+)
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import measured
+
+__all__ = ["METHOD", "identify_published"]
+
+METHOD = "published"
+"""Name of this method."""
+
+_NO_INTERVAL = "the published method states no interval"
+
+
+def identify_published(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
+    """Identify a record as published (`published_estimate`); no number is more than weak.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position.
+    valve : Valve
+        Geometry.
+    settings : IdentificationSettings, optional
+        The paper's by default, with the preload as a regressor of its own.
+
+    Returns
+    -------
+    Result
+        Parameters without intervals.
+
+    Raises
+    ------
+    RefusalError
+        If the record cannot tell; the message says what to do.
+    """
+    settings = settings or IdentificationSettings()
+    record = measured(recording)
+    found = published_fit(record, valve, settings)
+    estimate = found.estimate
+    parameters = {name: _stated(name, estimate) for name in estimate.values}
+    return Result(
+        method=METHOD,
+        recording=recording,
+        valve=valve,
+        settings=settings,
+        parameters=with_published(parameters, estimate),
+        fit=regression_uncertainty(record, found).fit,
+        rms=math.nan,
+        misfit=None,
+        derivative_window=settings.published_window,
+        warnings=estimate.warnings,
+        evidence=sweep_evidence(estimate),
+        findings=(sweep_finding(estimate),),
+        model=possible_model(estimate),
+        estimate=estimate,
+    )
+
+
+def _stated(name: str, estimate: Estimate) -> Parameter:
+    value = estimate.values[name]
+    if name in estimate.fixed:
+        return fixed(name, value, "given or assumed")
+    return Parameter(name, value, math.nan, math.nan, Verdict.WEAK, _NO_INTERVAL)

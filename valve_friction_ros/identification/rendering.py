@@ -1,0 +1,137 @@
+"""Table, page and frame of a result, from the mapping that `Result.to_dict` returns."""
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "frame_of",
+    "html_of",
+    "parameter_mapping",
+    "plain",
+    "table_of",
+    "text_of",
+    "two_digits",
+]
+
+_HEADER = ("parameter", "value", "± 95 %", "unit", "verdict", "published")
+_ALIGNED_RIGHT = (1, 2, 5)
+
+
+def plain(value: object) -> Any:
+    """Return a value as JSON knows it; a number that is not finite becomes None."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(each) for name, each in value.items()}
+    if isinstance(value, Enum):
+        return plain(value.value)
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    if isinstance(value, (np.floating, np.integer, np.bool_)):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def parameter_mapping(parameter: Parameter) -> dict[str, Any]:
+    """Return a parameter as a mapping of plain values, SI units."""
+    return {
+        "value": plain(parameter.value),
+        "standard_error": plain(parameter.standard_error),
+        "half_width": plain(parameter.half_width),
+        "interval": plain(parameter.interval),
+        "verdict": parameter.verdict.value,
+        "reason": parameter.reason,
+        "published": plain(parameter.published),
+        "unit": parameter.unit,
+    }
+
+
+def two_digits(value: float) -> str:
+    """Write a size with two digits, or all of its whole ones, and without an exponent."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
+
+
+def _cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:
+    value, width, published = (parameter[key] for key in ("value", "half_width", "published"))
+    return (
+        name,
+        "–" if value is None else f"{value:.6g}",
+        two_digits(width) if width else "",
+        parameter["unit"],
+        parameter["verdict"],
+        "" if published is None else f"{published:.6g}",
+    )
+
+
+def _rows(shown: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    return [_cells(name, each) for name, each in shown["parameters"].items()]
+
+
+def _title(shown: Mapping[str, Any]) -> str:
+    fit = shown["fit"]
+    return f"method {shown['method']}" + ("" if fit is None else f", fit {100 * fit:.2f} %")
+
+
+def table_of(shown: Mapping[str, Any]) -> str:
+    """Return the parameters as a table of plain text, and the fit below it."""
+    rows = [_HEADER, *_rows(shown)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(
+            cell.rjust(width) if place in _ALIGNED_RIGHT else cell.ljust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+    return "\n".join([*lines, "", _title(shown)])
+
+
+def text_of(shown: Mapping[str, Any], findings: Sequence[str]) -> str:
+    """Return the table, the reasons of the verdicts, the findings and the warnings."""
+    reasons = [
+        f"{name} {each['verdict']}: {each['reason']}"
+        for name, each in shown["parameters"].items()
+        if each["reason"] and each["verdict"] != Verdict.FIXED.value
+    ]
+    notes = [f"note: {warning}" for warning in shown["warnings"]]
+    return "\n".join([table_of(shown), *reasons, *findings, *notes])
+
+
+def html_of(shown: Mapping[str, Any]) -> str:
+    """Return the table of the parameters as HTML; text from outside is escaped."""
+
+    def row(cells: tuple[str, ...], tag: str) -> str:
+        written = (
+            f'<{tag} style="text-align:{"right" if place in _ALIGNED_RIGHT else "left"}">'
+            f"{html.escape(cell)}</{tag}>"
+            for place, cell in enumerate(cells)
+        )
+        return f"<tr>{''.join(written)}</tr>"
+
+    body = "".join(row(cells, "td") for cells in _rows(shown))
+    notes = "".join(f"<li>{html.escape(each)}</li>" for each in shown["warnings"])
+    return (
+        f"<table><caption>{html.escape(_title(shown))}</caption>"
+        f"<thead>{row(_HEADER, 'th')}</thead><tbody>{body}</tbody></table>"
+        + (f"<ul>{notes}</ul>" if notes else "")
+    )
+
+
+def frame_of(shown: Mapping[str, Any]) -> "pd.DataFrame":
+    """Return the parameters as a pandas frame, a row each; columns as in `parameter_mapping`."""
+    import pandas as pd  # noqa: PLC0415 - only where it is installed
+
+    rows = {name: dict(each) for name, each in shown["parameters"].items()}
+    for each in rows.values():
+        each["low"], each["high"] = each.pop("interval")
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")

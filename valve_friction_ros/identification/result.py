@@ -1,0 +1,195 @@
+"""The one result: what every method of identification returns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification import rendering
+from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.signature.valve_signature import ValveSignature
+from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+__all__ = ["Result", "StemComparison"]
+
+
+class StemComparison(NamedTuple):
+    """Measured and simulated stem at the same times.
+
+    Attributes
+    ----------
+    sample_period : float
+        Time between two samples, s.
+    measured : ndarray of float, shape (m,)
+        Measured position as the identification took it, m.
+    simulated : ndarray of float, shape (m,)
+        Position of the model's stem, m.
+    """
+
+    sample_period: float
+    measured: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of each sample since the first one, s, shape (m,)."""
+        return np.arange(self.measured.size, dtype=np.float64) * self.sample_period
+
+    @property
+    def residual(self) -> NDArray[np.float64]:
+        """Simulated less measured position, m, shape (m,)."""
+        return self.simulated - self.measured
+
+    def autocorrelation(self, lags: int) -> NDArray[np.float64]:
+        """Return the autocorrelation of the residual at lags of 0 … `lags` − 1 samples.
+
+        It is 1 at lag 0, and 0 everywhere for a residual that is nothing at all.
+        """
+        residual = self.residual - self.residual.mean()
+        size = 2 * residual.size
+        spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
+        products = np.fft.irfft(spectrum, size)[:lags]
+        power = float(products[0])
+        return np.asarray(products / (power or 1.0), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Identified parameters with their verdicts, and the evidence behind them.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method, as in `METHODS`.
+    recording : Recording
+        What was identified.
+    valve : Valve
+        Geometry that it was identified with.
+    settings : IdentificationSettings
+        How it was identified.
+    parameters : mapping of str to Parameter
+        By name: those of `UNITS`, and behind them what the record demanded in addition.
+    fit : float
+        Share of the stem's movement that the model reproduces, at most 1; of the force where no
+        stem is simulated.
+    rms : float
+        Root mean square of simulated less measured position, m; nan where no stem is simulated.
+    misfit : Misfit or None
+        A test of the model; None in a method without one.
+    derivative_window : int
+        Derivative window that was used, samples.
+    warnings : tuple of str
+        What a reader of the numbers should know, one sentence each.
+    evidence : mapping of str to object
+        Further numbers of the method, by name, SI units.
+    findings : tuple of str
+        The evidence in words, one sentence each.
+    model : KarnoppParameters or None
+        The identified model, to simulate; None where a value is impossible.
+    estimate : Estimate or None
+        The published sweep that a figure can show; None in a method without a sweep.
+    signature : ValveSignature or None
+        The valve signature; None in a method without one.
+    stem : StemComparison or None
+        Measured and simulated stem; None where no stem is simulated.
+    """
+
+    method: str
+    recording: Recording = field(repr=False)
+    valve: Valve
+    settings: IdentificationSettings
+    parameters: Mapping[str, Parameter]
+    fit: float
+    rms: float
+    misfit: Misfit | None
+    derivative_window: int
+    warnings: tuple[str, ...] = ()
+    evidence: Mapping[str, object] = field(default_factory=dict, repr=False)
+    findings: tuple[str, ...] = field(default=(), repr=False)
+    model: KarnoppParameters | None = field(default=None, repr=False)
+    estimate: Estimate | None = field(default=None, repr=False)
+    signature: ValveSignature | None = field(default=None, repr=False)
+    stem: StemComparison | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Freeze the mappings."""
+        for name in ("parameters", "evidence"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The identified values by name; nan where a parameter is not identifiable."""
+        return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as a mapping of plain values, SI units; what is not finite is None.
+
+        Every other rendering (JSON, rows, diagnostics, tables) is derived from this mapping. Its
+        keys are stable: ``method``, ``parameters.<name>`` with ``value``, ``standard_error``,
+        ``half_width``, ``interval``, ``verdict``, ``reason``, ``published`` and ``unit``; ``fit``,
+        ``rms``, ``systematic_misfit``, ``model_describes``, ``derivative_window``, ``evidence``,
+        ``settings`` and ``warnings``.
+        """
+        misfit, settings = self.misfit, self.settings
+        return {
+            "method": self.method,
+            "parameters": {
+                name: rendering.parameter_mapping(each) for name, each in self.parameters.items()
+            },
+            "fit": rendering.plain(self.fit),
+            "rms": rendering.plain(self.rms),
+            "systematic_misfit": None if misfit is None else rendering.plain(misfit.systematic),
+            "model_describes": None if misfit is None else misfit.describes,
+            "derivative_window": self.derivative_window,
+            "evidence": rendering.plain(self.evidence),
+            "settings": {
+                one.name: rendering.plain(getattr(settings, one.name)) for one in fields(settings)
+            },
+            "warnings": list(self.warnings),
+        }
+
+    def summary(self) -> str:
+        """Return the result as a table of plain text, with reasons and warnings below it."""
+        return rendering.text_of(self.to_dict(), self.findings)
+
+    def __str__(self) -> str:
+        """Return the table of the parameters."""
+        return rendering.table_of(self.to_dict())
+
+    def _repr_html_(self) -> str:
+        """Return the table of the parameters as HTML, for a notebook."""
+        return rendering.html_of(self.to_dict())
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the parameters as a pandas frame, a row each.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        return rendering.frame_of(self.to_dict())
+
+    def plot(self) -> "Figure":
+        """Draw the record, the model's stem and the evidence of the method.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; ``savefig`` writes it.
+        """
+        from valve_friction_ros.figures import identification_figure  # noqa: PLC0415 - drawn above
+
+        return identification_figure(self)

@@ -1,0 +1,32 @@
+"""Names and units of the parameters, once for all methods and all renderings."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+__all__ = ["CLOCK_OFFSET", "PARAMETER_UNITS", "UNITS"]
+
+CLOCK_OFFSET = "clock_offset"
+"""Time by which the stamps of the stem lag behind those of the pressure, s."""
+
+UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "mass": "kg",
+        "viscous_friction": "N·s/m",
+        "coulomb_friction": "N",
+        "static_friction": "N",
+        "spring_constant": "N/m",
+        "spring_preload": "N",
+    }
+)
+"""Unit of each parameter of the Karnopp model, in the order in which they are shown."""
+
+PARAMETER_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        **UNITS,
+        "stribeck_velocity": "m/s",
+        "coulomb_asymmetry": "1",
+        "viscous_asymmetry": "1",
+        CLOCK_OFFSET: "s",
+    }
+)
+"""Unit of every parameter that a result can hold; those after `UNITS` only on demand."""
