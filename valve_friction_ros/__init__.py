@@ -1,12 +1,98 @@
-"""Online identification of control-valve friction with the Karnopp model.
+"""Friction of control valves, identified with the Karnopp model, with intervals.
 
-The layers, arrows only downwards::
+Everything here works without ROS; all quantities are in SI units. The names below are loaded on
+first use. The rooms behind them, and which may import which, are drawn in ``doc/rooms.md``.
 
-    nodes, commands  →  reports, figures, fleet, reproduction  →  history, health, streams, records
-        →  identification  →  signals, model
+Examples
+--------
+A valve is simulated, identified, and compared with its healthy state.
 
-Everything below ``nodes`` works without ROS: import it from a notebook.
-All quantities are in SI units unless a name says otherwise.
+>>> import numpy as np
+>>> import valve_friction_ros as vf
+>>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+>>> healthy = vf.KarnoppParameters(
+...     mass=1.6, viscous_friction=4865.0, coulomb_friction=150.0, static_friction=150.0,
+...     spring_constant=2.05e5,
+... )
+>>> time = np.arange(4000) / 100
+>>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * time / 10)
+>>> stem = vf.simulate(valve, healthy, pressure, sample_period=0.01)
+>>> result = vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
+>>> friction = result.parameters["coulomb_friction"]
+>>> friction.verdict.value, bool(abs(friction.value - 150) < 1)
+('identified', True)
+>>> vf.compare(result, vf.Baseline(75.0)).level.name
+'WARN'
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from valve_friction_ros.front_door import compare, read_recording
+    from valve_friction_ros.health.baseline import Baseline
+    from valve_friction_ros.identification.methods import identify
+    from valve_friction_ros.identification.refusal import RefusalError
+    from valve_friction_ros.identification.result import Result
+    from valve_friction_ros.identification.settings import IdentificationSettings
+    from valve_friction_ros.identification.steps.step_response import step_test
+    from valve_friction_ros.identification.steps.validation import validate
+    from valve_friction_ros.model.instruments import SensorNoise
+    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+    from valve_friction_ros.model.recording import Recording
+    from valve_friction_ros.model.simulation import simulate
+    from valve_friction_ros.model.valve import Valve
+    from valve_friction_ros.records.valve_file import read_valve_file
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "Baseline",
+    "IdentificationSettings",
+    "KarnoppParameters",
+    "Recording",
+    "RefusalError",
+    "Result",
+    "SensorNoise",
+    "Valve",
+    "compare",
+    "identify",
+    "read_recording",
+    "read_valve_file",
+    "simulate",
+    "step_test",
+    "validate",
+]
+
+_HOMES = {
+    "Baseline": "health.baseline",
+    "IdentificationSettings": "identification.settings",
+    "KarnoppParameters": "model.karnopp_parameters",
+    "Recording": "model.recording",
+    "RefusalError": "identification.refusal",
+    "Result": "identification.result",
+    "SensorNoise": "model.instruments",
+    "Valve": "model.valve",
+    "compare": "front_door",
+    "identify": "identification.methods",
+    "read_recording": "front_door",
+    "read_valve_file": "records.valve_file",
+    "simulate": "model.simulation",
+    "step_test": "identification.steps.step_response",
+    "validate": "identification.steps.validation",
+}
+"""Module of each public name: a node that needs none of them loads none."""
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on its first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from valve_friction_ros.identification import Parameter
+from valve_friction_ros.identification import Parameter, RefusalError, Result
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 
 __all__ = ["Baseline", "Ratio"]
@@ -28,6 +28,13 @@ class Baseline:
         F_c, N, above zero.
     half_width : float
         Half the width of its 95 % interval, N; zero for a given value.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> healthy = vf.Baseline(coulomb_friction=150.0, half_width=2.0)
+    >>> healthy.coulomb_friction
+    150.0
     """
 
     coulomb_friction: float
@@ -37,6 +44,24 @@ class Baseline:
         """Refuse a baseline that nothing can be compared with."""
         require_positive("baseline_coulomb_friction", self.coulomb_friction)
         require_non_negative("half_width", self.half_width)
+
+    @classmethod
+    def of(cls, result: Result) -> "Baseline":
+        """Take the Coulomb friction of a result as baseline.
+
+        Raises
+        ------
+        RefusalError
+            If it is not identifiable, or not above zero.
+        """
+        friction = result.parameters["coulomb_friction"]
+        if math.isnan(friction.value):
+            raise RefusalError(
+                f"coulomb friction is not identifiable, so it is no baseline: {friction.reason}"
+            )
+        if friction.value <= 0:
+            raise RefusalError(f"a coulomb friction of {friction.value:.4g} N is no baseline")
+        return cls(friction.value, friction.half_width)
 
     def compared_with(self, friction: Parameter) -> Ratio:
         """Ratio of an assessed friction to the baseline; nan where it is not identifiable.

@@ -1,6 +1,5 @@
 """The monitor of one valve, without any ROS: gather, identify, remember, judge."""
 
-import math
 from dataclasses import dataclass, field, replace
 
 from valve_friction_ros.health.baseline import Baseline
@@ -150,14 +149,7 @@ class FrictionMonitor:
         """
         if self._assessment is None:
             raise RefusalError("there is no estimate to take as baseline: identify first")
-        friction = self._assessment.parameters["coulomb_friction"]
-        if math.isnan(friction.value):
-            raise RefusalError(
-                f"coulomb friction is not identifiable, so it is no baseline: {friction.reason}"
-            )
-        if friction.value <= 0:
-            raise RefusalError(f"a coulomb friction of {friction.value:.4g} N is no baseline")
-        self._baseline = Baseline(friction.value, friction.half_width)
+        self._baseline = Baseline.of(self._assessment)
         return self._baseline
 
     def take_baseline(self, baseline: Baseline) -> None:

@@ -84,5 +84,20 @@ def identify(
         If the record cannot tell; the message says what to do.
     ValueError
         If there is no such method.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+    >>> time = np.arange(4000) / 100
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * time / 10)
+    >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    >>> result = vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
+    >>> friction = result.parameters["coulomb_friction"]
+    >>> low, high = friction.interval
+    >>> low < 150.0 < high
+    True
     """
     return method_named(name=method)(recording, valve, settings)

@@ -4,4 +4,15 @@ __all__ = ["RefusalError"]
 
 
 class RefusalError(Exception):
-    """The record does not support an identification; the message says why and what to do."""
+    """The record does not support an identification; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445)
+    >>> try:
+    ...     vf.identify(vf.Recording(0.01, [1e5] * 1000, [0.01] * 1000), valve)
+    ... except vf.RefusalError as refusal:
+    ...     print(str(refusal).split(":")[0])
+    the stem did not move
+    """

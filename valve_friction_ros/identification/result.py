@@ -104,6 +104,21 @@ class Result:
         The valve signature; None in a method without one.
     stem : StemComparison or None
         Measured and simulated stem; None where no stem is simulated.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+    >>> time = np.arange(4000) / 100
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * time / 10)
+    >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    >>> result = vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
+    >>> str(result).splitlines()[0].split()
+    ['parameter', 'value', '±', '95', '%', 'unit', 'verdict', 'published']
+    >>> result.to_dict()["parameters"]["spring_constant"]["unit"]
+    'N/m'
     """
 
     method: str

@@ -60,6 +60,16 @@ class IdentificationSettings:
     ------
     ValueError
         If a setting is impossible; the message names it.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> vf.IdentificationSettings(fixed={"mass": 1.6}).fixed["mass"]
+    1.6
+    >>> vf.IdentificationSettings(derivative_window=30)
+    Traceback (most recent call last):
+        ...
+    ValueError: derivative_window must be odd and at least order + 2 = 5, got 30
     """
 
     derivative_window: int | None = None

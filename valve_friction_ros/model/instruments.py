@@ -64,6 +64,15 @@ class SensorNoise:
         Standard deviation of the pressure sensor, Pa.
     seed : int
         Seed of the random numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> rest = vf.Recording(1e-3, np.full(10_000, 1e5), np.zeros(10_000))
+    >>> noisy = vf.SensorNoise(position=10e-6, pressure=100.0, seed=1).applied_to(rest)
+    >>> bool(9.8e-6 < noisy.position.std() < 10.2e-6)
+    True
     """
 
     position: float = 0.0

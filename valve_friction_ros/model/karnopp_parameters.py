@@ -50,6 +50,20 @@ class KarnoppParameters:
     ------
     ValueError
         If a quantity is impossible; the message names it.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> packing = vf.KarnoppParameters(
+    ...     mass=1.6, viscous_friction=4865.0, coulomb_friction=150.0, static_friction=180.0,
+    ...     spring_constant=2.05e5,
+    ... )
+    >>> packing.static_friction - packing.coulomb_friction
+    30.0
+    >>> vf.KarnoppParameters(1.6, 4865.0, 150.0, 140.0, 2.05e5)
+    Traceback (most recent call last):
+        ...
+    ValueError: static_friction (140) must not be below coulomb_friction (150)
     """
 
     mass: float

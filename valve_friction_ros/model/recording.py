@@ -30,6 +30,15 @@ class Recording:
     ValueError
         If the arrays differ in shape, are not one-dimensional, are empty, or hold a value
         that is not finite; the message names the array and the first such sample.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> recording = vf.Recording(
+    ...     sample_period=0.1, pressure=[1e5, 1.1e5, 1.2e5], position=[0.0, 0.0, 1e-4]
+    ... )
+    >>> recording.duration
+    0.2
     """
 
     sample_period: float

@@ -182,6 +182,18 @@ def simulate(
     The third line of (2) holds at the instant of breakaway: from there on the moving friction of
     the first line acts. A sliding stem comes to rest when its speed falls to the limit velocity
     DV while static friction can hold it, at the latest when its speed reaches zero.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+    >>> time = np.arange(4000) / 100
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * time / 10)
+    >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    >>> stem.position.shape
+    (4000,)
     """
     period = require_positive("sample_period", sample_period)
     samples = np.asarray(pressure, dtype=np.float64)

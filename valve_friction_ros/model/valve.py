@@ -35,6 +35,13 @@ class Valve:
     ------
     ValueError
         If a quantity is impossible; the message names it.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, pressure_reference=101325.0, travel=28.575e-3)
+    >>> float(valve.actuator_force(201325.0))
+    4450.0
     """
 
     diaphragm_area: float

@@ -86,12 +86,28 @@ def _require_possible(known: Mapping[str, float]) -> None:
 
 
 def read_valve_file(path: Path) -> ValveFile:
-    """Read a valve from YAML: ``diaphragm_area`` and what else is known, in SI units.
+    r"""Read a valve from YAML: ``diaphragm_area`` and what else is known, in SI units.
 
     Raises
     ------
     ValueError
         In one line: the file, the key, and the rule that it breaks.
+
+    Returns
+    -------
+    ValveFile
+        The valve, and the nominal parameters that the file names.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import valve_friction_ros as vf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "fv_101.yaml")
+    ...     _ = path.write_text("diaphragm_area: 0.0445\nmass: 1.6\n")
+    ...     described = vf.read_valve_file(path)
+    >>> described.valve.diaphragm_area, described.known["mass"]
+    (0.0445, 1.6)
     """
     content = _numbers(path)
     names = (*_GEOMETRY, *FIXABLE)

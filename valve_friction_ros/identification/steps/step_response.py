@@ -162,6 +162,20 @@ def step_test(
         If the signals differ in length, hold values that are not finite, or a step lies outside.
     RefusalError
         If there is no step.
+
+    Examples
+    --------
+    A command of two steps, and a stem that follows it with a lag of 0.5 s.
+
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> time = np.arange(4000) / 100
+    >>> command = np.where(time < 10, 0.2, np.where(time < 25, 0.5, 0.3))
+    >>> lag = 1 - np.exp(-np.maximum(time - 10, 0) / 0.5)
+    >>> back = 1 - np.exp(-np.maximum(time - 25, 0) / 0.5)
+    >>> test = vf.step_test(command, 0.2 + 0.3 * lag - 0.2 * back, sample_period=0.01)
+    >>> len(test.steps)
+    2
     """
     period = require_positive("sample_period", sample_period)
     signal = np.asarray(input_signal, dtype=np.float64)

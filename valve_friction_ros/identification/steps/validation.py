@@ -113,6 +113,19 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
     RefusalError
         If the stem did not move, or the model has no spring: nothing calls such a stem back, and
         a simulation drifts away from the record whatever the friction.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+    >>> time = np.arange(4000) / 100
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * time / 10)
+    >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    >>> validation = vf.validate(vf.Recording(0.01, pressure, stem.position), valve, packing)
+    >>> bool(validation.fit > 0.999)
+    True
     """
     if parameters.spring_constant == 0:
         raise RefusalError(

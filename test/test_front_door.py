@@ -1,0 +1,170 @@
+"""The names that `import valve_friction_ros` offers: loaded on first use, with examples."""
+
+import doctest
+import math
+import subprocess
+import sys
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+import valve_friction_ros as vf
+
+NAN = float("nan")
+
+
+@pytest.fixture(scope="module")
+def columns(loose_record):
+    return {
+        "time_s": 100.0 + loose_record.time,
+        "pressure_pa": loose_record.pressure,
+        "position_m": loose_record.position,
+    }
+
+
+@pytest.fixture(scope="module")
+def result(loose_record, benches):
+    return vf.identify(loose_record, benches["low"].valve)
+
+
+def test_some_fifteen_names():
+    assert len(vf.__all__) == 15
+    assert set(vf.__all__) <= set(dir(vf))
+    with pytest.raises(AttributeError, match="no attribute 'assess'"):
+        _ = vf.assess
+
+
+def test_nothing_is_loaded_before_it_is_used():
+    code = "import sys, valve_friction_ros; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    loaded = run.stdout.split()
+    assert [name for name in loaded if name.startswith("valve_friction_ros")] == [
+        "valve_friction_ros"
+    ]
+    assert "numpy" not in loaded
+
+
+@pytest.mark.parametrize("name", [*vf.__all__, "valve_friction_ros"])
+def test_the_examples_hold(name):
+    thing = vf if name == "valve_friction_ros" else getattr(vf, name)
+    assert "Examples\n" in thing.__doc__
+    home = vf if thing is vf else import_module(thing.__module__)
+    (test,) = doctest.DocTestFinder(recurse=False).find(thing, name, home)
+    assert test.examples
+    words: list[str] = []
+    failed, _ = doctest.DocTestRunner().run(test, out=words.append)
+    assert not failed, "".join(words)
+
+
+class TestReadRecording:
+    def test_from_arrays(self, columns, loose_record):
+        found = vf.read_recording(columns)
+        assert (found.sample_period, found.start_time) == (loose_record.sample_period, 100.0)
+        np.testing.assert_array_equal(found.pressure, loose_record.pressure)
+        np.testing.assert_array_equal(found.position, loose_record.position)
+
+    def test_from_a_frame(self, columns, loose_record):
+        pandas = pytest.importorskip("pandas")
+        found = vf.read_recording(pandas.DataFrame(columns))
+        np.testing.assert_array_equal(found.position, loose_record.position)
+
+    def test_from_a_file(self, columns, loose_record, tmp_path):
+        path = tmp_path / "record.csv"
+        rows = np.column_stack([*columns.values()])
+        np.savetxt(path, rows, "%.17g", ",", header=",".join(columns), comments="")
+        found = vf.read_recording(path)
+        np.testing.assert_array_equal(found.pressure, loose_record.pressure)
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"time_s": [0.0, 1.0, 0.5]}, "^time_s does not increase at sample 2: sort the rows$"),
+            ({"pressure_pa": [1.0, NAN, 1.0]}, "^pressure_pa is not finite at sample 1$"),
+        ],
+    )
+    def test_bad_columns_are_named(self, change, message):
+        good = {"time_s": [0.0, 1.0, 2.0], "pressure_pa": [1.0] * 3, "position_m": [0.0] * 3}
+        with pytest.raises(ValueError, match=message):
+            vf.read_recording({**good, **change})
+
+    def test_a_missing_column_is_named(self):
+        with pytest.raises(ValueError, match=r"^there is no column 'pressure_pa' among time_s, x:"):
+            vf.read_recording({"time_s": [0.0], "x": [0.0]})
+
+
+class TestResult:
+    def test_the_table_has_a_line_a_parameter(self, result):
+        lines = str(result).splitlines()
+        assert len(lines) <= 10
+        assert lines[0].split()[:2] == ["parameter", "value"]
+        names = [line.split()[0] for line in lines[1 : 1 + len(result.parameters)]]
+        assert names == list(result.parameters)
+        assert lines[-1] == f"method refined, fit {100 * result.fit:.2f} %"
+
+    def test_the_summary_adds_reasons_and_warnings(self, result):
+        summary = result.summary()
+        assert summary.startswith(str(result))
+        for name, each in result.parameters.items():
+            assert (f"{name} {each.verdict.value}: {each.reason}" in summary) == bool(each.reason)
+        for warning in result.warnings:
+            assert f"note: {warning}" in summary
+
+    def test_the_mapping_is_plain(self, result):
+        import json
+
+        shown = result.to_dict()
+        assert json.loads(json.dumps(shown, allow_nan=False)) == shown
+        for name, each in result.parameters.items():
+            row = shown["parameters"][name]
+            assert row["value"] == (None if math.isnan(each.value) else each.value)
+            assert row["unit"] == each.unit
+        assert shown["settings"]["derivative_window"] is None
+
+    def test_html_is_escaped(self, result):
+        import dataclasses
+
+        page = dataclasses.replace(result, warnings=("<script>",))._repr_html_()
+        assert "&lt;script&gt;" in page
+        assert "<script>" not in page
+        assert page.count("<tr>") == 1 + len(result.parameters)
+
+    def test_to_frame(self, result):
+        pytest.importorskip("pandas")
+        frame = result.to_frame()
+        assert list(frame.index) == list(result.parameters)
+        coulomb = result.parameters["coulomb_friction"]
+        assert frame.loc["coulomb_friction", "value"] == coulomb.value
+        assert frame.loc["coulomb_friction", "high"] == coulomb.interval[1]
+
+    def test_plot(self, result):
+        labels = {axes.get_ylabel() for axes in result.plot().axes}
+        assert {"pressure [kPa]", "stem [mm]"} <= labels
+
+
+def test_methods_return_the_same_type(loose_record, benches):
+    published = vf.identify(loose_record, benches["low"].valve, method="published")
+    assert type(published) is vf.Result
+    assert published.method == "published"
+    friction = published.parameters["coulomb_friction"]
+    assert friction.value == friction.published
+    assert friction.reason == "the published method states no interval"
+    assert math.isnan(published.rms)
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("sweep", "it is now called 'refined'"), ("guess", "choose from refined, published")],
+)
+def test_an_unknown_method_is_named(loose_record, benches, name, hint):
+    with pytest.raises(ValueError, match=f"there is no method '{name}': {hint}"):
+        vf.identify(loose_record, benches["low"].valve, method=name)
+
+
+def test_compare_takes_a_result_or_a_number(result):
+    friction = result.parameters["coulomb_friction"]
+    half = vf.Baseline(friction.value / 2)
+    assert vf.compare(result, half).ratio.value == pytest.approx(2.0, rel=1e-12)
+    assert vf.compare(result, result).ratio.value == 1.0

@@ -1,0 +1,148 @@
+"""What a notebook needs beside the rooms' own functions; users find it in the package itself."""
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
+from valve_friction_ros.identification.result import Result
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
+from valve_friction_ros.streams.samples import Samples
+from valve_friction_ros.streams.uniform_grid import uniform_recording
+
+__all__ = ["compare", "read_recording"]
+
+_COLUMNS = ("time_s", "pressure_pa", "position_m")
+_ANY_SENSOR = Valve(diaphragm_area=1.0)
+"""Stands in where no valve is given: its sensors have no range, its stem no stops."""
+
+
+def read_recording(
+    source: str | PathLike[str] | Mapping[str, Any],
+    valve: Valve | None = None,
+    name: str | None = None,
+    options: ReadingOptions | None = None,
+) -> Recording:
+    """Read a recording from a CSV file, a bag, a pandas frame, or arrays.
+
+    Parameters
+    ----------
+    source : path, or mapping of str to array_like
+        CSV file (may be gzipped) or bag (MCAP or SQLite3, folder or file); or a pandas frame or
+        a mapping with the columns ``time_s``, ``pressure_pa`` and ``position_m``.
+    valve : Valve, optional
+        Range of the pressure sensor, and the travel that a position in percent is a share of. A
+        file that holds ``force_n`` needs it to turn the force into a pressure.
+    name : str, optional
+        Which valve of a bag, by its namespace; may be left out for a bag of one valve.
+    options : ReadingOptions, optional
+        Columns, units and layout of a CSV file, topics of a bag, the part to read.
+
+    Returns
+    -------
+    Recording
+        Pressure and stem position on one uniform time grid.
+
+    Raises
+    ------
+    ValueError
+        If the source cannot be read, a column is missing, or the bag holds no such valve.
+    RefusalError
+        If the samples make no record, as with a gap.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> columns = {
+    ...     "time_s": [0.0, 0.1, 0.2], "pressure_pa": [1e5, 1.1e5, 1.2e5],
+    ...     "position_m": [0.0, 0.0, 1e-4],
+    ... }
+    >>> recording = vf.read_recording(columns)
+    >>> len(recording), recording.sample_period
+    (3, 0.1)
+    """
+    if not isinstance(source, (str, PathLike)):
+        return _from_columns(source)
+    recorded = read_recordings(Path(source), valve or _ANY_SENSOR, options)
+    names = [each.name for each in recorded]
+    if name is None and len(recorded) > 1:
+        raise ValueError(f"{source}: several valves ({', '.join(names)}): choose one by name=")
+    if name is None:
+        return recorded[0].recording()
+    for each in recorded:
+        if each.name.strip("/") == name.strip("/"):
+            return each.recording()
+    raise ValueError(f"{source}: there is no valve {name!r} among {', '.join(names)}")
+
+
+def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
+    """Return a column as numbers; raises ValueError, which names it."""
+    if name not in columns:
+        known = ", ".join(map(str, columns))
+        raise ValueError(f"there is no column {name!r} among {known}: rename the column")
+    values = np.asarray(columns[name], dtype=np.float64)
+    finite = np.isfinite(values)
+    if not finite.all():
+        raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
+    return values
+
+
+def _from_columns(columns: Mapping[str, Any]) -> Recording:
+    time, pressure, position = (_column(columns, name) for name in _COLUMNS)
+    stamps = np.rint(time * 1e9).astype(np.int64)
+    later = np.diff(stamps) > 0
+    if not later.all():
+        sample = int(np.argmin(later)) + 1
+        raise ValueError(f"time_s does not increase at sample {sample}: sort the rows")
+    names = (_COLUMNS[1], _COLUMNS[2])
+    return uniform_recording(Samples(stamps, pressure), Samples(stamps, position), names)
+
+
+def compare(
+    result: Result, baseline: Baseline | Result, limits: FrictionLimits | None = None
+) -> Diagnosis:
+    """Compare an identified friction with that of the healthy valve.
+
+    Parameters
+    ----------
+    result : Result
+        The friction now.
+    baseline : Baseline or Result
+        The friction of the healthy valve: a number with its half width, or its identification.
+    limits : FrictionLimits, optional
+        Ratios from which friction counts as grown, excessive or collapsed.
+
+    Returns
+    -------
+    Diagnosis
+        Level, NE 107 status signal, a sentence for people, and the ratio with its interval.
+
+    Raises
+    ------
+    RefusalError
+        If `baseline` is a result whose Coulomb friction is no baseline.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> time = np.arange(4000) / 100
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * time / 10)
+    >>> def identified(friction):
+    ...     parameters = vf.KarnoppParameters(1.6, 4865.0, friction, friction, 2.05e5)
+    ...     stem = vf.simulate(valve, parameters, pressure, 0.01)
+    ...     return vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
+    >>> diagnosis = vf.compare(identified(400.0), identified(150.0))
+    >>> diagnosis.level.name, round(diagnosis.ratio.value, 1)
+    ('ERROR', 2.7)
+    """
+    healthy = Baseline.of(baseline) if isinstance(baseline, Result) else baseline
+    return diagnose(result, result.valve, healthy, limits)
