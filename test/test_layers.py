@@ -45,7 +45,10 @@ INNER = {
     "reproduction.figures": {"checks"},
     "nodes.plumbing": set(),
     "nodes.identifier": {"plumbing"},
-    "commands.demo": set(),
+    "commands.arguments": set(),
+    "commands.output": {"arguments"},
+    "commands.folder": {"arguments"},
+    "commands.demo": {"output"},
 }
 ROS_ROOMS = {"nodes", "commands"}
 

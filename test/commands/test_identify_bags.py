@@ -10,7 +10,7 @@ import pytest
 from bags import PRESSURE, messages_of, storage_file, write_bag
 from pages import PageReader
 
-from valve_friction_ros.commands.identify_recording import main
+from valve_friction_ros.commands.identify import main
 from valve_friction_ros.model import Recording
 
 
@@ -93,7 +93,7 @@ class TestOneValve:
         blocked = "rclpy", "sensor_msgs", "std_msgs", "builtin_interfaces", "rosbag2_py"
         code = (
             f"import sys; sys.modules.update(dict.fromkeys({blocked})); "
-            "from valve_friction_ros.commands.identify_recording import main; sys.exit(main())"
+            "from valve_friction_ros.commands.identify import main; sys.exit(main())"
         )
         done = subprocess.run(
             [sys.executable, "-c", code, str(bag), "--valve", str(bench_yaml)],

@@ -11,7 +11,7 @@ import pytest
 from pages import PNG, PageReader
 
 import valve_friction_ros
-from valve_friction_ros.commands.identify_recording import main
+from valve_friction_ros.commands.identify import main
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, TriangleWave, simulate
 
 BASELINE = ["--baseline-coulomb-friction", "100", "--baseline-half-width", "2"]

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from valve_friction_ros.commands.formatting import OneLineParser, complain
-from valve_friction_ros.commands.history_output import as_json, print_table, write_csv
+from valve_friction_ros.commands.output.formatting import OneLineParser, complain
+from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,

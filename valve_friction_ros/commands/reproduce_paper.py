@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from valve_friction_ros.commands.formatting import OneLineParser, complain
+from valve_friction_ros.commands.output.formatting import OneLineParser, complain
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import SensorNoise
 from valve_friction_ros.reports import render

@@ -20,7 +20,7 @@ from valve_friction_ros.commands.demo.bench_processes import (
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.commands.formatting import OneLineParser, complain, two_digits
+from valve_friction_ros.commands.output.formatting import OneLineParser, complain, two_digits
 from valve_friction_ros.figures import Case, friction_figure, require_picture_file
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (

@@ -9,14 +9,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from valve_friction_ros.commands.fleet_plan import Plan, forget_stale, make_plan
-from valve_friction_ros.commands.formatting import OneLineParser, complain
-from valve_friction_ros.commands.identification_arguments import (
+from valve_friction_ros.commands.arguments.identification import (
     add_identification_arguments,
     identification_settings,
 )
-from valve_friction_ros.commands.recording_arguments import add_reading_arguments, reading_options
-from valve_friction_ros.commands.stop_signals import StopSignals
+from valve_friction_ros.commands.arguments.recording import add_reading_arguments, reading_options
+from valve_friction_ros.commands.folder.plan import Plan, forget_stale, make_plan
+from valve_friction_ros.commands.folder.stop_signals import StopSignals
+from valve_friction_ros.commands.output.formatting import OneLineParser, complain
 from valve_friction_ros.fleet import (
     REFUSED,
     DeadWorker,

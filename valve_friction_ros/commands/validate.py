@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from valve_friction_ros.commands.estimate_file import read_estimate
-from valve_friction_ros.commands.formatting import OneLineParser, complain, json_number
-from valve_friction_ros.commands.recording_arguments import (
+from valve_friction_ros.commands.arguments.estimate_file import read_estimate
+from valve_friction_ros.commands.arguments.recording import (
     DIRECT_DRIVE,
     add_recording_arguments,
     described_valve,
     read_one,
     reading_options,
 )
+from valve_friction_ros.commands.output.formatting import OneLineParser, complain, json_number
 from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import (
     IdentifiedModel,

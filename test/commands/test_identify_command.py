@@ -13,8 +13,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.commands.assessment_output import as_json, print_table
-from valve_friction_ros.commands.identify_recording import main
+from valve_friction_ros.commands.identify import main
+from valve_friction_ros.commands.output.assessment_output import as_json, print_table
 from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
@@ -84,9 +84,9 @@ def quick_csv(write_csv, columns_of, quick_record):
     return write_csv(columns_of(quick_record))
 
 
-def run(*arguments, code="from valve_friction_ros.commands.identify_recording import main"):
+def run(*arguments, code="from valve_friction_ros.commands.identify import main"):
     """Run the command as a process of its own; without `code`, as `python -m` does."""
-    module = ["-m", "valve_friction_ros.commands.identify_recording"]
+    module = ["-m", "valve_friction_ros.commands.identify"]
     how = module if code is None else ["-c", f"import sys; {code}; sys.exit(main())"]
     return subprocess.run(
         [sys.executable, *how, *map(str, arguments)],
@@ -168,7 +168,7 @@ class TestProcesses:
         """Not even a figure needs rclpy, nor the global state of matplotlib."""
         blocked = (
             "sys.modules['rclpy'] = sys.modules['matplotlib.pyplot'] = None; "
-            "from valve_friction_ros.commands.identify_recording import main"
+            "from valve_friction_ros.commands.identify import main"
         )
         picture = tmp_path / "record.png"
         done = run(quick_csv, *bench_options, "--plot", picture, code=blocked)

@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
+from valve_friction_ros.commands.output.formatting import json_number, plain_console, two_digits
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
 from valve_friction_ros.identification import PARAMETER_UNITS
 

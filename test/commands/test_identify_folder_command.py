@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from bags import messages_of, write_bag
 
-from valve_friction_ros.commands.identify_recordings import main
+from valve_friction_ros.commands.identify_folder import main
 from valve_friction_ros.identification import IdentificationSettings, identify_refined
 from valve_friction_ros.model import (
     Recording,
@@ -76,7 +76,7 @@ def arguments(folder, output, bench_yaml):
 
 def start(arguments, script=None):
     """Start the command in a process group of its own, as a shell does."""
-    how = [str(script)] if script else ["-m", "valve_friction_ros.commands.identify_recordings"]
+    how = [str(script)] if script else ["-m", "valve_friction_ros.commands.identify_folder"]
     return subprocess.Popen(
         [sys.executable, *how, *arguments],
         stdout=subprocess.PIPE,

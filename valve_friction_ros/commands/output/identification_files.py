@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from valve_friction_ros.commands.recording_arguments import DIRECT_DRIVE, require_one
+from valve_friction_ros.commands.arguments.recording import DIRECT_DRIVE, require_one
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Result
 from valve_friction_ros.records.recorded_valve import RecordedValve

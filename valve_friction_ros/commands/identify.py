@@ -6,22 +6,22 @@ import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from valve_friction_ros.commands.assessment_output import as_json, print_table
-from valve_friction_ros.commands.formatting import OneLineParser, complain
-from valve_friction_ros.commands.identification_arguments import (
+from valve_friction_ros.commands.arguments.identification import (
     add_identification_arguments,
     identification_settings,
 )
-from valve_friction_ros.commands.identification_files import (
-    add_file_arguments,
-    baseline_from,
-    identification_files,
-)
-from valve_friction_ros.commands.recording_arguments import (
+from valve_friction_ros.commands.arguments.recording import (
     add_recording_arguments,
     described_valve,
     reading_options,
     require_one,
+)
+from valve_friction_ros.commands.output.assessment_output import as_json, print_table
+from valve_friction_ros.commands.output.formatting import OneLineParser, complain
+from valve_friction_ros.commands.output.identification_files import (
+    add_file_arguments,
+    baseline_from,
+    identification_files,
 )
 from valve_friction_ros.health import Diagnosis, diagnose
 from valve_friction_ros.identification import (

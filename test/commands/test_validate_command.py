@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.commands import identify_recording
-from valve_friction_ros.commands.validate_recording import main
+from valve_friction_ros.commands.validate import main
 from valve_friction_ros.identification import validate
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -171,7 +171,7 @@ class TestAnswer:
         assert matplotlib.image.imread(path).shape[0] > 500
 
     def test_as_a_process(self, estimate, other_csv, valve_options):
-        module = "valve_friction_ros.commands.validate_recording"
+        module = "valve_friction_ros.commands.validate"
         command = [sys.executable, "-m", module, other_csv, *valve_options]
         done = subprocess.run(
             [*map(str, command), "--estimate", str(estimate())],
