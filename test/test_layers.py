@@ -17,7 +17,7 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
 _VALVES = {*_CORE, "streams", "health"}
-_PAGES = {*_VALVES, "history"}
+_PAGES = {*_VALVES, "history", "records"}
 MAY_IMPORT = {
     "model": set(),
     "signals": {"model"},

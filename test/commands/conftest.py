@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from valve_friction_ros.commands.main import run
 from valve_friction_ros.model import Recording, SineWave, SquareWave, simulate
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -24,6 +25,17 @@ def quick_record(benches):
     """Ten seconds of a sine at 100 Hz, low friction: a small file."""
     pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
     return Recording(0.01, pressure, simulate(*benches["low"], pressure, 0.01).position)
+
+
+@pytest.fixture
+def command(capsys):
+    """Function of a sub-command and its arguments: exit code, stdout and stderr."""
+
+    def command(*arguments):
+        code = run([str(argument) for argument in arguments])
+        return (code, *capsys.readouterr())
+
+    return command
 
 
 @pytest.fixture

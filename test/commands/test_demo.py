@@ -1,5 +1,6 @@
-"""The command `demo`: its verdict, its options, and its whole story at a quicker pace."""
+"""The sub-command `demo`: its verdict, its options, and its whole story at a quicker pace."""
 
+import argparse
 import dataclasses
 import io
 import math
@@ -243,7 +244,9 @@ class TestIdentify:
 
 class TestOptions:
     def test_default_picture(self):
-        assert demo._parser().parse_args([]).output == Path("valve_friction_demo.png")
+        parser = argparse.ArgumentParser()
+        demo.declare(parser)
+        assert parser.parse_args([]).output == Path("valve_friction_demo.png")
 
     @pytest.mark.parametrize(
         ("name", "message"),
@@ -253,18 +256,17 @@ class TestOptions:
         ],
     )
     def test_a_bad_picture_is_refused_before_the_nodes_start(
-        self, monkeypatch, capsys, tmp_path, name, message
+        self, monkeypatch, command, tmp_path, name, message
     ):
         monkeypatch.setattr(demo, "running_nodes", pytest.fail)
-        assert demo.main(["--output", str(tmp_path / name)]) == 2
-        out, err = capsys.readouterr()
-        assert out == ""
-        assert err.startswith(f"demo: {tmp_path / name}: {message}")
+        code, out, err = command("demo", "--output", tmp_path / name)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"valve_friction demo: {tmp_path / name}: {message}")
         assert err.count("\n") == 1
 
-    def test_unknown_option(self, capsys):
+    def test_unknown_option(self, command, capsys):
         with pytest.raises(SystemExit) as ended:
-            demo.main(["--speed", "10"])
+            command("demo", "--speed", "10")
         assert ended.value.code == 2
         assert "unrecognized arguments: --speed 10" in capsys.readouterr().err
 
@@ -283,7 +285,7 @@ def test_the_whole_story(ros_environment, tmp_path):
     """Three nodes over DDS: identified, tightened while running, identified again, diagnosed."""
     output = tmp_path / "demo.png"
     done = subprocess.run(
-        [sys.executable, Path(__file__).with_name("quick_demo.py"), "--output", output],
+        [sys.executable, Path(__file__).with_name("quick_demo.py"), "demo", "--output", output],
         capture_output=True,
         text=True,
         timeout=110,

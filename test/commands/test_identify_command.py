@@ -1,4 +1,4 @@
-"""The command `identify_recording`, as people and programs use it."""
+"""The sub-command `identify`, as people and programs use it."""
 
 import dataclasses
 import gzip
@@ -7,13 +7,13 @@ import math
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.commands.identify import main
 from valve_friction_ros.commands.output.assessment_output import as_json, print_table
 from valve_friction_ros.identification import (
     UNITS,
@@ -84,12 +84,12 @@ def quick_csv(write_csv, columns_of, quick_record):
     return write_csv(columns_of(quick_record))
 
 
-def run(*arguments, code="from valve_friction_ros.commands.identify import main"):
+def run(*arguments, code="from valve_friction_ros.commands.main import main"):
     """Run the command as a process of its own; without `code`, as `python -m` does."""
-    module = ["-m", "valve_friction_ros.commands.identify"]
+    module = ["-m", "valve_friction_ros"]
     how = module if code is None else ["-c", f"import sys; {code}; sys.exit(main())"]
     return subprocess.run(
-        [sys.executable, *how, *map(str, arguments)],
+        [sys.executable, *how, "identify", *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=60,
@@ -98,14 +98,9 @@ def run(*arguments, code="from valve_friction_ros.commands.identify import main"
 
 
 @pytest.fixture
-def call(capsys):
-    """Function of arguments: exit code, stdout and stderr of the command in this process."""
-
-    def call(*arguments):
-        code = main([str(argument) for argument in arguments])
-        return (code, *capsys.readouterr())
-
-    return call
+def call(command):
+    """Function of arguments: exit code, stdout and stderr of `identify`."""
+    return partial(command, "identify")
 
 
 @pytest.fixture
@@ -168,7 +163,7 @@ class TestProcesses:
         """Not even a figure needs rclpy, nor the global state of matplotlib."""
         blocked = (
             "sys.modules['rclpy'] = sys.modules['matplotlib.pyplot'] = None; "
-            "from valve_friction_ros.commands.identify import main"
+            "from valve_friction_ros.commands.main import main"
         )
         picture = tmp_path / "record.png"
         done = run(quick_csv, *bench_options, "--plot", picture, code=blocked)
@@ -182,7 +177,7 @@ class TestProcesses:
         path.write_text("time_s,position_m,pressure_pa\n")
         done = run(path, *bench_options)
         assert (done.returncode, done.stdout) == (2, "")
-        assert re.fullmatch(r"identify_recording: \S+record\.csv: .+\n", done.stderr)
+        assert re.fullmatch(r"valve_friction identify: \S+record\.csv: .+\n", done.stderr)
 
 
 class TestJson:
@@ -348,9 +343,9 @@ class TestOptions:
             key: expected[key] for key in expected if key not in refined
         }
 
-    def test_help_names_all(self, capsys):
+    def test_help_names_all(self, call, capsys):
         with pytest.raises(SystemExit) as ended:
-            main(["--help"])
+            call("--help")
         assert ended.value.code == 0
         options = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
         columns = {f"--{name}-column" for name in ("time", "position", "pressure", "force")}
@@ -533,7 +528,7 @@ class TestPlot:
     def test_a_place_it_cannot_go_to(self, call, quick_csv, bench_options, tmp_path, name, message):
         code, out, err = call(quick_csv, *bench_options, "--plot", tmp_path / name)
         assert (code, out) == (2, "")
-        assert err.startswith(f"identify_recording: {tmp_path / name}: {message}")
+        assert err.startswith(f"valve_friction identify: {tmp_path / name}: {message}")
         assert err.count("\n") == 1
 
 
@@ -547,7 +542,7 @@ def refusal(call):
         line, rest = err.split("\n", 1)
         assert rest == ""
         command, _, message = line.partition(": ")
-        assert command == "identify_recording"
+        assert command == "valve_friction identify"
         return message
 
     return refusal
@@ -851,6 +846,8 @@ class TestForceBalance:
         path = write_csv(columns_of(square_record))
         code, out, err = call(path, *bench_options, "--method", "signature")
         assert (code, out) == (2, "")
-        assert err.startswith(f"identify_recording: {path}: the stem does not slide at a constant")
+        assert err.startswith(
+            f"valve_friction identify: {path}: the stem does not slide at a constant"
+        )
         assert "slow triangular wave" in err
         assert err.count("\n") == 1

@@ -1,8 +1,7 @@
-"""Command `identify_recording`: identify a recorded CSV file or bag."""
+"""Sub-command `identify`: identify the valves of a recorded CSV file or bag."""
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -17,7 +16,7 @@ from valve_friction_ros.commands.arguments.recording import (
     require_one,
 )
 from valve_friction_ros.commands.output.assessment_output import as_json, print_table
-from valve_friction_ros.commands.output.formatting import OneLineParser, complain
+from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.identification_files import (
     add_file_arguments,
     baseline_from,
@@ -35,10 +34,9 @@ from valve_friction_ros.model import Valve
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
 
-_EXIT_SOME_REFUSED = 1
-_EXIT_REFUSED = 2
+REFUSALS = (RefusalError,)
 
 
 class _Result(NamedTuple):
@@ -49,18 +47,17 @@ class _Result(NamedTuple):
     diagnosis: Diagnosis | None = None
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="identify_recording",
-        description="Identify the Karnopp friction model from a recorded CSV file or bag.",
-        epilog="All results are in SI units. Exit code 2: the file or the record was refused; of "
-        "several valves in a bag all were; 1: some of them were.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
+    parser.epilog = (
+        "All results are in SI units. Exit code 2: the file or the record was refused (of several "
+        "valves in a bag all were), or a file could not be written; 1: some valves were refused."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
     add_file_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    return parser
 
 
 def _identified(
@@ -78,29 +75,6 @@ def _identified(
         return identify(recording, valve, settings)
     except RefusalError as refusal:
         return recorded.refused(refusal)
-
-
-def _results(options: argparse.Namespace) -> list[_Result]:
-    """Read and identify the valves of the file, and write the files that are to be written."""
-    reading = reading_options(options)
-    description = described_valve(options, reading)
-    settings = identification_settings(options, description.known)
-    method = METHODS[options.method]
-    baseline, files = baseline_from(options), identification_files(options)
-    valve = description.valve
-    recorded = read_recordings(options.file, valve, reading)
-    files.require_one_valve(recorded)
-    if baseline is not None:
-        require_one(recorded, "--baseline-coulomb-friction is of")
-    results = []
-    for each in recorded:
-        outcome = _identified(each, valve, method, settings)
-        diagnosis = None
-        if isinstance(outcome, Result):
-            files.write(each, description, outcome, baseline)
-            diagnosis = diagnose(outcome, valve, baseline) if baseline is not None else None
-        results.append(_Result(each, outcome, diagnosis))
-    return results
 
 
 def _print_json(results: Sequence[_Result]) -> None:
@@ -126,25 +100,41 @@ def _print_tables(results: Sequence[_Result]) -> None:
         printed += 1
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    options = _parser().parse_args(arguments)
-    try:
-        results = _results(options)
-    except (ValueError, RefusalError, OSError) as error:
-        complain("identify_recording", error)
-        return _EXIT_REFUSED
+def _print(results: Sequence[_Result], command: str, in_json: bool) -> int:
+    """Print what was found and what was refused; return the exit code."""
     refusals = [result.outcome for result in results if isinstance(result.outcome, RefusalError)]
-    if options.json and (len(results) > 1 or not refusals):
+    if in_json and (len(results) > 1 or not refusals):
         _print_json(results)
-    elif not options.json:
+    elif not in_json:
         _print_tables(results)
     for refusal in refusals:
-        complain("identify_recording", refusal)
+        complain(command, refusal)
     if not refusals:
-        return 0
-    return _EXIT_REFUSED if len(refusals) == len(results) else _EXIT_SOME_REFUSED
+        return ExitCode.DONE
+    return ExitCode.REFUSED if len(refusals) == len(results) else ExitCode.PARTLY
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def run(options: argparse.Namespace) -> int:
+    """Identify the valves of the file, print what was found, and write the files asked for."""
+    reading = reading_options(options)
+    description = described_valve(options, reading)
+    valve = description.valve
+    settings = identification_settings(options, description.known)
+    baseline, files = baseline_from(options), identification_files(options)
+    recorded = read_recordings(options.file, valve, reading)
+    files.require_one_valve(recorded)
+    if baseline is not None:
+        require_one(recorded, "--baseline-coulomb-friction is of")
+    results = []
+    for each in recorded:
+        outcome = _identified(each, valve, METHODS[options.method], settings)
+        diagnosis = None
+        if isinstance(outcome, Result) and baseline is not None:
+            diagnosis = diagnose(outcome, valve, baseline)
+        results.append(_Result(each, outcome, diagnosis))
+    try:
+        return _print(results, options.command, options.json)
+    finally:  # a closed output costs no picture, and a full disk no numbers
+        for each, outcome, _ in results:
+            if isinstance(outcome, Result):
+                files.write(each, description, outcome, baseline)

@@ -1,4 +1,4 @@
-"""Command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
+"""Sub-command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
 
 import argparse
 import math
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import rclpy
+from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -20,8 +21,9 @@ from valve_friction_ros.commands.demo.bench_processes import (
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.commands.output.formatting import OneLineParser, complain, two_digits
-from valve_friction_ros.figures import Case, friction_figure, require_picture_file
+from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.output.formatting import OutputConsole, two_digits
+from valve_friction_ros.figures import Case, friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
     UNITS,
@@ -38,7 +40,9 @@ from valve_friction_ros.model import (
 )
 from valve_friction_ros.streams import RecordBuffer
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
+
+REFUSALS = (BenchError, RefusalError)
 
 _NAMESPACE = "fv_101"
 _RECORD = 2 * SquareWave().period
@@ -89,13 +93,15 @@ class _Outcome(NamedTuple):
         return [name for name in _TOLERANCES if name in outside | untrue]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="demo",
-        description="Start a simulated valve and its monitor as processes, identify the friction, "
-        "tighten the packing while it runs, and identify again.",
-        epilog="Exit code 0: all within tolerance and the excess friction was diagnosed; "
-        "1: not so; 2: the bench did not run.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = (
+        "Start a simulated valve and its monitor as processes, identify the friction, tighten the "
+        "packing while it runs, and identify again."
+    )
+    parser.epilog = (
+        "Exit code 0: all within tolerance and the excess friction was diagnosed; 1: not so; "
+        "2: the bench did not run, or the picture could not be written."
     )
     parser.add_argument(
         "--output",
@@ -104,7 +110,6 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.png",
         help="picture of the result (%(default)s)",
     )
-    return parser
 
 
 def _record(client: BenchClient, console: Console, label: str) -> None:
@@ -238,8 +243,6 @@ def _report(story: _Story, output: Path, console: Console) -> int:
     level = "without a level" if story.level is None else Level(story.level).name
     verdict = f"/diagnostics {level}: {story.message}"
     console.print(verdict, style="bold", highlight=False, markup=False)
-    friction_figure([outcome.case for outcome in story.outcomes], verdict).savefig(output)
-    console.print(f"picture: {output}", highlight=False, markup=False, soft_wrap=True)
     missed = [
         f"{name} ({outcome.label})" for outcome in story.outcomes for name in outcome.missed()
     ]
@@ -247,38 +250,24 @@ def _report(story: _Story, output: Path, console: Console) -> int:
         console.print(f"outside the tolerance: {', '.join(missed)}", style="bold red")
     if story.level != Level.ERROR:
         console.print("the excess friction was not diagnosed", style="bold red")
-    return 1 if missed or story.level != Level.ERROR else 0
+    save_picture(friction_figure([outcome.case for outcome in story.outcomes], verdict), output)
+    console.print(f"picture: {output}", highlight=False, markup=False, soft_wrap=True)
+    return ExitCode.PARTLY if missed or story.level != Level.ERROR else ExitCode.DONE
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demo; return its exit code."""
-    options = _parser().parse_args(arguments)
-    console = Console() if sys.stdout.isatty() else Console(width=_PRINTED_WIDTH)
-    try:
-        require_picture_file(options.output)
-    except ValueError as error:
-        complain("demo", error)
-        return 2
+def run(options: argparse.Namespace) -> int:
+    """Run the bench, and report what was seen."""
+    console = OutputConsole(width=None if sys.stdout.isatty() else _PRINTED_WIDTH)
+    require_picture_file(options.output)
     os.environ.update(quick_discovery())
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    window = 2 * _RECORD
-    try:
-        with running_nodes(_nodes(), _NAMESPACE):
-            rclpy.init(args=[])
-            client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, window))
-            try:
-                story = _run(client, console)
-            finally:
-                client.close()
-                rclpy.try_shutdown()
-        return _report(story, options.output, console)
-    except KeyboardInterrupt:
-        console.print("stopped")
-        return 130
-    except (BenchError, RefusalError, OSError) as error:
-        complain("demo", error)
-        return 2
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    with running_nodes(_nodes(), _NAMESPACE):
+        # Ctrl-C is Python's own: the handler of rclpy would end the context under the client.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
+        try:
+            story = _run(client, console)
+        finally:
+            client.close()
+            rclpy.try_shutdown()
+    return _report(story, options.output, console)

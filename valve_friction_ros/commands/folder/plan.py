@@ -1,4 +1,4 @@
-"""What `identify_recordings` has to do: each recording with its valve, and what is done already."""
+"""What `identify-folder` has to do: each recording with its valve, and what is done already."""
 
 import argparse
 from collections.abc import Iterator, Mapping

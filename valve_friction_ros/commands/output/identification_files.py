@@ -1,4 +1,4 @@
-"""What `identify_recording` writes of one valve beside its answer: a picture and a report."""
+"""What `identify` writes of a valve beside its result: a picture and a report."""
 
 import argparse
 from collections.abc import Sequence
@@ -75,7 +75,7 @@ class IdentificationFiles(NamedTuple):
         result: Result,
         baseline: Baseline | None,
     ) -> None:
-        """Write them; raises OSError where that fails."""
+        """Write them; raises OSError, which names the file, where that fails."""
         if self == (None, None):
             return
 
@@ -83,8 +83,7 @@ class IdentificationFiles(NamedTuple):
 
         drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
         if self.plot is not None:
-            figure = figures.identification_figure(result, drive)
-            figure.savefig(self.plot)
+            figures.save_picture(figures.identification_figure(result, drive), self.plot)
         if self.report is not None:
             from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
 
