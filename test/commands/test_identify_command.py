@@ -14,7 +14,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.commands.output.assessment_output import as_json, print_table
+from valve_friction_ros.commands.output.result_output import as_json, print_table
 from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,

@@ -15,13 +15,13 @@ from valve_friction_ros.commands.arguments.recording import (
     reading_options,
     require_one,
 )
-from valve_friction_ros.commands.output.assessment_output import as_json, print_table
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.identification_files import (
     add_file_arguments,
     baseline_from,
     identification_files,
 )
+from valve_friction_ros.commands.output.result_output import as_json, print_table
 from valve_friction_ros.health import Diagnosis, diagnose
 from valve_friction_ros.identification import (
     METHODS,
@@ -39,7 +39,7 @@ __all__ = ["REFUSALS", "declare", "run"]
 REFUSALS = (RefusalError,)
 
 
-class _Result(NamedTuple):
+class _Answer(NamedTuple):
     """A valve of the file, what came of it, and its diagnosis where it has a baseline."""
 
     recorded: RecordedValve
@@ -77,7 +77,7 @@ def _identified(
         return recorded.refused(refusal)
 
 
-def _print_json(results: Sequence[_Result]) -> None:
+def _print_json(results: Sequence[_Answer]) -> None:
     """Print the object of one valve; of several, an object of them by name."""
     answers = {
         recorded.name: {"error": str(outcome)}
@@ -89,7 +89,7 @@ def _print_json(results: Sequence[_Result]) -> None:
     print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
 
 
-def _print_tables(results: Sequence[_Result]) -> None:
+def _print_tables(results: Sequence[_Answer]) -> None:
     printed = 0
     for recorded, outcome, diagnosis in results:
         if isinstance(outcome, RefusalError):
@@ -100,7 +100,7 @@ def _print_tables(results: Sequence[_Result]) -> None:
         printed += 1
 
 
-def _print(results: Sequence[_Result], command: str, in_json: bool) -> int:
+def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
     """Print what was found and what was refused; return the exit code."""
     refusals = [result.outcome for result in results if isinstance(result.outcome, RefusalError)]
     if in_json and (len(results) > 1 or not refusals):
@@ -131,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
         diagnosis = None
         if isinstance(outcome, Result) and baseline is not None:
             diagnosis = diagnose(outcome, valve, baseline)
-        results.append(_Result(each, outcome, diagnosis))
+        results.append(_Answer(each, outcome, diagnosis))
     try:
         return _print(results, options.command, options.json)
     finally:  # a closed output costs no picture, and a full disk no numbers
