@@ -1,8 +1,10 @@
 """Recorded files of the bench valve, and the description of that valve."""
 
 import contextlib
+import json
 import os
 import socket
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +38,51 @@ def command(capsys):
         return (code, *capsys.readouterr())
 
     return command
+
+
+@pytest.fixture
+def call(command):
+    """Function of arguments: exit code, stdout and stderr of `identify`."""
+    return partial(command, "identify")
+
+
+@pytest.fixture
+def printed(call):
+    """Function of arguments: the one JSON object that the command prints."""
+
+    def printed(*arguments):
+        code, out, err = call(*arguments, "--json")
+        assert (code, err) == (0, "")
+        assert out.count("\n") == 1
+        return json.loads(out, parse_constant=pytest.fail)
+
+    return printed
+
+
+@pytest.fixture
+def refusal(call):
+    """Function of arguments: the one line on stderr that goes with exit code 2."""
+
+    def refusal(*arguments):
+        code, out, err = call(*arguments)
+        assert (code, out) == (2, "")
+        line, rest = err.split("\n", 1)
+        assert rest == ""
+        command, _, message = line.partition(": ")
+        assert command == "valve_friction identify"
+        return message
+
+    return refusal
+
+
+@pytest.fixture(scope="session")
+def bench_options(bench_yaml):
+    return ["--valve", str(bench_yaml)]
+
+
+@pytest.fixture
+def quick_csv(write_csv, columns_of, quick_record):
+    return write_csv(columns_of(quick_record))
 
 
 @pytest.fixture
