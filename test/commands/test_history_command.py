@@ -112,6 +112,8 @@ class TestJson:
             "value": 150.0,
             "standard_error": 0.5,
             "half_width": 1.0,
+            "interval": [149.0, 151.0],
+            "published": None,
             "unit": "N",
             "verdict": "identified",
             "reason": "",

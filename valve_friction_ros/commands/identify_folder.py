@@ -100,7 +100,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         read_valve_file(options.valve)
 
 
-def _planned(options: argparse.Namespace, stop: StopSignals) -> dict[str, Plan]:
+def _planned(options: argparse.Namespace) -> dict[str, Plan]:
     findings = find_recordings(options.folder, options.output)
     if findings.skipped:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
@@ -109,12 +109,7 @@ def _planned(options: argparse.Namespace, stop: StopSignals) -> dict[str, Plan]:
         print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
         raise ValueError(f"{options.folder}: there are no CSV files and no bags in it")
-    plans = {}
-    for plan in make_plan(findings, options):
-        if stop.wanted():
-            break
-        plans[plan.name] = plan
-    return plans
+    return {plan.name: plan for plan in make_plan(findings, options)}
 
 
 def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[tuple[Plan, _Rows]]:
@@ -174,13 +169,11 @@ def _print_tally(counted: Tally) -> None:
         console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
 
 
-def _run(options: argparse.Namespace, stop: StopSignals) -> int:
+def run(options: argparse.Namespace) -> int:
+    """Identify what is left to do, and print a tally."""
     _require_sense(options)
-    plans = _planned(options, stop)
-    if stop.wanted():
-        complain(options.command, "interrupted before anything was done")
-        return stop.exit_code
-    with ResultsFile(options.output) as results:
+    plans = _planned(options)
+    with StopSignals() as stop, ResultsFile(options.output) as results:
         left, dropped = forget_stale(results, plans, options)
         print(
             f"{len(plans)} recordings: {len(plans) - len(left)} done before, {len(left)} to do"
@@ -202,9 +195,3 @@ def _run(options: argparse.Namespace, stop: StopSignals) -> int:
     if refused == 0:
         return ExitCode.DONE
     return ExitCode.REFUSED if refused == counted.outcomes.total() else ExitCode.PARTLY
-
-
-def run(options: argparse.Namespace) -> int:
-    """Identify what is left to do, and print a tally."""
-    with StopSignals() as stop:
-        return _run(options, stop)

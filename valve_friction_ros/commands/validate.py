@@ -15,13 +15,13 @@ from valve_friction_ros.commands.arguments.recording import (
     reading_options,
 )
 from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.commands.output.formatting import json_number
 from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import (
     IdentifiedModel,
     RefusalError,
     Validation,
     identified_model,
+    plain,
     validate,
 )
 from valve_friction_ros.model import Valve
@@ -93,7 +93,7 @@ def _as_json(result: _Result) -> dict[str, Any]:
     return {
         "fit": validation.fit,
         "rms": validation.rms,
-        "rms_share_of_travel": json_number(valve.share_of_travel(validation.rms)),
+        "rms_share_of_travel": plain(valve.share_of_travel(validation.rms)),
         "maximum_error": validation.maximum_error,
         "samples": len(validation.recording),
         "sample_period": validation.recording.sample_period,

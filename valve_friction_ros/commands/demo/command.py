@@ -22,7 +22,7 @@ from valve_friction_ros.commands.demo.bench_processes import (
     running_nodes,
 )
 from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.commands.output.formatting import OutputConsole, two_digits
+from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.figures import Case, friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
@@ -30,6 +30,7 @@ from valve_friction_ros.identification import (
     Parameter,
     RefusalError,
     Verdict,
+    two_digits,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,

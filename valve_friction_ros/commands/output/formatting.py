@@ -1,13 +1,12 @@
-"""Consoles, and numbers without an exponent."""
+"""Consoles that results are printed on."""
 
 import errno
-import math
 import os
 import sys
 
 from rich.console import Console
 
-__all__ = ["OutputConsole", "json_number", "plain_console", "two_digits"]
+__all__ = ["OutputConsole", "plain_console"]
 
 _PRINTED_WIDTH = 120
 """Columns of what goes into a file or a pipe, which has no width of its own."""
@@ -25,13 +24,3 @@ def plain_console() -> Console:
     """Return a console that prints text as it is, as wide as the terminal if there is one."""
     width = None if sys.stdout.isatty() else _PRINTED_WIDTH
     return OutputConsole(width=width, highlight=False, markup=False)
-
-
-def json_number(value: float) -> float | None:
-    """Return `value`, or None, JSON's null, where it is not finite: JSON has no nan."""
-    return value if math.isfinite(value) else None
-
-
-def two_digits(value: float) -> str:
-    """Write a size with two digits, or all of its whole ones, and without an exponent."""
-    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
