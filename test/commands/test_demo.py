@@ -5,8 +5,10 @@ import dataclasses
 import io
 import math
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +43,7 @@ HALF_WIDTH = 0.01  # of the value
 @pytest.fixture(scope="module")
 def case(quick_record):
     settings = IdentificationSettings(position_bias=1.13e-3, fixed={"mass": 1.6})
-    return Case.of("loose", quick_record, identify_refined(quick_record, BENCH_VALVE, settings))
+    return Case.of("loose", identify_refined(quick_record, BENCH_VALVE, settings))
 
 
 def refined(name, value, verdict=Verdict.IDENTIFIED, reason=""):
@@ -207,7 +209,7 @@ class TestIdentify:
     def test_both_estimates_with_the_verdicts(self, quick_record, values):
         client = FakeClient(quick_record, values)
         found = demo._identify(client, "loose", LOW_FRICTION)
-        assert found.estimate == dict.fromkeys(demo._TOLERANCES, 3.0)
+        assert found.published == dict.fromkeys(demo._TOLERANCES, 3.0)
         friction = found.refined["coulomb_friction"]
         assert (friction.value, friction.half_width) == (3.5, 0.25)
         assert (friction.verdict, friction.reason) == (Verdict.WEAK, "2 strokes only")
@@ -226,7 +228,7 @@ class TestIdentify:
         }
         found = demo._identify(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
         assert found.refined["coulomb_friction"].verdict is Verdict.NOT_IDENTIFIABLE
-        assert found.estimate["coulomb_friction"] == 3.0
+        assert found.published["coulomb_friction"] == 3.0
 
     @pytest.mark.parametrize("age", [None, "2.5"])
     def test_an_older_estimate_is_not_the_one_asked_for(self, quick_record, values, age):
@@ -278,6 +280,33 @@ def test_nodes_start_as_the_bench_valve():
     assert {name: nodes["simulator"][name] for name in truth} == truth
     bias = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
     assert nodes["identifier"]["position_bias"] == bias
+
+
+def children(pid):
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+def test_interrupted(ros_environment, tmp_path):
+    """Ctrl-C while the nodes run: one line, and no node stays."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "valve_friction_ros", "demo"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env=ros_environment,
+    )
+    deadline = time.monotonic() + 60
+    while len(children(process.pid)) < 3:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    time.sleep(1.0)
+    nodes = children(process.pid)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err == "valve_friction demo: interrupted\n"
+    assert not any(Path(f"/proc/{node}").exists() for node in nodes)
 
 
 @pytest.mark.slow

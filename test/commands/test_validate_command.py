@@ -188,6 +188,7 @@ class TestRefusals:
         ("content", "cause"),
         [
             ("{", "not JSON"),
+            ("[" * 100_000, "not JSON: maximum recursion depth exceeded"),
             ("[]", "there are no parameters: give what `valve_friction identify --json` wrote"),
             ('{"valves": {}}', "is of several valves: identify the one by --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),

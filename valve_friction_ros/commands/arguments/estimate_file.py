@@ -39,7 +39,7 @@ def read_estimate(path: Path) -> dict[str, float]:
     except (OSError, UnicodeDecodeError) as error:
         cause = (isinstance(error, OSError) and error.strerror) or error
         raise ValueError(f"{path}: cannot be read: {cause}") from None
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
     if isinstance(content, dict) and "valves" in content:
         raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
