@@ -17,6 +17,7 @@ from rich.console import Console
 
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo.bench_client import BenchError
+from valve_friction_ros.commands.demo.outcome import TOLERANCES, Outcome, identified
 from valve_friction_ros.figures import Case
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
@@ -60,24 +61,24 @@ def outcome(case):
 
     def build(label="loose", truth=LOW_FRICTION, assessed=(), **errors):
         published = {
-            name: getattr(truth, name) * (1 + errors.get(name, 0.0)) for name in demo._TOLERANCES
+            name: getattr(truth, name) * (1 + errors.get(name, 0.0)) for name in TOLERANCES
         }
-        right = {name: refined(name, getattr(truth, name)) for name in demo._TOLERANCES}
+        right = {name: refined(name, getattr(truth, name)) for name in TOLERANCES}
         right |= {one.name: one for one in assessed}
-        return demo._Outcome(label, truth, published, right, case)
+        return Outcome(label, truth, published, right, case)
 
     return build
 
 
 def test_tolerances_are_what_was_promised():
-    assert {name: demo._TOLERANCES[name] for name in ASKED} == ASKED
+    assert {name: TOLERANCES[name] for name in ASKED} == ASKED
 
 
 class TestMissed:
-    @pytest.mark.parametrize("name", demo._TOLERANCES)
+    @pytest.mark.parametrize("name", TOLERANCES)
     @pytest.mark.parametrize("sign", [1, -1])
     def test_each_parameter_is_judged_both_ways(self, outcome, name, sign):
-        tolerance = demo._TOLERANCES[name]
+        tolerance = TOLERANCES[name]
         assert outcome(**{name: 0.99 * sign * tolerance}).missed() == []
         assert outcome(**{name: 1.01 * sign * tolerance}).missed() == [name]
 
@@ -89,7 +90,7 @@ class TestMissed:
         tight = outcome(truth=HIGH_FRICTION)._replace(published=outcome().published)
         assert set(tight.missed()) >= {"viscous_friction", "coulomb_friction", "static_friction"}
 
-    @pytest.mark.parametrize("name", demo._TOLERANCES)
+    @pytest.mark.parametrize("name", TOLERANCES)
     @pytest.mark.parametrize("sign", [1, -1])
     def test_an_interval_that_is_untrue(self, outcome, name, sign):
         """An identified value may be off by three half widths, at 1 % of the value each."""
@@ -192,7 +193,7 @@ class TestIdentify:
             "threshold [m/s]": "0.002",
             "warnings": "check the clocks",
         }
-        for name in demo._TOLERANCES:
+        for name in TOLERANCES:
             diagnostic |= {
                 f"{name} [{UNITS[name]}]": "3.5",
                 f"{name} half width [{UNITS[name]}]": "0.25",
@@ -208,8 +209,8 @@ class TestIdentify:
 
     def test_both_estimates_with_the_verdicts(self, quick_record, values):
         client = FakeClient(quick_record, values)
-        found = demo._identify(client, "loose", LOW_FRICTION)
-        assert found.published == dict.fromkeys(demo._TOLERANCES, 3.0)
+        found = identified(client, "loose", LOW_FRICTION)
+        assert found.published == dict.fromkeys(TOLERANCES, 3.0)
         friction = found.refined["coulomb_friction"]
         assert (friction.value, friction.half_width) == (3.5, 0.25)
         assert (friction.verdict, friction.reason) == (Verdict.WEAK, "2 strokes only")
@@ -226,7 +227,7 @@ class TestIdentify:
             "coulomb_friction half width [N]": "nan",
             "coulomb_friction verdict": "not identifiable",
         }
-        found = demo._identify(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
+        found = identified(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
         assert found.refined["coulomb_friction"].verdict is Verdict.NOT_IDENTIFIABLE
         assert found.published["coulomb_friction"] == 3.0
 
@@ -235,13 +236,13 @@ class TestIdentify:
         old = {name: value for name, value in values.items() if name != "estimate_age [s]"}
         old |= {} if age is None else {"estimate_age [s]": age}
         with pytest.raises(AssertionError, match="diagnostic of the estimate"):
-            demo._identify(FakeClient(quick_record, old), "loose", LOW_FRICTION)
+            identified(FakeClient(quick_record, old), "loose", LOW_FRICTION)
 
     def test_no_published_estimate_is_a_failure_with_its_reason(self, quick_record, values):
         withheld = {name: value for name, value in values.items() if "published" not in name}
         del withheld["threshold [m/s]"]
         with pytest.raises(BenchError, match=r"^no published estimate: check the clocks$"):
-            demo._identify(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
+            identified(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
 
 
 class TestOptions:

@@ -1,10 +1,9 @@
 """Sub-command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
 
 import argparse
-import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +12,6 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
 from valve_friction_ros.commands.demo.bench_processes import (
@@ -21,24 +19,13 @@ from valve_friction_ros.commands.demo.bench_processes import (
     quick_discovery,
     running_nodes,
 )
+from valve_friction_ros.commands.demo.outcome import Outcome, identified, table_of
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.formatting import OutputConsole
-from valve_friction_ros.figures import Case, friction_figure, require_picture_file, save_picture
+from valve_friction_ros.figures import friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
-from valve_friction_ros.identification import (
-    UNITS,
-    Parameter,
-    RefusalError,
-    Verdict,
-    two_digits,
-)
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    HIGH_FRICTION,
-    LOW_FRICTION,
-    KarnoppParameters,
-    SquareWave,
-)
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SquareWave
 from valve_friction_ros.streams import RecordBuffer
 
 __all__ = ["REFUSALS", "declare", "run"]
@@ -48,50 +35,11 @@ REFUSALS = (BenchError, RefusalError)
 _NAMESPACE = "fv_101"
 _RECORD = 2 * SquareWave().period
 _POSITION_BIAS = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
-_TOLERANCES = {
-    "mass": 0.10,
-    "viscous_friction": 0.001,
-    "coulomb_friction": 0.001,
-    "static_friction": 0.01,
-    "spring_constant": 0.001,
-    "spring_preload": 0.001,
-}
 _PRINTED_WIDTH = 100
-_INTERVALS = 3.0
-"""Half widths of its interval by which an identified value may be off."""
 _START_TIMEOUT = 30.0
 _UNDER_WAY = 2.0
 """Signal let pass after a change, s: samples still under way belong to the time before it."""
-_NEWEST = 2.0
-"""Age, s, up to which a diagnosed estimate is the one just asked for."""
 _FRICTION = ("mass", "viscous_friction", "coulomb_friction", "static_friction")
-
-
-class _Outcome(NamedTuple):
-    """One identified state of the packing."""
-
-    label: str
-    truth: KarnoppParameters
-    published: Mapping[str, float]
-    refined: Mapping[str, Parameter]
-    case: Case
-
-    def errors(self) -> dict[str, float]:
-        """Relative errors of the published estimate."""
-        return {name: self.published[name] / getattr(self.truth, name) - 1 for name in _TOLERANCES}
-
-    def missed(self) -> list[str]:
-        """Parameters whose published error exceeds the tolerance, or whose interval is untrue."""
-        outside = {
-            name for name, error in self.errors().items() if not abs(error) <= _TOLERANCES[name]
-        }
-        untrue = {
-            name
-            for name, one in self.refined.items()
-            if one.verdict is Verdict.IDENTIFIED
-            and abs(one.value - getattr(self.truth, name)) > _INTERVALS * one.half_width
-        }
-        return [name for name in _TOLERANCES if name in outside | untrue]
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -133,70 +81,6 @@ def _record(client: BenchClient, console: Console, label: str) -> None:
         client.wait(enough, 3 * _RECORD, f"record of {_RECORD:g} s")
 
 
-def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Outcome:
-    """Identify the record on the running node and read the result from its topics."""
-    recording = client.recording()
-    client.trigger("identify")
-    client.wait(
-        lambda: float(client.diagnostic_values.get("estimate_age [s]", "inf")) < _NEWEST,
-        _START_TIMEOUT,
-        "diagnostic of the estimate",
-    )
-    values = client.diagnostic_values
-    if "threshold [m/s]" not in values:
-        raise BenchError(f"no published estimate: {values['warnings']}")
-    sweep = client.sweep_columns()
-    published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in _TOLERANCES}
-    refined = {name: _refined(name, values) for name in _TOLERANCES}
-    case = Case(
-        label,
-        recording,
-        sweep["threshold"],
-        sweep["coulomb_friction"],
-        sweep["sigma"],
-        float(values["threshold [m/s]"]),
-        refined["coulomb_friction"],
-    )
-    return _Outcome(label, truth, published, refined, case)
-
-
-def _refined(name: str, values: Mapping[str, str]) -> Parameter:
-    """Read a parameter with its verdict from a diagnostic."""
-    half_width = float(values[f"{name} half width [{UNITS[name]}]"])
-    return Parameter(
-        name,
-        float(values[f"{name} [{UNITS[name]}]"]),
-        float("nan"),
-        half_width,
-        Verdict(values[f"{name} verdict"]),
-        values.get(f"{name} reason", ""),
-    )
-
-
-def _table(outcome: _Outcome) -> Table:
-    table = Table(title=outcome.label, title_justify="left", box=None, header_style="bold")
-    table.add_column("parameter", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    for heading in ("true", "published", "error", "refined", "± 95 %"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    for name, error in outcome.errors().items():
-        refined = outcome.refined[name]
-        told = not math.isnan(refined.value)
-        table.add_row(
-            name,
-            UNITS[name],
-            f"{getattr(outcome.truth, name):.6g}",
-            f"{outcome.published[name]:.6g}",
-            f"{100 * error:+.3f} %",
-            f"{refined.value:.6g}" if told else "–",
-            two_digits(refined.half_width) if refined.half_width > 0 else "",
-            refined.verdict.value,
-            style="red" if name in outcome.missed() else None,
-        )
-    return table
-
-
 def _nodes() -> list[NodeProcess]:
     simulated = {**asdict(LOW_FRICTION)}
     monitored = {
@@ -215,7 +99,7 @@ def _nodes() -> list[NodeProcess]:
 class _Story(NamedTuple):
     """What the demo saw: both states of the packing, and the closing diagnostic."""
 
-    outcomes: Sequence[_Outcome]
+    outcomes: Sequence[Outcome]
     level: int | None
     message: str
 
@@ -225,7 +109,7 @@ def _run(client: BenchClient, console: Console) -> _Story:
     with console.status("waiting for the nodes"):
         client.wait(lambda: client.recorded > 0, _START_TIMEOUT, "stem position")
     _record(client, console, "packing loose")
-    before = _identify(client, "packing loose", LOW_FRICTION)
+    before = identified(client, "packing loose", LOW_FRICTION)
     console.print(f"identified; {client.trigger('set_baseline')}", highlight=False)
     tightened = {name: getattr(HIGH_FRICTION, name) for name in _FRICTION}
     client.set_parameters("simulator", tightened)
@@ -233,14 +117,14 @@ def _run(client: BenchClient, console: Console) -> _Story:
     client.begin_record()
     client.wait(lambda: client.recorded >= _UNDER_WAY, _START_TIMEOUT, "stem position")
     _record(client, console, "packing tight")
-    after = _identify(client, "packing tight", HIGH_FRICTION)
+    after = identified(client, "packing tight", HIGH_FRICTION)
     return _Story((before, after), client.level, client.diagnostic_message)
 
 
 def _report(story: _Story, output: Path, console: Console) -> int:
     """Print and draw what was seen, and judge it; return the exit code."""
     for outcome in story.outcomes:
-        console.print(_table(outcome))
+        console.print(table_of(outcome))
     level = "without a level" if story.level is None else Level(story.level).name
     verdict = f"/diagnostics {level}: {story.message}"
     console.print(verdict, style="bold", highlight=False, markup=False)
