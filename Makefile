@@ -31,7 +31,7 @@ help:  ## list the targets
 
 .PHONY: demo
 demo: venv  ## friction of a simulated valve grows, and is diagnosed, in under two minutes
-	@"$(VENV)/bin/demo" $(DEMO_ARGS)
+	@"$(VENV)/bin/valve_friction" demo $(DEMO_ARGS)
 
 .PHONY: test
 test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some

@@ -50,12 +50,7 @@ setup(
             "identifiers = valve_friction_ros.nodes.start:identifiers",
             "simulator = valve_friction_ros.nodes.start:simulator",
             "pressure_source = valve_friction_ros.nodes.start:pressure_source",
-            "demo = valve_friction_ros.commands.demo.command:main",
-            "validate_recording = valve_friction_ros.commands.validate_recording:main",
-            "history = valve_friction_ros.commands.history:main",
-            "reproduce_paper = valve_friction_ros.commands.reproduce_paper:main",
-            "identify_recording = valve_friction_ros.commands.identify_recording:main",
-            "identify_recordings = valve_friction_ros.commands.identify_recordings:main",
+            "valve_friction = valve_friction_ros.commands.main:main",
         ],
     },
 )

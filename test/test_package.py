@@ -19,18 +19,7 @@ import rclpy
 
 PROJECT = Path(__file__).resolve().parents[1]
 NAME = "valve_friction_ros"
-EXECUTABLES = {
-    "demo",
-    "history",
-    "identifier",
-    "identifiers",
-    "identify_recording",
-    "identify_recordings",
-    "pressure_source",
-    "reproduce_paper",
-    "simulator",
-    "validate_recording",
-}
+EXECUTABLES = {"identifier", "identifiers", "pressure_source", "simulator", "valve_friction"}
 LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
 DOMAIN = 91
 PATIENCE = 30.0  # s, for one thing to happen on a loaded machine

@@ -21,9 +21,8 @@ _PATIENCE = 60.0
 _SILENCE = 5.0
 """Time without new samples after which no more are expected, s."""
 _TICKS = os.sysconf("SC_CLK_TCK")
-_PROFILE = (
-    Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "fast_discovery.xml"
-)
+_DEMO = Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "demo"
+_PROFILE = _DEMO / "fast_discovery.xml"
 
 
 class Process:

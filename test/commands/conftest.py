@@ -1,13 +1,16 @@
 """Recorded files of the bench valve, and the description of that valve."""
 
 import contextlib
+import json
 import os
 import socket
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from valve_friction_ros.commands.main import run
 from valve_friction_ros.model import Recording, SineWave, SquareWave, simulate
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -24,6 +27,62 @@ def quick_record(benches):
     """Ten seconds of a sine at 100 Hz, low friction: a small file."""
     pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
     return Recording(0.01, pressure, simulate(*benches["low"], pressure, 0.01).position)
+
+
+@pytest.fixture
+def command(capsys):
+    """Function of a sub-command and its arguments: exit code, stdout and stderr."""
+
+    def command(*arguments):
+        code = run([str(argument) for argument in arguments])
+        return (code, *capsys.readouterr())
+
+    return command
+
+
+@pytest.fixture
+def call(command):
+    """Function of arguments: exit code, stdout and stderr of `identify`."""
+    return partial(command, "identify")
+
+
+@pytest.fixture
+def printed(call):
+    """Function of arguments: the one JSON object that the command prints."""
+
+    def printed(*arguments):
+        code, out, err = call(*arguments, "--json")
+        assert (code, err) == (0, "")
+        assert out.count("\n") == 1
+        return json.loads(out, parse_constant=pytest.fail)
+
+    return printed
+
+
+@pytest.fixture
+def refusal(call):
+    """Function of arguments: the one line on stderr that goes with exit code 2."""
+
+    def refusal(*arguments):
+        code, out, err = call(*arguments)
+        assert (code, out) == (2, "")
+        line, rest = err.split("\n", 1)
+        assert rest == ""
+        command, _, message = line.partition(": ")
+        assert command == "valve_friction identify"
+        return message
+
+    return refusal
+
+
+@pytest.fixture(scope="session")
+def bench_options(bench_yaml):
+    return ["--valve", str(bench_yaml)]
+
+
+@pytest.fixture
+def quick_csv(write_csv, columns_of, quick_record):
+    return write_csv(columns_of(quick_record))
 
 
 @pytest.fixture

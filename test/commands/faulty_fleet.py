@@ -1,4 +1,4 @@
-"""The command `identify_recordings` where a file's name says what becomes of its process.
+"""The sub-command `identify-folder` where a file's name says what becomes of its process.
 
 At ``deadly…`` the process is killed, at ``endless…`` it waits until the command is dead.
 """
@@ -8,7 +8,8 @@ import os
 import signal
 import sys
 
-from valve_friction_ros.commands import identify_recordings
+from valve_friction_ros.commands import identify_folder
+from valve_friction_ros.commands.main import main
 from valve_friction_ros.fleet import identify_job
 
 
@@ -21,5 +22,5 @@ def identify(job):
 
 
 if __name__ == "__main__":
-    identify_recordings.identify_job = identify
-    sys.exit(identify_recordings.main())
+    identify_folder.identify_job = identify
+    sys.exit(main())

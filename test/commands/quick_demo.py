@@ -6,6 +6,7 @@ At 100 Hz only a derivative window of 50 ms follows the stem, and no such window
 import sys
 
 from valve_friction_ros.commands.demo import command as demo
+from valve_friction_ros.commands.main import main
 
 QUICKER = {
     "identifier": {"derivative_window": 5, "fixed.mass": 1.64},
@@ -21,4 +22,4 @@ if __name__ == "__main__":
     ]
     demo._nodes = lambda: nodes
     demo._UNDER_WAY = UNDER_WAY
-    sys.exit(demo.main())
+    sys.exit(main())

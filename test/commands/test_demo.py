@@ -1,11 +1,14 @@
-"""The command `demo`: its verdict, its options, and its whole story at a quicker pace."""
+"""The sub-command `demo`: its verdict, its options, and its whole story at a quicker pace."""
 
+import argparse
 import dataclasses
 import io
 import math
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +17,7 @@ from rich.console import Console
 
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo.bench_client import BenchError
+from valve_friction_ros.commands.demo.outcome import TOLERANCES, Outcome, identified
 from valve_friction_ros.figures import Case
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import (
@@ -40,7 +44,7 @@ HALF_WIDTH = 0.01  # of the value
 @pytest.fixture(scope="module")
 def case(quick_record):
     settings = IdentificationSettings(position_bias=1.13e-3, fixed={"mass": 1.6})
-    return Case.of("loose", quick_record, identify_refined(quick_record, BENCH_VALVE, settings))
+    return Case.of("loose", identify_refined(quick_record, BENCH_VALVE, settings))
 
 
 def refined(name, value, verdict=Verdict.IDENTIFIED, reason=""):
@@ -57,24 +61,24 @@ def outcome(case):
 
     def build(label="loose", truth=LOW_FRICTION, assessed=(), **errors):
         published = {
-            name: getattr(truth, name) * (1 + errors.get(name, 0.0)) for name in demo._TOLERANCES
+            name: getattr(truth, name) * (1 + errors.get(name, 0.0)) for name in TOLERANCES
         }
-        right = {name: refined(name, getattr(truth, name)) for name in demo._TOLERANCES}
+        right = {name: refined(name, getattr(truth, name)) for name in TOLERANCES}
         right |= {one.name: one for one in assessed}
-        return demo._Outcome(label, truth, published, right, case)
+        return Outcome(label, truth, published, right, case)
 
     return build
 
 
 def test_tolerances_are_what_was_promised():
-    assert {name: demo._TOLERANCES[name] for name in ASKED} == ASKED
+    assert {name: TOLERANCES[name] for name in ASKED} == ASKED
 
 
 class TestMissed:
-    @pytest.mark.parametrize("name", demo._TOLERANCES)
+    @pytest.mark.parametrize("name", TOLERANCES)
     @pytest.mark.parametrize("sign", [1, -1])
     def test_each_parameter_is_judged_both_ways(self, outcome, name, sign):
-        tolerance = demo._TOLERANCES[name]
+        tolerance = TOLERANCES[name]
         assert outcome(**{name: 0.99 * sign * tolerance}).missed() == []
         assert outcome(**{name: 1.01 * sign * tolerance}).missed() == [name]
 
@@ -86,7 +90,7 @@ class TestMissed:
         tight = outcome(truth=HIGH_FRICTION)._replace(published=outcome().published)
         assert set(tight.missed()) >= {"viscous_friction", "coulomb_friction", "static_friction"}
 
-    @pytest.mark.parametrize("name", demo._TOLERANCES)
+    @pytest.mark.parametrize("name", TOLERANCES)
     @pytest.mark.parametrize("sign", [1, -1])
     def test_an_interval_that_is_untrue(self, outcome, name, sign):
         """An identified value may be off by three half widths, at 1 % of the value each."""
@@ -189,7 +193,7 @@ class TestIdentify:
             "threshold [m/s]": "0.002",
             "warnings": "check the clocks",
         }
-        for name in demo._TOLERANCES:
+        for name in TOLERANCES:
             diagnostic |= {
                 f"{name} [{UNITS[name]}]": "3.5",
                 f"{name} half width [{UNITS[name]}]": "0.25",
@@ -205,8 +209,8 @@ class TestIdentify:
 
     def test_both_estimates_with_the_verdicts(self, quick_record, values):
         client = FakeClient(quick_record, values)
-        found = demo._identify(client, "loose", LOW_FRICTION)
-        assert found.estimate == dict.fromkeys(demo._TOLERANCES, 3.0)
+        found = identified(client, "loose", LOW_FRICTION)
+        assert found.published == dict.fromkeys(TOLERANCES, 3.0)
         friction = found.refined["coulomb_friction"]
         assert (friction.value, friction.half_width) == (3.5, 0.25)
         assert (friction.verdict, friction.reason) == (Verdict.WEAK, "2 strokes only")
@@ -223,27 +227,29 @@ class TestIdentify:
             "coulomb_friction half width [N]": "nan",
             "coulomb_friction verdict": "not identifiable",
         }
-        found = demo._identify(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
+        found = identified(FakeClient(quick_record, values | unknown), "loose", LOW_FRICTION)
         assert found.refined["coulomb_friction"].verdict is Verdict.NOT_IDENTIFIABLE
-        assert found.estimate["coulomb_friction"] == 3.0
+        assert found.published["coulomb_friction"] == 3.0
 
     @pytest.mark.parametrize("age", [None, "2.5"])
     def test_an_older_estimate_is_not_the_one_asked_for(self, quick_record, values, age):
         old = {name: value for name, value in values.items() if name != "estimate_age [s]"}
         old |= {} if age is None else {"estimate_age [s]": age}
         with pytest.raises(AssertionError, match="diagnostic of the estimate"):
-            demo._identify(FakeClient(quick_record, old), "loose", LOW_FRICTION)
+            identified(FakeClient(quick_record, old), "loose", LOW_FRICTION)
 
     def test_no_published_estimate_is_a_failure_with_its_reason(self, quick_record, values):
         withheld = {name: value for name, value in values.items() if "published" not in name}
         del withheld["threshold [m/s]"]
         with pytest.raises(BenchError, match=r"^no published estimate: check the clocks$"):
-            demo._identify(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
+            identified(FakeClient(quick_record, withheld), "loose", LOW_FRICTION)
 
 
 class TestOptions:
     def test_default_picture(self):
-        assert demo._parser().parse_args([]).output == Path("valve_friction_demo.png")
+        parser = argparse.ArgumentParser()
+        demo.declare(parser)
+        assert parser.parse_args([]).output == Path("valve_friction_demo.png")
 
     @pytest.mark.parametrize(
         ("name", "message"),
@@ -253,18 +259,17 @@ class TestOptions:
         ],
     )
     def test_a_bad_picture_is_refused_before_the_nodes_start(
-        self, monkeypatch, capsys, tmp_path, name, message
+        self, monkeypatch, command, tmp_path, name, message
     ):
         monkeypatch.setattr(demo, "running_nodes", pytest.fail)
-        assert demo.main(["--output", str(tmp_path / name)]) == 2
-        out, err = capsys.readouterr()
-        assert out == ""
-        assert err.startswith(f"demo: {tmp_path / name}: {message}")
+        code, out, err = command("demo", "--output", tmp_path / name)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"valve_friction demo: {tmp_path / name}: {message}")
         assert err.count("\n") == 1
 
-    def test_unknown_option(self, capsys):
+    def test_unknown_option(self, command, capsys):
         with pytest.raises(SystemExit) as ended:
-            demo.main(["--speed", "10"])
+            command("demo", "--speed", "10")
         assert ended.value.code == 2
         assert "unrecognized arguments: --speed 10" in capsys.readouterr().err
 
@@ -278,12 +283,39 @@ def test_nodes_start_as_the_bench_valve():
     assert nodes["identifier"]["position_bias"] == bias
 
 
+def children(pid):
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+def test_interrupted(ros_environment, tmp_path):
+    """Ctrl-C while the nodes run: one line, and no node stays."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "valve_friction_ros", "demo"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env=ros_environment,
+    )
+    deadline = time.monotonic() + 60
+    while len(children(process.pid)) < 3:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    time.sleep(1.0)
+    nodes = children(process.pid)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err == "valve_friction demo: interrupted\n"
+    assert not any(Path(f"/proc/{node}").exists() for node in nodes)
+
+
 @pytest.mark.slow
 def test_the_whole_story(ros_environment, tmp_path):
     """Three nodes over DDS: identified, tightened while running, identified again, diagnosed."""
     output = tmp_path / "demo.png"
     done = subprocess.run(
-        [sys.executable, Path(__file__).with_name("quick_demo.py"), "--output", output],
+        [sys.executable, Path(__file__).with_name("quick_demo.py"), "demo", "--output", output],
         capture_output=True,
         text=True,
         timeout=110,

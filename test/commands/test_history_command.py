@@ -1,5 +1,6 @@
-"""Command `history`, as a person runs it."""
+"""The sub-command `history`, as a person runs it."""
 
+import argparse
 import csv
 import json
 import math
@@ -9,7 +10,7 @@ import matplotlib.image
 import pytest
 from histories import DAY, OTHER, START, VALVE, refused, success
 
-from valve_friction_ros.commands import history as command
+from valve_friction_ros.commands import history as subcommand
 from valve_friction_ros.health import Baseline, FrictionLimits
 from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline
 from valve_friction_ros.identification import Verdict
@@ -34,12 +35,12 @@ def file(tmp_path_factory):
 
 
 @pytest.fixture
-def run(file, capsys):
+def run(file, command, capsys):
     """Run the command on the file; return exit code, output and errors."""
 
     def call(*arguments, path=file):
         try:
-            code = command.main([str(path), *map(str, arguments)])
+            return command("history", path, *arguments)
         except SystemExit as end:
             code = end.code
         captured = capsys.readouterr()
@@ -111,6 +112,8 @@ class TestJson:
             "value": 150.0,
             "standard_error": 0.5,
             "half_width": 1.0,
+            "interval": [149.0, 151.0],
+            "published": None,
             "unit": "N",
             "verdict": "identified",
             "reason": "",
@@ -199,7 +202,7 @@ class TestErrors:
     def refused(self, result, *words):
         code, output, errors = result
         assert (code, output) == (2, "")
-        assert errors.startswith("history: ")
+        assert errors.startswith("valve_friction history: ")
         assert errors.count("\n") == 1
         for word in words:
             assert word in errors
@@ -253,5 +256,6 @@ class TestErrors:
 
 def test_the_default_file():
     """That of the nodes."""
-    options = command._parser().parse_args([])
-    assert options.file.parts[-2:] == ("valve_friction_ros", "history.sqlite")
+    parser = argparse.ArgumentParser()
+    subcommand.declare(parser)
+    assert parser.parse_args([]).file.parts[-2:] == ("valve_friction_ros", "history.sqlite")

@@ -4,25 +4,20 @@ import json
 import subprocess
 import sys
 from decimal import Decimal
+from functools import partial
 
 import numpy as np
 import pytest
 from bags import PRESSURE, messages_of, storage_file, write_bag
 from pages import PageReader
 
-from valve_friction_ros.commands.identify_recording import main
 from valve_friction_ros.model import Recording
 
 
 @pytest.fixture
-def call(capsys, bench_yaml):
-    """Function of arguments: exit code, stdout and stderr of the command in this process."""
-
-    def call(*arguments):
-        code = main(["--valve", str(bench_yaml), *map(str, arguments)])
-        return (code, *capsys.readouterr())
-
-    return call
+def call(command, bench_yaml):
+    """Function of arguments: exit code, stdout and stderr of `identify`."""
+    return partial(command, "identify", "--valve", bench_yaml)
 
 
 @pytest.fixture
@@ -84,7 +79,7 @@ class TestOneValve:
         file.write_bytes(file.read_bytes()[:40_000])
         code, out, err = call(bag)
         assert (code, out) == (2, "")
-        assert err.startswith(f"identify_recording: {bag}, /fv_101: the ")
+        assert err.startswith(f"valve_friction identify: {bag}, /fv_101: the ")
         assert "; bag.db3 is cut off or damaged (" in err
         assert err.count("\n") == 1
 
@@ -93,10 +88,10 @@ class TestOneValve:
         blocked = "rclpy", "sensor_msgs", "std_msgs", "builtin_interfaces", "rosbag2_py"
         code = (
             f"import sys; sys.modules.update(dict.fromkeys({blocked})); "
-            "from valve_friction_ros.commands.identify_recording import main; sys.exit(main())"
+            "from valve_friction_ros.commands.main import main; sys.exit(main())"
         )
         done = subprocess.run(
-            [sys.executable, "-c", code, str(bag), "--valve", str(bench_yaml)],
+            [sys.executable, "-c", code, "identify", str(bag), "--valve", str(bench_yaml)],
             capture_output=True,
             text=True,
             timeout=60,
@@ -123,7 +118,7 @@ class TestSeveralValves:
         assert valves["/fv_101"] == csv_answer
         assert list(valves["/fv_102"]) == list(valves["/fv_103"]) == ["error"]
         assert err.splitlines() == [
-            f"identify_recording: {valves[name]['error']}" for name in ("/fv_102", "/fv_103")
+            f"valve_friction identify: {valves[name]['error']}" for name in ("/fv_102", "/fv_103")
         ]
         assert valves["/fv_102"]["error"].startswith(
             f"{fleet}, /fv_102: the stem did not move: its position spans 0 µm"
@@ -141,8 +136,8 @@ class TestSeveralValves:
         code, out, err = call(fleet, "--valve-name", "fv_103", "--json")
         assert (code, out) == (2, "")
         assert err == (
-            f"identify_recording: {fleet}, /fv_103: no sensor_msgs/msg/JointState topic beside "
-            "/fv_103/actuator_pressure\n"
+            f"valve_friction identify: {fleet}, /fv_103: no sensor_msgs/msg/JointState topic "
+            "beside /fv_103/actuator_pressure\n"
         )
 
     def test_two_good_ones(self, call, tmp_path, quick_record):
@@ -166,8 +161,8 @@ class TestSeveralValves:
         code, out, err = call(fleet, "--plot", tmp_path / "fleet.png")
         assert (code, out) == (2, "")
         assert err == (
-            "identify_recording: --plot draws one valve: choose one of /fv_101, /fv_102, /fv_103 "
-            "by --valve-name\n"
+            "valve_friction identify: --plot draws one valve: choose one of /fv_101, /fv_102, "
+            "/fv_103 by --valve-name\n"
         )
         picture = tmp_path / "one.png"
         assert call(fleet, "--valve-name", "fv_101", "--plot", picture)[0] == 0
@@ -180,7 +175,7 @@ class TestSeveralValves:
             (["--report", report], "--report is of"),
             (["--baseline-coulomb-friction", "150"], "--baseline-coulomb-friction is of"),
         ):
-            assert call(fleet, *options) == (2, "", f"identify_recording: {purpose} {which}")
+            assert call(fleet, *options) == (2, "", f"valve_friction identify: {purpose} {which}")
         assert not report.exists()
         assert call(fleet, "--valve-name", "fv_101", "--report", report)[0] == 0
         page = PageReader(report.read_text(encoding="utf-8"))
@@ -211,7 +206,7 @@ class TestNoRecording:
         change(bag)
         code, out, err = call(bag)
         assert (code, out) == (2, "")
-        assert err.startswith(f"identify_recording: {bag}")
+        assert err.startswith(f"valve_friction identify: {bag}")
         assert words in err
         assert err.count("\n") == 1
 
@@ -235,10 +230,12 @@ class TestNoRecording:
         assert words in err
         assert err.count("\n") == 1
 
-    def test_a_bag_needs_the_valve(self, bag, capsys):
-        assert main([str(bag)]) == 2
-        assert capsys.readouterr().err == (
-            "identify_recording: pressure needs the diaphragm_area: give a valve file by --valve\n"
+    def test_a_bag_needs_the_valve(self, bag, command):
+        code, _, err = command("identify", bag)
+        assert code == 2
+        assert err == (
+            "valve_friction identify: pressure needs the diaphragm_area: give a valve file by "
+            "--valve\n"
         )
 
 

@@ -1,4 +1,4 @@
-"""`identify_recording --report`: one page, read as a browser reads it, and shown by one."""
+"""`identify --report`: one page, read as a browser reads it, and shown by one."""
 
 import json
 import math
@@ -6,12 +6,12 @@ import re
 import shutil
 import struct
 import subprocess
+from functools import partial
 
 import pytest
 from pages import PNG, PageReader
 
 import valve_friction_ros
-from valve_friction_ros.commands.identify_recording import main
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, TriangleWave, simulate
 
 BASELINE = ["--baseline-coulomb-friction", "100", "--baseline-half-width", "2"]
@@ -39,14 +39,9 @@ BROWSERS = [path for path in map(shutil.which, _NAMES) if path is not None]
 
 
 @pytest.fixture
-def call(capsys):
-    """Function of arguments: exit code, stdout and stderr of the command in this process."""
-
-    def call(*arguments):
-        code = main([str(argument) for argument in arguments])
-        return (code, *capsys.readouterr())
-
-    return call
+def call(command):
+    """Function of arguments: exit code, stdout and stderr of `identify`."""
+    return partial(command, "identify")
 
 
 @pytest.fixture
@@ -187,7 +182,7 @@ def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, quick_r
 def test_what_cannot_be_is_told_before_anything_is_read(call, bench_yaml, options, reason):
     """The recording is not even there."""
     code, out, err = call("missing.csv", "--valve", bench_yaml, *options)
-    assert (code, out, err) == (2, "", f"identify_recording: {reason}\n")
+    assert (code, out, err) == (2, "", f"valve_friction identify: {reason}\n")
 
 
 @pytest.fixture
@@ -200,7 +195,7 @@ def test_a_folder_that_cannot_be_written_to(call, bench_yaml, unwritable):
     path = f"{unwritable}/report.html"
     code, out, err = call("missing.csv", "--valve", bench_yaml, "--report", path)
     assert (code, out) == (2, "")
-    assert err.startswith(f"identify_recording: {path}: cannot write into {unwritable}: ")
+    assert err.startswith(f"valve_friction identify: {path}: cannot write into {unwritable}: ")
     assert err.count("\n") == 1
 
 

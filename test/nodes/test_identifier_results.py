@@ -165,7 +165,7 @@ def test_diagnostics(bench):
 def test_real_machine_gives_the_numbers_of_the_command(live):
     if not EMPS.is_file():
         pytest.skip(f"the EMPS record is not here ({EMPS.name}): it may not be redistributed")
-    command = [sys.executable, "-m", "valve_friction_ros.commands.identify_recording", str(EMPS)]
+    command = [sys.executable, "-m", "valve_friction_ros", "identify", str(EMPS)]
     told = subprocess.run(
         [*command, "--fix", "spring_constant=0", "--json"],
         cwd=Path(__file__).parents[2],

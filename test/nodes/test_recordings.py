@@ -39,7 +39,7 @@ class Run(NamedTuple):
 
 def identified(*arguments):
     """The one JSON object of the command, run as a person would."""
-    command = [sys.executable, "-m", "valve_friction_ros.commands.identify_recording", "--json"]
+    command = [sys.executable, "-m", "valve_friction_ros", "identify", "--json"]
     done = subprocess.run(
         [*command, *map(str, arguments)],
         cwd=PROJECT,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pytest
 
-from valve_friction_ros.commands import reproduce_paper
+from valve_friction_ros.commands import main, reproduce_paper
 from valve_friction_ros.model import IsaSteps
 from valve_friction_ros.reproduction import Plan, Programme
 
@@ -44,5 +44,5 @@ def reproduced(tmp_path_factory):
         patch.setattr(reproduce_paper, "run_programme", run)
         patch.setattr(reproduce_paper, "_PLAN", SHORT)
         patch.setattr(reproduce_paper, "_SEEDS", 2)
-        code = reproduce_paper.main(["--output", str(output), "--seed", "3"])
+        code = main.run(["reproduce-paper", "--output", str(output), "--seed", "3"])
     return Reproduced(code, printed.getvalue().splitlines(), output, kept[0], told)

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from valve_friction_ros.commands.reproduce_paper import main
+from valve_friction_ros.commands.main import run
 from valve_friction_ros.reproduction import all_checks
 
 PICTURES = {
@@ -97,9 +97,9 @@ def test_the_noise_of_the_run_is_stated(page):
 )
 def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, told):
     monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
+    assert run(["reproduce-paper", *arguments]) == 2
     error = capsys.readouterr().err
-    assert error.startswith("reproduce_paper: ")
+    assert error.startswith("valve_friction reproduce-paper: ")
     assert told in error
     assert error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
@@ -107,16 +107,18 @@ def test_wrong_options_are_refused_in_one_line(tmp_path, monkeypatch, capsys, ar
 
 def test_an_output_that_is_a_file_is_refused(tmp_path, capsys):
     (tmp_path / "taken").write_text("")
-    assert main(["--output", str(tmp_path / "taken")]) == 2
-    told = f"reproduce_paper: {tmp_path / 'taken'}: is no folder: give --output another name\n"
-    assert capsys.readouterr().err == told
+    assert run(["reproduce-paper", "--output", str(tmp_path / "taken")]) == 2
+    told = f"{tmp_path / 'taken'}: is no folder: give --output another name"
+    assert capsys.readouterr().err == f"valve_friction reproduce-paper: {told}\n"
 
 
 def test_noise_that_hides_everything_is_refused_with_the_packing(tmp_path, capsys):
-    options = ["--output", str(tmp_path), "--position-noise-um", "1000"]
-    assert main(options) == 2
+    options = ["reproduce-paper", "--output", str(tmp_path), "--position-noise-um", "1000"]
+    assert run(options) == 2
     refusal = capsys.readouterr().err.splitlines()[-1]
-    assert refusal.startswith("reproduce_paper: packing low: sampling is too slow for the motion")
+    assert refusal.startswith(
+        "valve_friction reproduce-paper: packing low: sampling is too slow for the motion"
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -130,6 +132,6 @@ def test_noise_of_the_command_line_replaces_the_configured(monkeypatch, tmp_path
         raise ValueError("enough")
 
     monkeypatch.setattr(reproduce_paper, "run_programme", refuse)
-    options = ["--output", str(tmp_path), "--position-noise-um", "0", "--pressure-noise-pa", "7"]
-    assert main([*options, "--seed", "4"]) == 2
+    options = ["--position-noise-um", "0", "--pressure-noise-pa", "7", "--seed", "4"]
+    assert run(["reproduce-paper", "--output", str(tmp_path), *options]) == 2
     assert {(one.position, one.pressure, one.seed) for one in seen.values()} == {(0.0, 7.0, 4)}

@@ -1,14 +1,13 @@
-"""Command `history`: list, export and draw what the identifiers have kept."""
+"""Sub-command `history`: list, export and draw what the identifiers have kept."""
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from valve_friction_ros.commands.formatting import OneLineParser, complain
-from valve_friction_ros.commands.history_output import as_json, print_table, write_csv
+from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
@@ -19,9 +18,9 @@ from valve_friction_ros.history import (
 from valve_friction_ros.records.data_folder import history_file
 from valve_friction_ros.streams import nanoseconds
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
 
-_EXIT_REFUSED = 2
+REFUSALS = (HistoryError,)
 _FIRST = datetime(1970, 1, 1, tzinfo=timezone.utc)
 _LAST = datetime(2262, 1, 1, tzinfo=timezone.utc)
 """Whose nanoseconds still are a signed 64-bit number."""
@@ -47,11 +46,12 @@ def _until(text: str) -> datetime:
     return min(_time(text) + timedelta(days=is_date), _LAST)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="history",
-        description="List what the identifiers have kept: identifications, refusals and trend.",
-        epilog="Times are in UTC. Exit code 2: the file or the choice was refused.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = "List what the identifiers have kept: identifications, refusals and trend."
+    parser.epilog = (
+        "Times are in UTC. Exit code 2: the file or the choice was refused, or the table or the "
+        "picture could not be written."
     )
     parser.add_argument(
         "file",
@@ -81,7 +81,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write them as a table")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    return parser
 
 
 def _is_called(valve: KeptValve, name: str) -> bool:
@@ -99,12 +98,19 @@ def _chosen(valves: Sequence[KeptValve], names: Sequence[str] | None) -> tuple[K
     return tuple(valve for valve in valves if any(_is_called(valve, name) for name in names))
 
 
-def _run(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
-    file = HistoryFile(options.file)
+def _require_files(options: argparse.Namespace) -> None:
+    """Refuse files that cannot be written, before long work is done for them."""
+    if options.csv is not None and not options.csv.parent.is_dir():
+        raise ValueError(f"{options.csv}: there is no folder {options.csv.parent}")
     if options.plot is not None:
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
         figures.require_picture_file(options.plot)
+
+
+def _histories(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
+    """Read the chosen valves within the chosen times."""
+    file = HistoryFile(options.file)
     histories = valve_histories(
         file,
         _chosen(file.valves(), options.valve),
@@ -112,31 +118,29 @@ def _run(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
     )
     if not histories:
         raise ValueError(f"{options.file}: no identification of these valves within these times")
-    if options.csv is not None:
-        write_csv(options.csv, histories)
+    return histories
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print what was kept of the chosen valves, and write the files asked for."""
+    _require_files(options)
+    histories = _histories(options)
+    figure = None
     if options.plot is not None:
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
         try:
             figure = figures.trend_figure(histories)
         except ValueError as error:
             raise ValueError(f"--plot: {error} by --valve") from None
-        figure.savefig(options.plot)
-    return histories
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    options = _parser().parse_args(arguments)
     try:
-        histories = _run(options)
-    except (ValueError, HistoryError, OSError) as error:
-        complain("history", error)
-        return _EXIT_REFUSED
-    if options.json:
-        print(json.dumps(as_json(histories), ensure_ascii=False, allow_nan=False))
-    else:
-        print_table(histories)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        if options.json:
+            print(json.dumps(as_json(histories), ensure_ascii=False, allow_nan=False))
+        else:
+            print_table(histories)
+    finally:  # a closed output costs no file, and a full disk no list
+        if options.csv is not None:
+            write_csv(options.csv, histories)
+        if figure is not None:
+            figures.save_picture(figure, options.plot)
+    return ExitCode.DONE

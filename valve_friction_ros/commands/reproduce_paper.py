@@ -1,18 +1,18 @@
-"""Command `reproduce_paper`: the published programme on the simulated bench, and a report of it."""
+"""Sub-command `reproduce-paper`: the published programme on the simulated bench, and its report."""
 
 import argparse
 import math
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from valve_friction_ros.commands.formatting import OneLineParser, complain
+from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import SensorNoise
-from valve_friction_ros.reports import render
+from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.reports import write_report
 from valve_friction_ros.reproduction import (
     BENCH_NAMES,
     Bench,
@@ -27,9 +27,9 @@ from valve_friction_ros.reproduction import (
     summary,
 )
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
 
-_EXIT_REFUSED = 2
+REFUSALS = (RefusalError,)
 _PAGE = "reproduction.html"
 _PLAN = Plan()
 _SEEDS = 5
@@ -37,14 +37,14 @@ _DRAWINGS = 2
 """Steps after the programme: the figures, and the page."""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="reproduce_paper",
-        description="Run the paper's experiments, identification and validation on the simulated "
-        f"bench, and write {_PAGE} and every figure, beside the paper's numbers. The last line "
-        "says what matched.",
-        epilog="Exit code 0: the report is written, whatever matched; 2: it is not.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = (
+        "Run the paper's experiments, identification and validation on the simulated bench, and "
+        f"write {_PAGE} and every figure, beside the paper's numbers. The last line says what "
+        "matched."
     )
+    parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
     parser.add_argument(
         "--output",
         type=Path,
@@ -72,7 +72,6 @@ def _parser() -> argparse.ArgumentParser:
         help="standard deviation of the pressure sensor, Pa, instead of the configured one",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the noise (%(default)s)")
-    return parser
 
 
 def _noise(bench: Bench, options: argparse.Namespace) -> SensorNoise:
@@ -107,43 +106,32 @@ def _reproduce(benches: dict[str, Bench], output: Path, progress: Callable[[str]
     progress("figures")
     pictures = draw_figures(programme)
     for name, picture in pictures.items():
-        (output / f"{name}.png").write_bytes(picture.png)
+        write_whole(output / f"{name}.png", picture.png)
     progress("report")
-    text = render(report_page(programme, checks, pictures))
-    (output / _PAGE).write_text(text, encoding="utf-8")
+    write_report(report_page(programme, checks, pictures), output / _PAGE)
     return summary(checks)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    options = _parser().parse_args(arguments)
-    console = Console(stderr=True)
-    try:
-        benches = _benches(options)
-        if options.output.exists() and not options.output.is_dir():
-            raise ValueError(f"{options.output}: is no folder: give --output another name")
-        options.output.mkdir(parents=True, exist_ok=True)
-        with Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            console=console,
-        ) as bar:
-            task = bar.add_task("", total=progress_steps(benches) + _DRAWINGS, completed=-1)
-            matched = _reproduce(
-                benches,
-                options.output,
-                lambda what: bar.update(task, description=what, advance=1),
-            )
-            bar.update(task, description="done", advance=1)
-    except (ValueError, RefusalError, OSError) as error:
-        complain("reproduce_paper", error)
-        return _EXIT_REFUSED
+def run(options: argparse.Namespace) -> int:
+    """Run the programme, and write the report."""
+    benches = _benches(options)
+    if options.output.exists() and not options.output.is_dir():
+        raise ValueError(f"{options.output}: is no folder: give --output another name")
+    options.output.mkdir(parents=True, exist_ok=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=OutputConsole(stderr=True),
+    ) as bar:
+        task = bar.add_task("", total=progress_steps(benches) + _DRAWINGS, completed=-1)
+        matched = _reproduce(
+            benches,
+            options.output,
+            lambda what: bar.update(task, description=what, advance=1),
+        )
+        bar.update(task, description="done", advance=1)
     print(f"{options.output / _PAGE} is written.")
     print(matched)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return ExitCode.DONE

@@ -2,7 +2,7 @@
 
 from valve_friction_ros.figures.case import FORCE, PRESSURE, Case, DriveScale
 from valve_friction_ros.figures.friction_figure import friction_figure, identification_figure
-from valve_friction_ros.figures.picture import require_picture_file
+from valve_friction_ros.figures.picture import require_picture_file, save_picture
 from valve_friction_ros.figures.signature_figure import draw_breakaway_points, signature_figure
 from valve_friction_ros.figures.trend_figure import trend_figure
 from valve_friction_ros.figures.validation_figure import validation_figure
@@ -16,6 +16,7 @@ __all__ = [
     "friction_figure",
     "identification_figure",
     "require_picture_file",
+    "save_picture",
     "signature_figure",
     "trend_figure",
     "validation_figure",

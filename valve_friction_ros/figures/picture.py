@@ -1,10 +1,17 @@
-"""Files that figures can be saved to."""
+"""Files that figures are saved to."""
 
+import io
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-__all__ = ["require_picture_file"]
+from valve_friction_ros.records.whole_file import write_whole
+
+__all__ = ["require_picture_file", "save_picture"]
+
+
+def _format(path: Path) -> str:
+    return path.suffix.lstrip(".").lower()
 
 
 def require_picture_file(path: Path) -> None:
@@ -16,7 +23,20 @@ def require_picture_file(path: Path) -> None:
         If the ending is no picture format, or the folder is not there; the message names it.
     """
     endings = Figure().canvas.get_supported_filetypes()
-    if path.suffix.lstrip(".").lower() not in endings:
+    if _format(path) not in endings:
         raise ValueError(f"{path}: not a picture format; choose from .{', .'.join(endings)}")
     if not path.parent.is_dir():
         raise ValueError(f"{path}: there is no folder {path.parent}")
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Draw a figure into a file in the format of its ending.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; it names `path`, and no part of the picture stays.
+    """
+    content = io.BytesIO()
+    figure.savefig(content, format=_format(path))
+    write_whole(path, content.getvalue())

@@ -1,9 +1,9 @@
 """Files that reports are written to."""
 
-import os
 import tempfile
 from pathlib import Path
 
+from valve_friction_ros.records.whole_file import write_whole
 from valve_friction_ros.reports.page import Page, render
 
 __all__ = ["require_report_file", "write_report"]
@@ -35,16 +35,11 @@ def require_report_file(path: Path) -> None:
 
 
 def write_report(page: Page, path: Path) -> None:
-    """Write a page as one HTML file; nobody meets half of it.
+    """Write a page as one HTML file, whole or not at all.
 
     Raises
     ------
     OSError
         If it cannot be written; what was at its place stays as it was.
     """
-    draft = path.with_name(f".{os.getpid()}_{path.name}")
-    try:
-        draft.write_text(render(page), encoding="utf-8")
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+    write_whole(path, render(page).encode())

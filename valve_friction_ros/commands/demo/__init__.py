@@ -1,1 +1,5 @@
-"""The demonstration: a simulated valve whose friction grows."""
+"""Sub-command `demo`: a simulated valve whose friction grows."""
+
+from valve_friction_ros.commands.demo.command import REFUSALS, declare, run
+
+__all__ = ["REFUSALS", "declare", "run"]

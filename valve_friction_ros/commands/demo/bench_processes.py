@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,7 +52,7 @@ def _wait_or_kill(process: subprocess.Popen[bytes]) -> None:
 def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
     for process in processes:
         if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
     for process in processes:
         _wait_or_kill(process)
 
@@ -62,7 +61,7 @@ def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
 def running_nodes(
     nodes: Sequence[NodeProcess], namespace: str
 ) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Run `nodes` in `namespace` as long as the context lasts; stop them as Ctrl-C would."""
+    """Run `nodes` in `namespace` as long as the context lasts; then stop them."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
         # A session of their own keeps the terminal's Ctrl-C from them: they are stopped here.

@@ -1,18 +1,17 @@
-"""Command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
+"""Sub-command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
 
 import argparse
-import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
 import rclpy
+from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
 from valve_friction_ros.commands.demo.bench_processes import (
@@ -20,82 +19,38 @@ from valve_friction_ros.commands.demo.bench_processes import (
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.commands.formatting import OneLineParser, complain, two_digits
-from valve_friction_ros.figures import Case, friction_figure, require_picture_file
+from valve_friction_ros.commands.demo.outcome import Outcome, identified, table_of
+from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.output.formatting import OutputConsole
+from valve_friction_ros.figures import friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
-from valve_friction_ros.identification import (
-    UNITS,
-    Parameter,
-    RefusalError,
-    Verdict,
-)
-from valve_friction_ros.model import (
-    BENCH_VALVE,
-    HIGH_FRICTION,
-    LOW_FRICTION,
-    KarnoppParameters,
-    SquareWave,
-)
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SquareWave
 from valve_friction_ros.streams import RecordBuffer
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
+
+REFUSALS = (BenchError, RefusalError)
 
 _NAMESPACE = "fv_101"
 _RECORD = 2 * SquareWave().period
 _POSITION_BIAS = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
-_TOLERANCES = {
-    "mass": 0.10,
-    "viscous_friction": 0.001,
-    "coulomb_friction": 0.001,
-    "static_friction": 0.01,
-    "spring_constant": 0.001,
-    "spring_preload": 0.001,
-}
 _PRINTED_WIDTH = 100
-_INTERVALS = 3.0
-"""Half widths of its interval by which an identified value may be off."""
 _START_TIMEOUT = 30.0
 _UNDER_WAY = 2.0
 """Signal let pass after a change, s: samples still under way belong to the time before it."""
-_NEWEST = 2.0
-"""Age, s, up to which a diagnosed estimate is the one just asked for."""
 _FRICTION = ("mass", "viscous_friction", "coulomb_friction", "static_friction")
 
 
-class _Outcome(NamedTuple):
-    """One identified state of the packing."""
-
-    label: str
-    truth: KarnoppParameters
-    published: Mapping[str, float]
-    refined: Mapping[str, Parameter]
-    case: Case
-
-    def errors(self) -> dict[str, float]:
-        """Relative errors of the published estimate."""
-        return {name: self.published[name] / getattr(self.truth, name) - 1 for name in _TOLERANCES}
-
-    def missed(self) -> list[str]:
-        """Parameters whose published error exceeds the tolerance, or whose interval is untrue."""
-        outside = {
-            name for name, error in self.errors().items() if not abs(error) <= _TOLERANCES[name]
-        }
-        untrue = {
-            name
-            for name, one in self.refined.items()
-            if one.verdict is Verdict.IDENTIFIED
-            and abs(one.value - getattr(self.truth, name)) > _INTERVALS * one.half_width
-        }
-        return [name for name in _TOLERANCES if name in outside | untrue]
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="demo",
-        description="Start a simulated valve and its monitor as processes, identify the friction, "
-        "tighten the packing while it runs, and identify again.",
-        epilog="Exit code 0: all within tolerance and the excess friction was diagnosed; "
-        "1: not so; 2: the bench did not run.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = (
+        "Start a simulated valve and its monitor as processes, identify the friction, tighten the "
+        "packing while it runs, and identify again."
+    )
+    parser.epilog = (
+        "Exit code 0: all within tolerance and the excess friction was diagnosed; 1: not so; "
+        "2: the bench did not run, or the picture could not be written."
     )
     parser.add_argument(
         "--output",
@@ -104,7 +59,6 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.png",
         help="picture of the result (%(default)s)",
     )
-    return parser
 
 
 def _record(client: BenchClient, console: Console, label: str) -> None:
@@ -127,70 +81,6 @@ def _record(client: BenchClient, console: Console, label: str) -> None:
         client.wait(enough, 3 * _RECORD, f"record of {_RECORD:g} s")
 
 
-def _identify(client: BenchClient, label: str, truth: KarnoppParameters) -> _Outcome:
-    """Identify the record on the running node and read the result from its topics."""
-    recording = client.recording()
-    client.trigger("identify")
-    client.wait(
-        lambda: float(client.diagnostic_values.get("estimate_age [s]", "inf")) < _NEWEST,
-        _START_TIMEOUT,
-        "diagnostic of the estimate",
-    )
-    values = client.diagnostic_values
-    if "threshold [m/s]" not in values:
-        raise BenchError(f"no published estimate: {values['warnings']}")
-    sweep = client.sweep_columns()
-    published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in _TOLERANCES}
-    refined = {name: _refined(name, values) for name in _TOLERANCES}
-    case = Case(
-        label,
-        recording,
-        sweep["threshold"],
-        sweep["coulomb_friction"],
-        sweep["sigma"],
-        float(values["threshold [m/s]"]),
-        refined["coulomb_friction"],
-    )
-    return _Outcome(label, truth, published, refined, case)
-
-
-def _refined(name: str, values: Mapping[str, str]) -> Parameter:
-    """Read a parameter with its verdict from a diagnostic."""
-    half_width = float(values[f"{name} half width [{UNITS[name]}]"])
-    return Parameter(
-        name,
-        float(values[f"{name} [{UNITS[name]}]"]),
-        float("nan"),
-        half_width,
-        Verdict(values[f"{name} verdict"]),
-        values.get(f"{name} reason", ""),
-    )
-
-
-def _table(outcome: _Outcome) -> Table:
-    table = Table(title=outcome.label, title_justify="left", box=None, header_style="bold")
-    table.add_column("parameter", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    for heading in ("true", "published", "error", "refined", "± 95 %"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    for name, error in outcome.errors().items():
-        refined = outcome.refined[name]
-        told = not math.isnan(refined.value)
-        table.add_row(
-            name,
-            UNITS[name],
-            f"{getattr(outcome.truth, name):.6g}",
-            f"{outcome.published[name]:.6g}",
-            f"{100 * error:+.3f} %",
-            f"{refined.value:.6g}" if told else "–",
-            two_digits(refined.half_width) if refined.half_width > 0 else "",
-            refined.verdict.value,
-            style="red" if name in outcome.missed() else None,
-        )
-    return table
-
-
 def _nodes() -> list[NodeProcess]:
     simulated = {**asdict(LOW_FRICTION)}
     monitored = {
@@ -209,7 +99,7 @@ def _nodes() -> list[NodeProcess]:
 class _Story(NamedTuple):
     """What the demo saw: both states of the packing, and the closing diagnostic."""
 
-    outcomes: Sequence[_Outcome]
+    outcomes: Sequence[Outcome]
     level: int | None
     message: str
 
@@ -219,7 +109,7 @@ def _run(client: BenchClient, console: Console) -> _Story:
     with console.status("waiting for the nodes"):
         client.wait(lambda: client.recorded > 0, _START_TIMEOUT, "stem position")
     _record(client, console, "packing loose")
-    before = _identify(client, "packing loose", LOW_FRICTION)
+    before = identified(client, "packing loose", LOW_FRICTION)
     console.print(f"identified; {client.trigger('set_baseline')}", highlight=False)
     tightened = {name: getattr(HIGH_FRICTION, name) for name in _FRICTION}
     client.set_parameters("simulator", tightened)
@@ -227,19 +117,17 @@ def _run(client: BenchClient, console: Console) -> _Story:
     client.begin_record()
     client.wait(lambda: client.recorded >= _UNDER_WAY, _START_TIMEOUT, "stem position")
     _record(client, console, "packing tight")
-    after = _identify(client, "packing tight", HIGH_FRICTION)
+    after = identified(client, "packing tight", HIGH_FRICTION)
     return _Story((before, after), client.level, client.diagnostic_message)
 
 
 def _report(story: _Story, output: Path, console: Console) -> int:
     """Print and draw what was seen, and judge it; return the exit code."""
     for outcome in story.outcomes:
-        console.print(_table(outcome))
+        console.print(table_of(outcome))
     level = "without a level" if story.level is None else Level(story.level).name
     verdict = f"/diagnostics {level}: {story.message}"
     console.print(verdict, style="bold", highlight=False, markup=False)
-    friction_figure([outcome.case for outcome in story.outcomes], verdict).savefig(output)
-    console.print(f"picture: {output}", highlight=False, markup=False, soft_wrap=True)
     missed = [
         f"{name} ({outcome.label})" for outcome in story.outcomes for name in outcome.missed()
     ]
@@ -247,38 +135,24 @@ def _report(story: _Story, output: Path, console: Console) -> int:
         console.print(f"outside the tolerance: {', '.join(missed)}", style="bold red")
     if story.level != Level.ERROR:
         console.print("the excess friction was not diagnosed", style="bold red")
-    return 1 if missed or story.level != Level.ERROR else 0
+    save_picture(friction_figure([outcome.case for outcome in story.outcomes], verdict), output)
+    console.print(f"picture: {output}", highlight=False, markup=False, soft_wrap=True)
+    return ExitCode.PARTLY if missed or story.level != Level.ERROR else ExitCode.DONE
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demo; return its exit code."""
-    options = _parser().parse_args(arguments)
-    console = Console() if sys.stdout.isatty() else Console(width=_PRINTED_WIDTH)
-    try:
-        require_picture_file(options.output)
-    except ValueError as error:
-        complain("demo", error)
-        return 2
+def run(options: argparse.Namespace) -> int:
+    """Run the bench, and report what was seen."""
+    console = OutputConsole(width=None if sys.stdout.isatty() else _PRINTED_WIDTH)
+    require_picture_file(options.output)
     os.environ.update(quick_discovery())
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    window = 2 * _RECORD
-    try:
-        with running_nodes(_nodes(), _NAMESPACE):
-            rclpy.init(args=[])
-            client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, window))
-            try:
-                story = _run(client, console)
-            finally:
-                client.close()
-                rclpy.try_shutdown()
-        return _report(story, options.output, console)
-    except KeyboardInterrupt:
-        console.print("stopped")
-        return 130
-    except (BenchError, RefusalError, OSError) as error:
-        complain("demo", error)
-        return 2
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    with running_nodes(_nodes(), _NAMESPACE):
+        # Ctrl-C is Python's own: the handler of rclpy would end the context under the client.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        client = BenchClient(_NAMESPACE, RecordBuffer(BENCH_VALVE, 2 * _RECORD))
+        try:
+            story = _run(client, console)
+        finally:
+            client.close()
+            rclpy.try_shutdown()
+    return _report(story, options.output, console)

@@ -1,35 +1,34 @@
-"""Command `validate_recording`: simulate a recording with an identified model."""
+"""Sub-command `validate`: simulate a recording with an identified model."""
 
 import argparse
 import json
 import math
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from valve_friction_ros.commands.estimate_file import read_estimate
-from valve_friction_ros.commands.formatting import OneLineParser, complain, json_number
-from valve_friction_ros.commands.recording_arguments import (
+from valve_friction_ros.commands.arguments.estimate_file import read_estimate
+from valve_friction_ros.commands.arguments.recording import (
     DIRECT_DRIVE,
     add_recording_arguments,
     described_valve,
     read_one,
     reading_options,
 )
+from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import (
     IdentifiedModel,
     RefusalError,
     Validation,
     identified_model,
+    plain,
     validate,
 )
 from valve_friction_ros.model import Valve
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
 
-_EXIT_REFUSED = 2
+REFUSALS = (RefusalError,)
 
 
 class _Result(NamedTuple):
@@ -38,15 +37,19 @@ class _Result(NamedTuple):
     validation: Validation
     model: IdentifiedModel
     valve: Valve
+    is_force: bool
     notes: tuple[str, ...]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="validate_recording",
-        description="Simulate a recording with an identified model, and compare the stems. "
-        "Validate on another recording than the one that was identified.",
-        epilog="All values are in SI units. Exit code 2: a file or the record was refused.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = (
+        "Simulate a recording with an identified model, and compare the stems. Validate on another "
+        "recording than the one that was identified."
+    )
+    parser.epilog = (
+        "All values are in SI units. Exit code 2: a file or the record was refused, or the picture "
+        "could not be written."
     )
     add_recording_arguments(parser)
     parser.add_argument(
@@ -54,14 +57,14 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         required=True,
         metavar="ESTIMATE.json",
-        help="the model, as `identify_recording --json` prints it",
+        help="the model, as `valve_friction identify --json` prints it",
     )
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both stems")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    return parser
 
 
-def _run(options: argparse.Namespace) -> _Result:
+def _validated(options: argparse.Namespace) -> _Result:
+    """Read the files and simulate."""
     reading = reading_options(options)
     description = described_valve(options, reading)
     valve = description.valve
@@ -80,18 +83,17 @@ def _run(options: argparse.Namespace) -> _Result:
         validation = validate(recording, valve, model.parameters)
     except RefusalError as refusal:
         raise recorded.refused(refusal) from None
-    if options.plot is not None:
-        drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
-        figures.validation_figure(validation, valve, drive).savefig(options.plot)
-    return _Result(validation, model, valve, (*recorded.notes, *model.notes))
+    return _Result(
+        validation, model, valve, description is DIRECT_DRIVE, (*recorded.notes, *model.notes)
+    )
 
 
 def _as_json(result: _Result) -> dict[str, Any]:
-    validation, model, valve, notes = result
+    validation, model, valve, _, notes = result
     return {
         "fit": validation.fit,
         "rms": validation.rms,
-        "rms_share_of_travel": json_number(valve.share_of_travel(validation.rms)),
+        "rms_share_of_travel": plain(valve.share_of_travel(validation.rms)),
         "maximum_error": validation.maximum_error,
         "samples": len(validation.recording),
         "sample_period": validation.recording.sample_period,
@@ -101,7 +103,7 @@ def _as_json(result: _Result) -> dict[str, Any]:
 
 
 def _print(result: _Result) -> None:
-    validation, _, valve, notes = result
+    validation, _, valve, _, notes = result
     share = valve.share_of_travel(validation.rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
     print(f"fit {100 * validation.fit:.2f} %  (1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
@@ -111,20 +113,22 @@ def _print(result: _Result) -> None:
         print(f"note: {note}")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    options = _parser().parse_args(arguments)
+def _draw(result: _Result, path: Path) -> None:
+    from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
+    drive = figures.FORCE if result.is_force else figures.PRESSURE
+    figures.save_picture(figures.validation_figure(result.validation, result.valve, drive), path)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Validate the model, print how well it describes the recording, and draw it."""
+    result = _validated(options)
     try:
-        result = _run(options)
-    except (ValueError, RefusalError, OSError) as error:
-        complain("validate_recording", error)
-        return _EXIT_REFUSED
-    if options.json:
-        print(json.dumps(_as_json(result), ensure_ascii=False, allow_nan=False))
-    else:
-        _print(result)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        if options.json:
+            print(json.dumps(_as_json(result), ensure_ascii=False, allow_nan=False))
+        else:
+            _print(result)
+    finally:  # a closed output costs no picture, and a full disk no numbers
+        if options.plot is not None:
+            _draw(result, options.plot)
+    return ExitCode.DONE

@@ -1,12 +1,12 @@
-"""What `identify_recordings` has to do: each recording with its valve, and what is done already."""
+"""What `identify-folder` has to do: each recording with its valve, and what is done already."""
 
 import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from valve_friction_ros.commands.identification_arguments import identification_settings
-from valve_friction_ros.commands.recording_arguments import reading_options, valve_of
+from valve_friction_ros.commands.arguments.identification import identification_settings
+from valve_friction_ros.commands.arguments.recording import reading_options, valve_of
 from valve_friction_ros.fleet import Entry, Findings, FoundRecording, Job, Options, ResultsFile
 from valve_friction_ros.records.recordings import ReadingOptions
 

@@ -1,4 +1,4 @@
-"""The command `identify_recordings`: many recordings, interrupted and resumed."""
+"""The sub-command `identify-folder`: many recordings, interrupted and resumed."""
 
 import csv
 import gzip
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from bags import messages_of, write_bag
 
-from valve_friction_ros.commands.identify_recordings import main
+from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_refined
 from valve_friction_ros.model import (
     Recording,
@@ -71,12 +71,13 @@ def output(tmp_path):
 
 @pytest.fixture
 def arguments(folder, output, bench_yaml):
-    return [str(folder), "--output", str(output), "--valve", str(bench_yaml), "--jobs", "1"]
+    options = ["--output", str(output), "--valve", str(bench_yaml), "--jobs", "1"]
+    return ["identify-folder", str(folder), *options]
 
 
 def start(arguments, script=None):
     """Start the command in a process group of its own, as a shell does."""
-    how = [str(script)] if script else ["-m", "valve_friction_ros.commands.identify_recordings"]
+    how = [str(script)] if script else ["-m", "valve_friction_ros"]
     return subprocess.Popen(
         [sys.executable, *how, *arguments],
         stdout=subprocess.PIPE,
@@ -230,7 +231,7 @@ def test_a_process_that_dies_costs_its_recording_only(folder, texts, output, arg
     assert "killed by SIGKILL" in errors["deadly.csv"]
     assert len(errors) == 5
 
-    assert main([*arguments, "--retry-failed"]) == 0
+    assert run_here([*arguments, "--retry-failed"]) == 0
     assert "5 recordings: 4 done before, 1 to do, 1 of them again" in capsys.readouterr().err
     assert max(done(output).values()) == 1
 
@@ -240,11 +241,11 @@ def test_only_what_changed_is_done_again(folder, texts, output, arguments, capsy
     for name, text in zip(names, texts, strict=False):
         (folder / name).write_text(text)
     (folder / "c.csv").write_text("nonsense")
-    assert main(arguments) == 1
+    assert run_here(arguments) == 1
     first = {row["recording"]: row for row in rows_of(output)}
     (folder / "b.csv").write_text(texts[5])
     capsys.readouterr()
-    assert main(arguments) == 1
+    assert run_here(arguments) == 1
     assert "3 recordings: 2 done before, 1 to do, 1 of them again" in capsys.readouterr().err
     second = {row["recording"]: row for row in rows_of(output)}
     assert list(second) == ["a.csv", "c.csv", "b.csv"]
@@ -252,20 +253,20 @@ def test_only_what_changed_is_done_again(folder, texts, output, arguments, capsy
     assert second["b.csv"]["coulomb_friction_n"] != first["b.csv"]["coulomb_friction_n"]
 
     state = output.read_bytes()
-    assert main(arguments) == 1
+    assert run_here(arguments) == 1
     assert output.read_bytes() == state
 
 
 def test_other_options_are_not_mixed_in_silence(folder, texts, output, arguments, capsys):
     (folder / "a.csv").write_text(texts[0])
-    assert main(arguments) == 0
+    assert run_here(arguments) == 0
     state = output.read_bytes()
     capsys.readouterr()
-    assert main([*arguments, "--fix", "mass=1.6"]) == 2
+    assert run_here([*arguments, "--fix", "mass=1.6"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "1 recordings in it were identified with other options" in line
     assert output.read_bytes() == state
-    assert main([*arguments, "--fix", "mass=1.6", "--redo"]) == 0
+    assert run_here([*arguments, "--fix", "mass=1.6", "--redo"]) == 0
     (row,) = rows_of(output)
     assert (row["mass_kg"], row["mass_verdict"]) == ("1.6", "fixed")
 
@@ -282,7 +283,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
     (folder / "own" / "valve.yaml").write_text(double)
     (folder / "own" / "b.csv").write_text(texts[0])
     (folder / "own" / "b.valve.yaml").write_text("diaphragm_area: none")
-    assert main([str(folder), "--output", str(output), "--jobs", "1"]) == 1
+    assert run_here(["identify-folder", str(folder), "--output", str(output), "--jobs", "1"]) == 1
     rows = {row["recording"]: row for row in map(json.loads, output.open())}
     assert "pressure needs the diaphragm_area" in rows["alone/a.csv"]["error"]
     assert "b.valve.yaml: diaphragm_area must be a number" in rows["own/b.csv"]["error"]
@@ -290,7 +291,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
     assert twice == pytest.approx(2, rel=0.01)
 
     shutil.copy(bench_yaml, folder / "alone" / "a.valve.yaml")  # mended: no --redo is asked for
-    assert main([str(folder), "--output", str(output), "--jobs", "1"]) == 1
+    assert run_here(["identify-folder", str(folder), "--output", str(output), "--jobs", "1"]) == 1
     rows = {row["recording"]: row for row in map(json.loads, output.open())}
     assert rows["alone/a.csv"]["error"] is None
     assert len(rows) == 4
@@ -309,11 +310,11 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
     ],
 )
 def test_bad_arguments_are_refused_at_once(arguments, output, capsys, extra, message):
-    assert main([*arguments, *extra]) == 2
+    assert run_here([*arguments, *extra]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     (line,) = err.splitlines()
-    assert line.startswith("identify_recordings: ")
+    assert line.startswith("valve_friction identify-folder: ")
     assert message in line
     assert not output.exists()
 
@@ -321,23 +322,23 @@ def test_bad_arguments_are_refused_at_once(arguments, output, capsys, extra, mes
 def test_the_output_may_lie_among_the_recordings(folder, texts, bench_yaml):
     (folder / "a.csv").write_text(texts[0])
     arguments = [
-        *(str(folder), "--output", str(folder / "out.csv")),
+        *("identify-folder", str(folder), "--output", str(folder / "out.csv")),
         *("--valve", str(bench_yaml), "--jobs", "1"),
     ]
-    assert main(arguments) == 0
-    assert main(arguments) == 0
+    assert run_here(arguments) == 0
+    assert run_here(arguments) == 0
     assert done(folder / "out.csv") == Counter([("a.csv", "")])
-    assert main([*arguments[:2], str(folder / "a.csv"), *arguments[3:]]) == 2
+    assert run_here([*arguments[:3], str(folder / "a.csv"), *arguments[4:]]) == 2
     assert (folder / "a.csv").read_text() == texts[0]
 
 
 @pytest.mark.parametrize("name", ["friction.csv", "friction.jsonl"])
 def test_a_recording_that_cannot_be_begun_is_not_tried_again(folder, texts, tmp_path, capsys, name):
     (folder / "a.csv").write_text(texts[0])  # a pressure, and no valve file
-    arguments = [str(folder), "--output", str(tmp_path / name)]
-    assert main(arguments) == 2
+    arguments = ["identify-folder", str(folder), "--output", str(tmp_path / name)]
+    assert run_here(arguments) == 2
     assert "a.csv: pressure needs the diaphragm_area" in capsys.readouterr().err
-    assert main(arguments) == 2
+    assert run_here(arguments) == 2
     assert "1 recordings: 1 done before, 0 to do" in capsys.readouterr().err
-    assert main([*arguments, "--retry-failed"]) == 2
+    assert run_here([*arguments, "--retry-failed"]) == 2
     assert "1 to do, 1 of them again" in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """How a history is told: as a table, as an object of JSON, and as CSV."""
 
 import csv
+import io
 import json
 import math
 import re
@@ -11,9 +12,15 @@ from typing import Any
 
 from rich.table import Table
 
-from valve_friction_ros.commands.formatting import json_number, plain_console, two_digits
+from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
-from valve_friction_ros.identification import PARAMETER_UNITS
+from valve_friction_ros.identification import (
+    PARAMETER_UNITS,
+    parameter_mapping,
+    plain,
+    two_digits,
+)
+from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["as_json", "print_table", "write_csv"]
 
@@ -65,39 +72,31 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     return told
 
 
-def _entry_as_json(entry: HistoryEntry) -> dict[str, Any]:
+def _entry_as_json(entry: HistoryEntry) -> Any:
     ratio, baseline = entry.diagnosis.ratio, entry.baseline
-    return {
-        "time": time_text(entry.time),
-        "begin": None if entry.span is None else time_text(entry.span.begin),
-        "end": None if entry.span is None else time_text(entry.span.end),
-        "method": entry.method,
-        "parameters": {
-            name: {
-                "value": json_number(one.value),
-                "standard_error": json_number(one.standard_error),
-                "half_width": json_number(one.half_width),
-                "unit": PARAMETER_UNITS.get(name, ""),
-                "verdict": one.verdict.value,
-                "reason": one.reason,
-            }
-            for name, one in entry.parameters.items()
-        },
-        "fit": json_number(entry.fit.share),
-        "rms": json_number(entry.fit.rms),
-        "systematic_misfit": json_number(entry.fit.systematic),
-        "warnings": list(entry.warnings),
-        "level": int(entry.diagnosis.level),
-        "status_signal": entry.diagnosis.status_signal.value,
-        "message": entry.diagnosis.message,
-        "ratio": None if ratio is None else [json_number(one) for one in ratio],
-        "baseline": None if baseline is None else baseline.coulomb_friction,
-        "baseline_half_width": None if baseline is None else baseline.half_width,
-        "limits": vars(entry.limits),
-        "refusal": entry.refusal,
-        "settings": json.loads(entry.settings),
-        "software_version": entry.version,
-    }
+    return plain(
+        {
+            "time": time_text(entry.time),
+            "begin": None if entry.span is None else time_text(entry.span.begin),
+            "end": None if entry.span is None else time_text(entry.span.end),
+            "method": entry.method,
+            "parameters": {name: parameter_mapping(one) for name, one in entry.parameters.items()},
+            "fit": entry.fit.share,
+            "rms": entry.fit.rms,
+            "systematic_misfit": entry.fit.systematic,
+            "warnings": list(entry.warnings),
+            "level": int(entry.diagnosis.level),
+            "status_signal": entry.diagnosis.status_signal.value,
+            "message": entry.diagnosis.message,
+            "ratio": None if ratio is None else list(ratio),
+            "baseline": None if baseline is None else baseline.coulomb_friction,
+            "baseline_half_width": None if baseline is None else baseline.half_width,
+            "limits": vars(entry.limits),
+            "refusal": entry.refusal,
+            "settings": json.loads(entry.settings),
+            "software_version": entry.version,
+        }
+    )
 
 
 def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
@@ -119,9 +118,9 @@ def _parameter_cells(entry: HistoryEntry) -> dict[str, object]:
     cells: dict[str, object] = {}
     for name, one in entry.parameters.items():
         unit = _COLUMN_UNITS.get(PARAMETER_UNITS.get(name, "1"), "")
-        cells[f"{name}{unit}"] = json_number(one.value)
-        cells[f"{name}_standard_error{unit}"] = json_number(one.standard_error)
-        cells[f"{name}_half_width{unit}"] = json_number(one.half_width)
+        cells[f"{name}{unit}"] = one.value
+        cells[f"{name}_standard_error{unit}"] = one.standard_error
+        cells[f"{name}_half_width{unit}"] = one.half_width
         cells[f"{name}_verdict"] = one.verdict.value
     return cells
 
@@ -138,11 +137,11 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
         "level": _LEVELS[entry.diagnosis.level],
         "refusal": entry.refusal,
         "ratio": None if ratio is None else ratio.value,
-        "ratio_low": None if ratio is None else json_number(ratio.low),
-        "ratio_high": None if ratio is None else json_number(ratio.high),
+        "ratio_low": None if ratio is None else ratio.low,
+        "ratio_high": None if ratio is None else ratio.high,
         "baseline_n": None if baseline is None else baseline.coulomb_friction,
-        "fit": json_number(entry.fit.share),
-        "rms_m": json_number(entry.fit.rms),
+        "fit": entry.fit.share,
+        "rms_m": entry.fit.rms,
         **_parameter_cells(entry),
         "message": entry.diagnosis.message,
         "software_version": entry.version,
@@ -150,17 +149,24 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
 
 
 def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
-    """Write a row an identification, oldest first; a cell without a value is empty."""
+    """Write a row for each identification, oldest first; a cell without a value is empty.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; it names `path`, and no part of the table stays.
+    """
     entries = sorted(
         (entry for history in histories for entry in history.entries), key=lambda one: one.time
     )
-    rows = [_row(entry) for entry in entries]
+    rows = [plain(_row(entry)) for entry in entries]
     widest = max(rows, key=len)
     header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, header, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, header, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_whole(path, text.getvalue().encode())
 
 
 def _told(entry: HistoryEntry) -> str:

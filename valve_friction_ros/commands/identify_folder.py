@@ -1,22 +1,22 @@
-"""Command `identify_recordings`: identify all recordings of a folder, on all cores."""
+"""Sub-command `identify-folder`: identify all recordings of a folder, on all cores."""
 
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from valve_friction_ros.commands.fleet_plan import Plan, forget_stale, make_plan
-from valve_friction_ros.commands.formatting import OneLineParser, complain
-from valve_friction_ros.commands.identification_arguments import (
+from valve_friction_ros.commands.arguments.identification import (
     add_identification_arguments,
     identification_settings,
 )
-from valve_friction_ros.commands.recording_arguments import add_reading_arguments, reading_options
-from valve_friction_ros.commands.stop_signals import StopSignals
+from valve_friction_ros.commands.arguments.recording import add_reading_arguments, reading_options
+from valve_friction_ros.commands.folder.plan import Plan, forget_stale, make_plan
+from valve_friction_ros.commands.folder.stop_signals import StopSignals
+from valve_friction_ros.commands.output.errors import ExitCode, complain
+from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.fleet import (
     REFUSED,
     DeadWorker,
@@ -36,24 +36,24 @@ from valve_friction_ros.fleet.row import Cell
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.records.valve_file import read_valve_file
 
-__all__ = ["main"]
+__all__ = ["REFUSALS", "declare", "run"]
 
-_NAME = "identify_recordings"
-_EXIT_SOME_REFUSED = 1
-_EXIT_NOTHING = 2
+REFUSALS = ()
 _SHOWN_SKIPPED = 10
 _SHOWN_REASONS = 10
 
 _Rows = list[Mapping[str, Cell]]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog=_NAME,
-        description="Identify all recordings in a folder and those below it, on all cores, a row "
-        "a valve in one file. The same command goes on where it was interrupted.",
-        epilog="Exit code 0: all were identified; 1: some were refused; 2: all were, or nothing "
-        "was done; 130, 143: interrupted.",
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = (
+        "Identify all recordings in a folder and those below it, on all cores, a row a valve in "
+        "one file. The same command goes on where it was interrupted."
+    )
+    parser.epilog = (
+        "Exit code 0: all were identified; 1: some were refused; 2: all were, or nothing was done; "
+        "130, 143: interrupted."
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="where the recordings are")
     parser.add_argument(
@@ -85,7 +85,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_identification_arguments(parser)
     add_reading_arguments(parser)
-    return parser
 
 
 def _require_sense(options: argparse.Namespace) -> None:
@@ -101,7 +100,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         read_valve_file(options.valve)
 
 
-def _planned(options: argparse.Namespace, stop: StopSignals) -> dict[str, Plan]:
+def _planned(options: argparse.Namespace) -> dict[str, Plan]:
     findings = find_recordings(options.folder, options.output)
     if findings.skipped:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
@@ -110,12 +109,7 @@ def _planned(options: argparse.Namespace, stop: StopSignals) -> dict[str, Plan]:
         print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
         raise ValueError(f"{options.folder}: there are no CSV files and no bags in it")
-    plans = {}
-    for plan in make_plan(findings, options):
-        if stop.wanted():
-            break
-        plans[plan.name] = plan
-    return plans
+    return {plan.name: plan for plan in make_plan(findings, options)}
 
 
 def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[tuple[Plan, _Rows]]:
@@ -137,7 +131,7 @@ def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[t
 
 def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: StopSignals) -> None:
     """Identify and write, and show how far it is."""
-    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
     columns = (
         TextColumn("identifying"),
         BarColumn(),
@@ -159,7 +153,7 @@ def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: Stop
 
 
 def _print_tally(counted: Tally) -> None:
-    console = Console(highlight=False, markup=False)
+    console = OutputConsole(highlight=False, markup=False)
     table = Table("Coulomb friction", "valves", box=None, header_style="bold")
     table.columns[1].justify = "right"
     for outcome, count in sorted(counted.outcomes.items(), key=lambda one: one[0] == REFUSED):
@@ -175,13 +169,11 @@ def _print_tally(counted: Tally) -> None:
         console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
 
 
-def _run(options: argparse.Namespace, stop: StopSignals) -> int:
+def run(options: argparse.Namespace) -> int:
+    """Identify what is left to do, and print a tally."""
     _require_sense(options)
-    plans = _planned(options, stop)
-    if stop.wanted():
-        print(f"{_NAME}: interrupted before anything was done", file=sys.stderr)
-        return stop.exit_code
-    with ResultsFile(options.output) as results:
+    plans = _planned(options)
+    with StopSignals() as stop, ResultsFile(options.output) as results:
         left, dropped = forget_stale(results, plans, options)
         print(
             f"{len(plans)} recordings: {len(plans) - len(left)} done before, {len(left)} to do"
@@ -191,30 +183,15 @@ def _run(options: argparse.Namespace, stop: StopSignals) -> int:
         _identify(left, results, options.jobs, stop)
         mine = (entry for entry in results.entries() if entry.recording in plans)
         if stop.wanted():
-            print(
-                f"{_NAME}: interrupted with {sum(1 for _ in mine)} of {len(plans)} recordings in "
+            complain(
+                options.command,
+                f"interrupted with {sum(1 for _ in mine)} of {len(plans)} recordings in "
                 f"{options.output}: the same command goes on from there",
-                file=sys.stderr,
             )
             return stop.exit_code
         counted = tally(mine)
     _print_tally(counted)
     refused = counted.outcomes[REFUSED]
     if refused == 0:
-        return 0
-    return _EXIT_NOTHING if refused == counted.outcomes.total() else _EXIT_SOME_REFUSED
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    options = _parser().parse_args(arguments)
-    with StopSignals() as stop:
-        try:
-            return _run(options, stop)
-        except (ValueError, OSError) as error:
-            complain(_NAME, error)
-            return _EXIT_NOTHING
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        return ExitCode.DONE
+    return ExitCode.REFUSED if refused == counted.outcomes.total() else ExitCode.PARTLY

@@ -1,4 +1,4 @@
-"""Estimates that `identify_recording --json` wrote, read back."""
+"""Estimates that `valve_friction identify --json` wrote, read back."""
 
 import json
 import math
@@ -22,7 +22,7 @@ def _value(path: Path, name: str, entry: Any) -> float:
 
 
 def read_estimate(path: Path) -> dict[str, float]:
-    """Read the assessed values from the JSON of `identify_recording`.
+    """Read the assessed values from the JSON of `valve_friction identify`.
 
     Returns
     -------
@@ -39,14 +39,14 @@ def read_estimate(path: Path) -> dict[str, float]:
     except (OSError, UnicodeDecodeError) as error:
         cause = (isinstance(error, OSError) and error.strerror) or error
         raise ValueError(f"{path}: cannot be read: {cause}") from None
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
     if isinstance(content, dict) and "valves" in content:
         raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
     parameters = content.get("parameters") if isinstance(content, dict) else None
     if not isinstance(parameters, dict):
         raise ValueError(
-            f"{path}: there are no parameters: give what `identify_recording --json` wrote"
+            f"{path}: there are no parameters: give what `valve_friction identify --json` wrote"
         )
     for name in parameters:
         if name not in PARAMETER_UNITS:

@@ -1,15 +1,14 @@
-"""The command `validate_recording`, from the estimate that `identify_recording` wrote."""
+"""The sub-command `validate`, from the estimate that `identify` wrote."""
 
 import json
 import subprocess
 import sys
+from functools import partial
 
 import matplotlib.image
 import numpy as np
 import pytest
 
-from valve_friction_ros.commands import identify_recording
-from valve_friction_ros.commands.validate_recording import main
 from valve_friction_ros.identification import validate
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -49,7 +48,7 @@ def valve_options(bench_yaml):
 
 @pytest.fixture
 def estimate(tmp_path):
-    """Function of values by name: a file as `identify_recording --json` writes it."""
+    """Function of values by name: a file as `identify --json` writes it."""
 
     def write(**changes):
         values = {
@@ -70,14 +69,9 @@ def estimate(tmp_path):
 
 
 @pytest.fixture
-def call(capsys):
-    """Function of arguments: exit code, stdout and stderr of the command in this process."""
-
-    def call(*arguments):
-        code = main([str(argument) for argument in arguments])
-        return (code, *capsys.readouterr())
-
-    return call
+def call(command):
+    """Function of arguments: exit code, stdout and stderr of `validate`."""
+    return partial(command, "validate")
 
 
 @pytest.fixture
@@ -87,7 +81,7 @@ def refused(call):
     def refused(*arguments):
         code, out, err = call(*arguments)
         assert (code, out) == (2, "")
-        assert err.startswith("validate_recording: ")
+        assert err.startswith("valve_friction validate: ")
         assert err.count("\n") == 1
         return err
 
@@ -108,16 +102,16 @@ def test_a_model_validates_on_a_record_it_has_not_seen(
     other_csv,
     valve_options,
     tmp_path,
-    capsys,
+    command,
     call,
 ):
     """A record that suits the method is identified, and the slow sine simulated with the model."""
     record = simulated(benches["high"], excitation, duration)
     path = write_csv(columns_of(record), "identified.csv")
-    arguments = [str(path), *valve_options, "--method", method, "--json"]
-    assert identify_recording.main(arguments) == 0
+    code, printed, _ = command("identify", path, *valve_options, "--method", method, "--json")
+    assert code == 0
     estimate = tmp_path / "estimate.json"
-    estimate.write_text(capsys.readouterr().out)
+    estimate.write_text(printed)
     answer = json.loads(estimate.read_text())
     assert answer["method"] == method
     assert answer["parameters"]["coulomb_friction"]["value"] == pytest.approx(606.0, rel=0.02)
@@ -171,10 +165,9 @@ class TestAnswer:
         assert matplotlib.image.imread(path).shape[0] > 500
 
     def test_as_a_process(self, estimate, other_csv, valve_options):
-        module = "valve_friction_ros.commands.validate_recording"
-        command = [sys.executable, "-m", module, other_csv, *valve_options]
+        command = [sys.executable, "-m", "valve_friction_ros", "validate"]
         done = subprocess.run(
-            [*map(str, command), "--estimate", str(estimate())],
+            [*command, other_csv, *valve_options, "--estimate", estimate()],
             capture_output=True,
             text=True,
             timeout=60,
@@ -195,7 +188,8 @@ class TestRefusals:
         ("content", "cause"),
         [
             ("{", "not JSON"),
-            ("[]", "there are no parameters: give what `identify_recording --json` wrote"),
+            ("[" * 100_000, "not JSON: maximum recursion depth exceeded"),
+            ("[]", "there are no parameters: give what `valve_friction identify --json` wrote"),
             ('{"valves": {}}', "is of several valves: identify the one by --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),
             ('{"parameters": {"mass": {"value": "1"}}}', "must be a number or null, got '1'"),

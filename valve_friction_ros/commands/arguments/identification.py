@@ -37,7 +37,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         help="x̄ of (10) in m: the paper's form of four columns, F_0 = k·x̄",
     )
     parser.add_argument(
-        "--window",
+        "--derivative-window",
         type=int,
         help=f"derivative window d, samples; by default {defaults.published_window} for the "
         "published method, and chosen by the noise of the record for the others",
@@ -80,7 +80,7 @@ def identification_settings(
     """
     defaults = IdentificationSettings()
     return IdentificationSettings(
-        derivative_window=options.window,
+        derivative_window=options.derivative_window,
         order=options.order,
         fixed=_fixed(options.fix, known),
         position_bias=options.position_bias,

@@ -1,11 +1,11 @@
-"""What `identify_recording` writes of one valve beside its answer: a picture and a report."""
+"""What `identify` writes of a valve beside its result: a picture and a report."""
 
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from valve_friction_ros.commands.recording_arguments import DIRECT_DRIVE, require_one
+from valve_friction_ros.commands.arguments.recording import DIRECT_DRIVE, require_one
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Result
 from valve_friction_ros.records.recorded_valve import RecordedValve
@@ -75,7 +75,7 @@ class IdentificationFiles(NamedTuple):
         result: Result,
         baseline: Baseline | None,
     ) -> None:
-        """Write them; raises OSError where that fails."""
+        """Write them; raises OSError, which names the file, where that fails."""
         if self == (None, None):
             return
 
@@ -83,8 +83,7 @@ class IdentificationFiles(NamedTuple):
 
         drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
         if self.plot is not None:
-            figure = figures.identification_figure(result, drive)
-            figure.savefig(self.plot)
+            figures.save_picture(figures.identification_figure(result, drive), self.plot)
         if self.report is not None:
             from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
 

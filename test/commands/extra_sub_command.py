@@ -1,0 +1,48 @@
+"""The command with one sub-command more, ``extra``: what a further one takes, and how all end.
+
+The sub-command is this module and one line of `SUB_COMMANDS`.
+"""
+
+import os
+import signal
+import sys
+
+from valve_friction_ros.commands import main
+
+
+class RefusedError(Exception):
+    """A refusal of its own kind."""
+
+
+REFUSALS = (RefusedError,)
+
+
+def declare(parser):
+    parser.description = "One sub-command more."
+    parser.add_argument("ending")
+
+
+def run(options):
+    if options.ending == "interrupted":
+        os.kill(os.getpid(), signal.SIGINT)
+    if options.ending == "disguised":  # as numpy does while it is imported
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt as interrupt:
+            raise ImportError("numpy cannot be imported") from interrupt
+    if options.ending == "own refusal":
+        raise RefusedError("not this\none")
+    if options.ending == "refusal":
+        raise ValueError("not that one")
+    if options.ending == "no file":
+        raise FileNotFoundError(2, "No such file or directory", "none.csv")
+    if options.ending == "bug":
+        raise KeyError("a bug")
+    sys.stdout.write("x" * 100_000 if options.ending == "long" else "short\n")
+    return 1
+
+
+if __name__ == "__main__":
+    main.SUB_COMMANDS["extra"] = "one sub-command more"
+    sys.modules["valve_friction_ros.commands.extra"] = sys.modules["__main__"]
+    sys.exit(main.main())

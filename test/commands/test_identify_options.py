@@ -1,0 +1,101 @@
+"""The options of the sub-command `identify`."""
+
+import math
+import re
+
+import pytest
+from answers import column, known, values
+
+from valve_friction_ros.identification import IdentificationSettings, identify_refined
+from valve_friction_ros.model import BENCH_VALVE
+
+POSITION_BIAS = 1.13e-3
+FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
+
+
+class TestOptions:
+    def test_fixed_by_value_and_by_name(self, printed, quick_csv, bench_options):
+        answer = printed(
+            quick_csv, *bench_options, "--fix", "spring_constant=2.05e5", "--fix", "mass"
+        )
+        fixed = {name for name, verdict in column(answer, "verdict").items() if verdict == "fixed"}
+        assert fixed == {"spring_constant", "mass"}
+        assert values(answer)["spring_constant"] == 2.05e5
+        assert values(answer)["mass"] == 1.6  # of the valve file
+        assert answer["warnings"] == []
+        for name in fixed:
+            entry = answer["parameters"][name]
+            assert entry["standard_error"] == 0.0
+            assert entry["interval"] == [entry["value"]] * 2
+            assert entry["published"] == entry["value"]
+
+    def test_threshold(self, printed, quick_csv, bench_options):
+        answer = printed(quick_csv, *bench_options, "--fix", "limit_velocity=0.002")
+        assert answer["evidence"]["threshold"] == 0.002
+
+    def test_position_bias(self, printed, quick_csv, bench_options):
+        answer = printed(quick_csv, *bench_options, *FOUR_COLUMNS)
+        for found in (values(answer), column(answer, "published")):
+            assert found["spring_preload"] == pytest.approx(
+                found["spring_constant"] * POSITION_BIAS, rel=1e-12
+            )
+
+    def test_window_sets_both_and_so_does_the_order(
+        self, printed, quick_csv, quick_record, bench_options
+    ):
+        answer = printed(quick_csv, *bench_options, "--derivative-window", 15, "--order", 4)
+        settings = IdentificationSettings(derivative_window=15, order=4, assumed_mass=1.6)
+        assert answer["evidence"]["published_window"] == answer["derivative_window"] == 15
+        assert answer["settings"]["order"] == 4
+        expected = identify_refined(quick_record, BENCH_VALVE, settings)
+        assert column(answer, "published") == expected.estimate.values
+        assert known(answer) == {
+            name: value for name, value in expected.values.items() if not math.isnan(value)
+        }
+
+    def test_without_it_the_record_chooses_one(self, printed, quick_csv, bench_options):
+        """No noise, no need of 31 samples; the published estimate keeps its 31."""
+        answer = printed(quick_csv, *bench_options)
+        assert answer["evidence"]["published_window"] == 31
+        assert 5 <= answer["derivative_window"] < 31
+
+    def test_valve(self, printed, quick_csv, bench_options, tmp_path):
+        """Twice the area is twice the force, and so is every parameter; 2 rounds nothing."""
+        path = tmp_path / "valve.yaml"
+        path.write_text("diaphragm_area: 0.089\npressure_reference: 41740.0\n")
+        once = printed(quick_csv, *bench_options, "--fix", "mass=1.6")
+        twice = printed(quick_csv, "--valve", path, "--fix", "mass=3.2")
+        doubled = {name: 2 * value for name, value in column(once, "published").items()}
+        assert column(twice, "published") == doubled
+        assert known(twice) == pytest.approx(
+            {name: 2 * value for name, value in known(once).items()}, rel=1e-6
+        )
+
+    @pytest.mark.parametrize("header", ["force_n", "F [N]"])
+    def test_force(
+        self, printed, write_csv, columns_of, quick_record, quick_csv, bench_options, header
+    ):
+        """The actuator's force in the file, and no valve file: the same sums, the same result."""
+        columns = columns_of(quick_record)
+        pressure = columns.pop("pressure_pa")
+        path = write_csv(columns | {header: BENCH_VALVE.actuator_force(pressure)}, "force.csv")
+        found = printed(path, "--force-column", header, "--fix", "mass=1.6")
+        expected = printed(quick_csv, *bench_options, "--fix", "mass=1.6")
+        assert column(found, "published") == column(expected, "published")
+        assert column(found, "verdict") == column(expected, "verdict")
+        assert known(found) == pytest.approx(known(expected), rel=1e-9)
+        for answer in (found, expected):
+            del answer["settings"]["assumed_mass"]  # of the valve file
+        refined = ("parameters", "fit", "rms", "systematic_misfit")
+        assert {key: found[key] for key in found if key not in refined} == {
+            key: expected[key] for key in expected if key not in refined
+        }
+
+    def test_help_names_all(self, call, capsys):
+        with pytest.raises(SystemExit) as ended:
+            call("--help")
+        assert ended.value.code == 0
+        options = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
+        columns = {f"--{name}-column" for name in ("time", "position", "pressure", "force")}
+        method = {"--method", "--fix", "--position-bias", "--derivative-window", "--order"}
+        assert options >= columns | method | {"--valve", "--plot", "--report", "--json"}

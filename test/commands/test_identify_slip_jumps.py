@@ -1,0 +1,97 @@
+"""The sub-command `identify` on a packing that slips."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from answers import PARAMETER_KEYS, row_of
+
+from valve_friction_ros.identification import (
+    UNITS,
+)
+from valve_friction_ros.model import (
+    GRAPHITE_PACKING,
+    GRAPHITE_VALVE,
+    Recording,
+    SensorNoise,
+    SineWave,
+    simulate,
+)
+
+SLIPPING = dataclasses.replace(GRAPHITE_PACKING, mass=1.6)
+FALLING = dataclasses.replace(SLIPPING, stribeck_velocity=3.26e-3)
+"""A published identification of a graphite packing."""
+
+
+class TestSlipJumps:
+    """Graphite packing: sixteen seconds of a sine at 100 Hz, 10 µm and 100 Pa of noise."""
+
+    NAMES = ("coulomb_friction", "static_friction", "viscous_friction", "spring_constant")
+
+    @pytest.fixture
+    def options(self, tmp_path):
+        path = tmp_path / "graphite.yaml"
+        geometry = dataclasses.asdict(GRAPHITE_VALVE)
+        path.write_text("\n".join(f"{name}: {value}" for name, value in geometry.items()))
+        return ["--valve", path, "--fix", "mass=1.6"]
+
+    @pytest.fixture
+    def file_of(self, write_csv, columns_of):
+        """Function of a packing and a delay of the stem's stamps (samples): its record."""
+
+        def build(packing, delay=0):
+            pressure = SineWave(period=4.0).sample(np.arange(1600) / 100)
+            position = simulate(GRAPHITE_VALVE, packing, pressure, 0.01).position
+            record = SensorNoise(10e-6, 100.0, seed=1).applied_to(
+                Recording(0.01, pressure[delay:], position[: 1600 - delay])
+            )
+            return write_csv(columns_of(record))
+
+        return build
+
+    def assert_true(self, answer, packing):
+        """The bounds of the whole benchmark: 5 %, and no error beyond three half widths."""
+        for name in self.NAMES:
+            entry, truth = answer["parameters"][name], getattr(packing, name)
+            assert entry["verdict"] == "identified", name
+            assert entry["value"] == pytest.approx(truth, rel=0.05)
+            low, high = entry["interval"]
+            assert abs(entry["value"] - truth) < 1.5 * (high - low)
+        assert answer["model_describes"] is True
+        assert answer["systematic_misfit"] < 10e-6
+
+    def test_a_slip_jump_tells_the_static_friction(self, printed, file_of, options):
+        answer = printed(file_of(SLIPPING), *options)
+        self.assert_true(answer, SLIPPING)
+        assert list(answer["parameters"]) == list(UNITS)
+
+    def test_a_fall_of_the_friction_is_told_with_its_speed(self, printed, file_of, options):
+        answer = printed(file_of(FALLING), *options)
+        self.assert_true(answer, FALLING)
+        assert list(answer["parameters"]) == [*UNITS, "stribeck_velocity"]
+        entry = answer["parameters"]["stribeck_velocity"]
+        assert set(entry) == PARAMETER_KEYS
+        assert (entry["unit"], entry["published"]) == ("m/s", None)
+        low, high = entry["interval"]
+        assert low < FALLING.stribeck_velocity < high
+
+    def test_the_fall_in_the_table(self, call, file_of, options):
+        """Between 2.9 and 3.6 mm/s, with its interval, and nothing published to compare with."""
+        code, out, err = call(file_of(FALLING), *options)
+        assert (code, err) == (0, "")
+        row = row_of(out, "stribeck_velocity")
+        assert re.fullmatch(
+            r"stribeck_velocity 0\.00(29|3[0-6])\d+ \S+ m/s (identified|weak)", row
+        ), row
+
+    def test_late_stamps_are_reported(self, call, printed, file_of, options):
+        """Ten samples, 100 ms: to a tenth of a period, in the note as in the parameters."""
+        path = file_of(SLIPPING, delay=10)
+        entry = printed(path, *options)["parameters"]["clock_offset"]
+        assert entry["value"] == pytest.approx(0.1, abs=1e-3)
+        assert entry["unit"] == "s"
+        words = " ".join(call(path, *options)[1].split())
+        assert re.search(
+            r"note: the stamps of the stem are (99|100|101)(\.\d)? ms late against those", words
+        )

@@ -1,0 +1,243 @@
+"""The command `valve_friction`: how it finds its sub-commands, and how it ends."""
+
+import importlib
+import os
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from valve_friction_ros import __version__
+from valve_friction_ros.commands.main import SUB_COMMANDS
+
+EXTRA = Path(__file__).with_name("extra_sub_command.py")
+PROGRAM = ["-m", "valve_friction_ros"]
+
+
+def start(*arguments, program=PROGRAM, **streams):
+    """Start the command as a process; its streams are pipes unless said otherwise."""
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams
+    return subprocess.Popen(
+        [sys.executable, *map(str, program), *map(str, arguments)], text=True, **streams
+    )
+
+
+def ended(process):
+    """Exit code, stdout and stderr."""
+    out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
+def extra(*arguments, **streams):
+    return ended(start("extra", *arguments, program=[EXTRA], **streams))
+
+
+class TestChoice:
+    def test_help_has_a_line_for_each(self):
+        code, out, err = ended(start("--help"))
+        assert (code, err) == (0, "")
+        lines = [" ".join(line.split()) for line in out.splitlines()]
+        for name, text in SUB_COMMANDS.items():
+            assert f"{name} {text}" in lines
+
+    def test_help_imports_no_sub_command(self):
+        """It is there at once: nothing slow is imported for it."""
+        code = (
+            "import sys\n"
+            "from valve_friction_ros.commands.main import run\n"
+            "try: run(['--help'])\n"
+            "except SystemExit: print('\\n'.join(sys.modules), file=sys.stderr)"
+        )
+        loaded = ended(start("-c", code, program=[]))[2].split()
+        assert "valve_friction_ros.commands.main" in loaded
+        slow = {"numpy", "numba", "scipy", "matplotlib", "rich", "rclpy", "sqlite3"}
+        assert not slow & set(loaded)
+        assert not [name for name in loaded if name.startswith("valve_friction_ros.commands.i")]
+
+    def test_version(self, command, capsys):
+        with pytest.raises(SystemExit) as end:
+            command("--version")
+        assert end.value.code == 0
+        assert capsys.readouterr().out == f"valve_friction {__version__}\n"
+
+    @pytest.mark.parametrize(
+        ("name", "nearest"),
+        [
+            ("identfy", "identify"),
+            ("identify_recording", "identify"),
+            ("identify_folder", "identify-folder"),
+            ("validate_recording", "validate"),
+            ("reproduce_paper", "reproduce-paper"),
+            ("histroy", "history"),
+        ],
+    )
+    def test_a_wrong_name_suggests_the_nearest(self, command, capsys, name, nearest):
+        with pytest.raises(SystemExit) as end:
+            command(name, "record.csv", "--json")
+        assert end.value.code == 2
+        assert capsys.readouterr() == (
+            "",
+            f"valve_friction: there is no sub-command '{name}'; the nearest is '{nearest}'; "
+            "see --help\n",
+        )
+
+    @pytest.mark.parametrize("arguments", [[], ["--json", "identify"]])
+    def test_no_name(self, command, capsys, arguments):
+        with pytest.raises(SystemExit) as end:
+            command(*arguments)
+        assert end.value.code == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert err.startswith("valve_friction: ")
+        assert err.count("\n") == 1
+
+    @pytest.mark.parametrize("name", SUB_COMMANDS)
+    def test_each_describes_itself(self, command, capsys, name):
+        with pytest.raises(SystemExit) as end:
+            command(name, "--help")
+        assert end.value.code == 0
+        out = capsys.readouterr().out
+        assert out.startswith(f"usage: valve_friction {name} ")
+        assert "exit code 2" in " ".join(out.lower().replace("; 2:", " exit code 2").split())
+        module = importlib.import_module(f"valve_friction_ros.commands.{name.replace('-', '_')}")
+        assert all(issubclass(error, Exception) for error in module.REFUSALS)
+
+    def test_an_unknown_option_names_the_sub_command(self, command, capsys):
+        with pytest.raises(SystemExit) as end:
+            command("history", "--jason")
+        assert end.value.code == 2
+        assert capsys.readouterr().err == (
+            "valve_friction history: unrecognized arguments: --jason; see --help\n"
+        )
+
+
+class TestEnd:
+    """One line on stderr whatever happens, but for a bug."""
+
+    def test_well(self):
+        assert extra("well") == (1, "short\n", "")
+
+    @pytest.mark.parametrize(
+        ("ending", "line"),
+        [
+            ("refusal", "not that one"),
+            ("own refusal", "not this one"),
+            ("no file", "none.csv: No such file or directory"),
+        ],
+    )
+    def test_refused(self, ending, line):
+        assert extra(ending) == (2, "", f"valve_friction extra: {line}\n")
+
+    @pytest.mark.parametrize("ending", ["interrupted", "disguised"])
+    def test_interrupted(self, ending):
+        assert extra(ending) == (130, "", "valve_friction extra: interrupted\n")
+
+    def test_a_bug_shows_where_it_is(self):
+        code, out, err = extra("bug")
+        assert (code, out) == (1, "")
+        assert err.startswith("Traceback")
+        assert err.endswith("KeyError: 'a bug'\n")
+
+    def test_in_the_background_of_a_shell(self):
+        """Ctrl-C is not for a process that was started with SIGINT ignored."""
+        ignored = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            process = start("extra", "interrupted", program=[EXTRA])
+        finally:
+            signal.signal(signal.SIGINT, ignored)
+        assert ended(process) == (1, "short\n", "")
+
+    @pytest.mark.parametrize("ending", ["short", "long"])
+    def test_closed_output(self, ending):
+        reading, writing = os.pipe()
+        os.close(reading)
+        code, _, err = extra(ending, stdout=writing)
+        os.close(writing)
+        assert code == 141
+        assert err == (
+            "valve_friction extra: the output was closed before everything was printed\n"
+        )
+
+    @pytest.mark.parametrize("ending", ["short", "long"])
+    @pytest.mark.parametrize("unbuffered", ["", "1"])
+    def test_full_output(self, ending, unbuffered):
+        environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+        with Path("/dev/full").open("w") as full:
+            code, _, err = extra(ending, stdout=full, env=environment)
+            assert (code, err) == (
+                2,
+                "valve_friction extra: standard output: No space left on device\n",
+            )
+            assert extra(ending, stdout=full, stderr=full, env=environment)[0] == 2
+
+    def test_full_output_of_the_help(self):
+        with Path("/dev/full").open("w") as full:
+            environment = os.environ | {"PYTHONUNBUFFERED": ""}
+            code, _, err = ended(start("--help", stdout=full, env=environment))
+        assert (code, err) == (2, "valve_friction: standard output: No space left on device\n")
+
+    @pytest.mark.parametrize("closed", [1, 2])
+    def test_a_stream_that_was_closed_before(self, closed):
+        shell = f'exec "$@" {closed}>&-'
+        code = subprocess.run(
+            ["sh", "-c", shell, "sh", sys.executable, EXTRA, "extra", "well"],
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+        assert code.returncode == 1
+        assert code.stderr == b""
+
+
+class TestRealSubCommands:
+    @pytest.mark.parametrize(
+        ("arguments", "file"),
+        [
+            (["identify", "record.csv", "--valve", "valve.yaml"], "record.csv"),
+            (["validate", "record.csv", "--estimate", "estimate.json"], "estimate.json"),
+            (["identify-folder", ".", "--output", "all.csv", "--valve", "a.yaml"], "a.yaml"),
+            (["reproduce-paper", "--config", "."], "bench_low.yaml"),
+        ],
+    )
+    def test_interrupted_while_it_reads(self, tmp_path, bench_yaml, arguments, file):
+        (tmp_path / "valve.yaml").write_text(bench_yaml.read_text())
+        (tmp_path / "record.csv").write_text("time_s,position_m,force_n\n0,0,0\n")
+        (tmp_path / file).unlink(missing_ok=True)
+        os.mkfifo(tmp_path / file)
+        path = os.pathsep.join(filter(None, [str(bench_yaml.parents[1]), *sys.path]))
+        environment = os.environ | {"PYTHONPATH": path}
+        process = start(*arguments, cwd=tmp_path, env=environment)
+        with (tmp_path / file).open("w"):  # returns when the command reads
+            process.send_signal(signal.SIGINT)
+            code, out, err = ended(process)
+        assert (code, out) == (130, "")
+        assert err.startswith(f"valve_friction {arguments[0]}: interrupted")
+        assert err.count("\n") == 1
+
+    @pytest.mark.parametrize("options", [[], ["--json"]])
+    def test_a_picture_on_a_full_disk(self, quick_csv, bench_options, tmp_path, options):
+        """The numbers are printed, the file is named, and no part of it stays."""
+        picture = tmp_path / "record.png"
+        process = start(
+            *("identify", quick_csv, *bench_options, *options, "--plot", picture),
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+        )
+        code, out, err = ended(process)
+        assert code == 2
+        assert "spring_constant" in out
+        assert err == f"valve_friction identify: {picture}: File too large\n"
+        assert {path.name for path in tmp_path.iterdir()} == {quick_csv.name}
+
+    def test_a_picture_beside_a_closed_output(self, quick_csv, bench_options, tmp_path):
+        picture = tmp_path / "record.png"
+        reading, writing = os.pipe()
+        os.close(reading)
+        process = start("identify", quick_csv, *bench_options, "--plot", picture, stdout=writing)
+        os.close(writing)
+        code, _, err = ended(process)
+        assert code == 141
+        assert err.count("\n") == 1
+        assert picture.stat().st_size > 20_000

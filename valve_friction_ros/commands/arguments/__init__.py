@@ -1,0 +1,1 @@
+"""Arguments that sub-commands share, and what they stand for."""

@@ -1,0 +1,140 @@
+"""Sub-command `identify`: identify the valves of a recorded CSV file or bag."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from valve_friction_ros.commands.arguments.identification import (
+    add_identification_arguments,
+    identification_settings,
+)
+from valve_friction_ros.commands.arguments.recording import (
+    add_recording_arguments,
+    described_valve,
+    reading_options,
+    require_one,
+)
+from valve_friction_ros.commands.output.errors import ExitCode, complain
+from valve_friction_ros.commands.output.identification_files import (
+    add_file_arguments,
+    baseline_from,
+    identification_files,
+)
+from valve_friction_ros.commands.output.result_output import as_json, print_table
+from valve_friction_ros.health import Diagnosis, diagnose
+from valve_friction_ros.identification import (
+    METHODS,
+    IdentificationSettings,
+    Method,
+    RefusalError,
+    Result,
+)
+from valve_friction_ros.model import Valve
+from valve_friction_ros.records.recorded_valve import RecordedValve
+from valve_friction_ros.records.recordings import read_recordings
+
+__all__ = ["REFUSALS", "declare", "run"]
+
+REFUSALS = (RefusalError,)
+
+
+class _Answer(NamedTuple):
+    """A valve of the file, what came of it, and its diagnosis where it has a baseline."""
+
+    recorded: RecordedValve
+    outcome: Result | RefusalError
+    diagnosis: Diagnosis | None = None
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
+    parser.epilog = (
+        "All results are in SI units. Exit code 2: the file or the record was refused (of several "
+        "valves in a bag all were), or a file could not be written; 1: some valves were refused."
+    )
+    add_recording_arguments(parser)
+    add_identification_arguments(parser)
+    add_file_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _identified(
+    recorded: RecordedValve,
+    valve: Valve,
+    identify: Method,
+    settings: IdentificationSettings,
+) -> Result | RefusalError:
+    """Identify one valve, or return why not, with its name."""
+    try:
+        recording = recorded.recording()
+    except RefusalError as refusal:
+        return refusal
+    try:
+        return identify(recording, valve, settings)
+    except RefusalError as refusal:
+        return recorded.refused(refusal)
+
+
+def _print_json(results: Sequence[_Answer]) -> None:
+    """Print the object of one valve; of several, an object of them by name."""
+    answers = {
+        recorded.name: {"error": str(outcome)}
+        if isinstance(outcome, RefusalError)
+        else as_json(outcome, recorded.notes, diagnosis)
+        for recorded, outcome, diagnosis in results
+    }
+    answer = {"valves": answers} if len(results) > 1 else next(iter(answers.values()))
+    print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
+
+
+def _print_tables(results: Sequence[_Answer]) -> None:
+    printed = 0
+    for recorded, outcome, diagnosis in results:
+        if isinstance(outcome, RefusalError):
+            continue
+        if len(results) > 1:
+            print("\n" * (printed > 0) + recorded.name)
+        print_table(outcome, recorded.notes, diagnosis)
+        printed += 1
+
+
+def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
+    """Print what was found and what was refused; return the exit code."""
+    refusals = [result.outcome for result in results if isinstance(result.outcome, RefusalError)]
+    if in_json and (len(results) > 1 or not refusals):
+        _print_json(results)
+    elif not in_json:
+        _print_tables(results)
+    for refusal in refusals:
+        complain(command, refusal)
+    if not refusals:
+        return ExitCode.DONE
+    return ExitCode.REFUSED if len(refusals) == len(results) else ExitCode.PARTLY
+
+
+def run(options: argparse.Namespace) -> int:
+    """Identify the valves of the file, print what was found, and write the files asked for."""
+    reading = reading_options(options)
+    description = described_valve(options, reading)
+    valve = description.valve
+    settings = identification_settings(options, description.known)
+    baseline, files = baseline_from(options), identification_files(options)
+    recorded = read_recordings(options.file, valve, reading)
+    files.require_one_valve(recorded)
+    if baseline is not None:
+        require_one(recorded, "--baseline-coulomb-friction is of")
+    results = []
+    for each in recorded:
+        outcome = _identified(each, valve, METHODS[options.method], settings)
+        diagnosis = None
+        if isinstance(outcome, Result) and baseline is not None:
+            diagnosis = diagnose(outcome, valve, baseline)
+        results.append(_Answer(each, outcome, diagnosis))
+    try:
+        return _print(results, options.command, options.json)
+    finally:  # a closed output costs no picture, and a full disk no numbers
+        for each, outcome, _ in results:
+            if isinstance(outcome, Result):
+                files.write(each, description, outcome, baseline)

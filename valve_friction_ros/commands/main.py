@@ -1,0 +1,133 @@
+"""The command `valve_friction`: it finds the sub-command, and reports how it ended."""
+
+import argparse
+import difflib
+import importlib
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Protocol, cast
+
+from valve_friction_ros import __version__
+from valve_friction_ros.commands.output.errors import (
+    PROGRAM,
+    ExitCode,
+    OneLineParser,
+    complain,
+    flush_output,
+)
+
+__all__ = ["SUB_COMMANDS", "SubCommand", "main", "run"]
+
+SUB_COMMANDS = {
+    "identify": "identify the friction of a valve from a CSV file or a bag",
+    "identify-folder": "identify all recordings of a folder, on all cores",
+    "validate": "simulate a recording with an identified model",
+    "history": "list, export and draw what the nodes have identified",
+    "reproduce-paper": "run the paper's programme and write a report",
+    "demo": "tighten the packing of a simulated valve that is monitored",
+}
+"""The line in ``--help`` by sub-command; ``identify-folder`` is the module `identify_folder`."""
+
+
+class SubCommand(Protocol):
+    """The module of a sub-command; it is imported only when it was chosen."""
+
+    REFUSALS: tuple[type[Exception], ...]
+    """Errors of the user's request that `run` raises beside ValueError and OSError."""
+
+    def declare(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the arguments, and what the help says around them."""
+
+    def run(self, options: argparse.Namespace) -> int:
+        """Run, print the result, and return the exit code."""
+
+
+def _imported(name: str) -> SubCommand:
+    package, _, _ = __name__.rpartition(".")
+    return cast(SubCommand, importlib.import_module(f"{package}.{name.replace('-', '_')}"))
+
+
+def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
+    """Return the sub-command and its arguments; end the process where there is none."""
+    listed = "\n".join(f"  {name:<16} {text}" for name, text in SUB_COMMANDS.items())
+    parser = OneLineParser(
+        prog=PROGRAM,
+        usage=f"{PROGRAM} SUB-COMMAND ...",
+        description="Identify the friction of control valves, and follow it over time.\n\n"
+        f"sub-commands (`{PROGRAM} SUB-COMMAND --help` describes them):\n{listed}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    parser.add_argument("command", metavar="SUB-COMMAND", help=argparse.SUPPRESS)
+    rest = parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    rest.required = False
+    chosen = parser.parse_args(arguments)
+    if chosen.command not in SUB_COMMANDS:
+        (nearest,) = difflib.get_close_matches(chosen.command, SUB_COMMANDS, 1, cutoff=0.0)
+        parser.error(f"there is no sub-command {chosen.command!r}; the nearest is {nearest!r}")
+    return chosen.command, chosen.arguments
+
+
+def _run(name: str, arguments: Sequence[str]) -> int:
+    """Run a sub-command; errors of the user's request are reported."""
+    module = _imported(name)
+    parser = OneLineParser(prog=f"{PROGRAM} {name}")
+    module.declare(parser)
+    options = parser.parse_args(arguments, argparse.Namespace(command=name))
+    refusals: tuple[type[Exception], ...] = (ValueError, *module.REFUSALS)
+    try:
+        return module.run(options)
+    except refusals as error:
+        complain(name, error)
+        return ExitCode.REFUSED
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the sub-command that `arguments` name.
+
+    Returns
+    -------
+    int
+        Exit code; what went wrong stands on one line of stderr.
+    """
+    name = ""
+    try:
+        try:
+            name, others = _chosen(arguments)
+            return _run(name, others)
+        finally:
+            flush_output()
+    except OSError as error:
+        complain(name, error)
+        is_closed = isinstance(error, BrokenPipeError)
+        return ExitCode.OUTPUT_CLOSED if is_closed else ExitCode.REFUSED
+
+
+def main() -> int:
+    """Run as a process, which Ctrl-C ends with one line, too."""
+    is_interrupted = False
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal is_interrupted
+        is_interrupted = True
+        signal.default_int_handler(number, frame)
+
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by whoever started the process
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
+    try:
+        code = run(sys.argv[1:])
+    except BaseException:  # numpy makes an ImportError of a KeyboardInterrupt while it is imported
+        if not is_interrupted:
+            raise
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        complain(" ".join(sys.argv[1:2]), "interrupted")
+        code = ExitCode.INTERRUPTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # nothing is left but the end of the process
+    return code
