@@ -1,4 +1,4 @@
-"""What a figure shows of one identified record."""
+"""The data of an identified record in a figure."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -13,7 +13,7 @@ __all__ = ["FORCE", "PRESSURE", "Case", "DriveScale"]
 
 
 class DriveScale(NamedTuple):
-    """How the pressure of a recording is shown: the axis label, and Pa for one of its units."""
+    """Unit of the pressure in a figure: the axis label, and the size of the unit in Pa."""
 
     label: str
     pascals: float
@@ -33,7 +33,7 @@ class Case:
     Attributes
     ----------
     label : str
-        What to call it.
+        Name in the legend.
     recording : Recording
         Pressure and stem position.
     thresholds : ndarray of float, shape (S,)
@@ -47,7 +47,7 @@ class Case:
     friction : Parameter
         The refined Coulomb friction with its interval and verdict.
     drive : DriveScale
-        How the pressure is shown.
+        Unit of the pressure.
     simulated : ndarray of float, shape (m,), or None
         Position of the refined model's stem, m, at m times evenly spread over the record.
     """
@@ -69,7 +69,7 @@ class Case:
         result: Result,
         drive: DriveScale = PRESSURE,
     ) -> "Case":
-        """Gather a case from a result with a sweep."""
+        """Return the case of a result with a sweep."""
         estimate = result.estimate
         if estimate is None:
             raise ValueError(f"the method {result.method} has no sweep to draw")

@@ -1,4 +1,4 @@
-"""The figure of an identification: record, sweep, signature and verdict on one page."""
+"""The figure of an identification: record, sweep, signature and verdicts on one page."""
 
 import math
 from collections.abc import Sequence
@@ -26,14 +26,14 @@ from valve_friction_ros.model import Valve
 __all__ = ["friction_figure", "identification_figure"]
 
 
-def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
-    """Draw one or several identified records of a valve, and the verdict on it.
+def friction_figure(cases: Sequence[Case], title: str) -> Figure:
+    """Draw one or several identified records of a valve.
 
     Parameters
     ----------
     cases : sequence of Case
         One to four, in the order of time.
-    verdict : str
+    title : str
         One sentence, printed above the panels.
 
     Returns
@@ -44,11 +44,11 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
     Raises
     ------
     ValueError
-        If there is no case, or more than can be told apart.
+        If `cases` is empty, or holds more cases than distinct colours.
     """
     if not 0 < len(cases) <= len(COLOURS):
         raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
-    figure = titled_figure(verdict)
+    figure = titled_figure(title)
     panels = figure.subplot_mosaic(
         [
             ["pressure", "pressure"],
@@ -72,15 +72,15 @@ def friction_figure(cases: Sequence[Case], verdict: str) -> Figure:
 
 def identification_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
     """Draw a recording and its identification, each number with its verdict."""
-    verdict = _verdict(result, result.valve)
+    title = _title(result, result.valve)
     if result.signature is not None:
-        return signature_figure(result, verdict, drive)
-    return friction_figure([Case.of("recording", result, drive)], verdict)
+        return signature_figure(result, title, drive)
+    return friction_figure([Case.of("recording", result, drive)], title)
 
 
-def _verdict(result: Result, valve: Valve) -> str:
-    told = [
-        _told(symbol, result.parameters[name], PARAMETER_UNITS[name])
+def _title(result: Result, valve: Valve) -> str:
+    parts = [
+        _with_verdict(symbol, result.parameters[name], PARAMETER_UNITS[name])
         for symbol, name in (
             ("F_c", "coulomb_friction"),
             ("F_v", "viscous_friction"),
@@ -89,13 +89,13 @@ def _verdict(result: Result, valve: Valve) -> str:
     ]
     share = dead_band(result, valve)
     if math.isfinite(share):
-        told.append(f"dead band {percentage(share)} of travel")
+        parts.append(f"dead band {percentage(share)} of travel")
     if math.isfinite(result.rms):
-        told.append(f"fit {100 * result.fit:.2f} %")
-    return "; ".join((*told, *result.warnings))
+        parts.append(f"fit {100 * result.fit:.2f} %")
+    return "; ".join((*parts, *result.warnings))
 
 
-def _told(symbol: str, parameter: Parameter, unit: str) -> str:
+def _with_verdict(symbol: str, parameter: Parameter, unit: str) -> str:
     if math.isnan(parameter.value):
         return f"{symbol} {parameter.verdict.value}"
     return f"{symbol} {parameter.value:.4g} {unit} ({parameter.verdict.value})"

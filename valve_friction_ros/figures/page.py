@@ -1,4 +1,4 @@
-"""The page that figures are drawn on: its size, its title, the dress of its panels."""
+"""The page of a figure: its size, its title, the style of its panels."""
 
 import textwrap
 from collections.abc import Iterable
@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 __all__ = ["dress", "titled_figure"]
 
 _TITLE_WIDTH = 95
+"""Characters of a line of the title, which fill the width of the figure."""
 
 
 def titled_figure(title: str) -> Figure:
@@ -21,7 +22,7 @@ def titled_figure(title: str) -> Figure:
 
 
 def dress(panels: Iterable[Axes]) -> None:
-    """Give panels a faint grid, and take the frame away where there is no scale."""
+    """Give panels a faint grid, and remove the sides of the frame without a scale."""
     for axes in panels:
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)

@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-"""Told apart by colour-blind readers too."""
+"""Colours of Okabe and Ito: colour-blind readers can distinguish them."""
 
 _MOST_POINTS = 20_000
-"""Points drawn of a record; more would not be seen."""
+"""Most points drawn of a record. Chosen: ten for each pixel of the width, so that peaks stay."""
 
 
 def thinned(size: int) -> slice:
-    """Return the samples of a long record that are drawn."""
+    """Return the samples of a record to draw."""
     return slice(None, None, max(1, size // _MOST_POINTS))
 
 
@@ -64,7 +64,7 @@ def draw_pressure(axes: Axes, recording: Recording, drive: DriveScale, colour: s
 
 
 def draw_stem(axes: Axes, recording: Recording, simulated: NDArray[np.float64]) -> None:
-    """Draw the measured stem over the time, and dotted upon it the simulated one."""
+    """Draw the measured stem over the time, and the simulated stem as a dotted line on it."""
     some = thinned(len(recording))
     time = recording.time[some]
     axes.plot(time, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
@@ -90,7 +90,7 @@ def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
 
 
 def _told(friction: Parameter) -> str:
-    """Refined Coulomb friction in words, its verdict with it."""
+    """Return the refined Coulomb friction and its verdict as text."""
     if math.isnan(friction.value):
         return f"$F_c$ {friction.verdict.value}"
     interval = f" ± {friction.half_width:.2g}" if friction.half_width > 0 else ""

@@ -15,18 +15,22 @@ def _format(path: Path) -> str:
 
 
 def require_picture_file(path: Path) -> None:
-    """Refuse a file that a figure cannot be saved to, before long work is done for it.
+    """Refuse a file that a figure cannot be saved to, before the work begins.
 
     Raises
     ------
     ValueError
-        If the ending is no picture format, or the folder is not there; the message names it.
+        If the ending is not a picture format, or the folder does not exist; the message names it.
     """
     endings = Figure().canvas.get_supported_filetypes()
     if _format(path) not in endings:
-        raise ValueError(f"{path}: not a picture format; choose from .{', .'.join(endings)}")
+        raise ValueError(
+            f"{path}: the ending is not a picture format; choose from .{', .'.join(endings)}"
+        )
     if not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}")
+        raise ValueError(
+            f"{path}: the folder {path.parent} does not exist: create it, or name another folder"
+        )
 
 
 def save_picture(figure: Figure, path: Path) -> None:

@@ -38,13 +38,14 @@ _WIDTH = 7.1
 """Between the margins of an A4 page, inches."""
 
 SETTLED_SHARE = 0.1
-"""Share by which σ_s in the chosen region differs from that of the choice, at most."""
+"""Largest difference of σ_s in the chosen region, over σ_s at the chosen threshold. Chosen."""
 
 _PALE = "#8CC5E8"
-"""Lets what is drawn upon it be seen."""
+"""Pale, so that curves on it stay visible."""
 
 _LAGS = 200
 _BINS = 60
+"""Lags and bins of the residual's panels. Chosen: readable at the width of a page."""
 
 
 def _paper_figure(height: float) -> Figure:
@@ -81,7 +82,7 @@ def signature_loop_figure(result: Result, drive: DriveScale = PRESSURE) -> Figur
 
 
 def chosen_region(sweep: Sweep, threshold: float) -> tuple[float, float]:
-    """Return the thresholds around the chosen one, m/s, over which σ_s has hardly changed."""
+    """Return the lowest and highest threshold, m/s, of the region around the chosen threshold."""
     choice = int(np.argmin(np.abs(sweep.thresholds - threshold)))
     level = sweep.sigma[choice]
     settled = np.abs(sweep.sigma - level) <= SETTLED_SHARE * level
@@ -118,7 +119,7 @@ def sweep_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
 
 
 def comparison_figure(comparison: StemComparison) -> Figure:
-    """Draw the measured stem over the time, and dotted upon it the simulated one."""
+    """Draw the measured stem over the time, and the simulated stem as a dotted line on it."""
     figure = _paper_figure(2.7)
     axes = figure.subplots()
     some = thinned(comparison.measured.size)

@@ -51,11 +51,11 @@ def draw_signature_loop(
     recording : Recording
         Pressure and stem position.
     valve : Valve
-        Turns forces into pressures.
+        Converts forces into pressures.
     signature : ValveSignature
-        What was read off the recording.
+        The signature of the recording.
     drive : DriveScale
-        How the pressure is shown.
+        Unit of the pressure.
     """
     some = thinned(len(recording))
     pressure = recording.pressure[some] / drive.pascals
@@ -85,11 +85,11 @@ def signature_figure(result: Result, title: str, drive: DriveScale = PRESSURE) -
     Parameters
     ----------
     result : Result
-        What was identified; it holds a valve signature.
+        A result with a valve signature.
     title : str
         Printed above the panels.
     drive : DriveScale
-        How the pressure is shown.
+        Unit of the pressure.
 
     Returns
     -------

@@ -16,14 +16,16 @@ from valve_friction_ros.identification import Verdict
 __all__ = ["MOST_PANELS", "trend_figure"]
 
 MOST_PANELS = 12
-"""Valves that still can be read on one page."""
+"""Most valves on one page. Chosen: still readable."""
 
 _ESTIMATE, _TREND = COLOURS[:2]
 _LIMITS = {"warn_ratio": "#E69F00", "error_ratio": "#B2182B", "low_ratio": "#762A83"}
 _NAMES = {"warn_ratio": "worth maintenance", "error_ratio": "excess", "low_ratio": "may leak"}
 _MARGIN = 0.03
+"""Height of the marks of refusals, as a share of the panel."""
+
 _SHORTEST = np.timedelta64(2, "h")
-"""Time that a panel shows at least; matplotlib would show years about a single time."""
+"""Shortest time axis; around a single point matplotlib would show years."""
 
 
 def _dates(times: ArrayLike) -> NDArray[np.datetime64]:
@@ -47,7 +49,7 @@ def trend_figure(histories: Sequence[ValveHistory]) -> Figure:
     Raises
     ------
     ValueError
-        If there is no valve, or more than a page holds.
+        If `histories` is empty, or holds more than `MOST_PANELS` valves.
     """
     if not 0 < len(histories) <= MOST_PANELS:
         raise ValueError(
@@ -109,7 +111,7 @@ def _draw(axes: Axes, history: ValveHistory) -> None:
     tag = history.valve.tag
     axes.set_title(f"{tag} ({history.valve.name})" if tag else history.valve.name, loc="left")
     if history.trend is not None and history.trend.is_significant:
-        axes.set_title(_told(history.trend), loc="right", fontsize="medium", color=_TREND)
+        axes.set_title(_drift_text(history.trend), loc="right", fontsize="medium", color=_TREND)
     axes.set_ylabel("coulomb friction $F_c$ [N]")
     axes.set_xlabel(f"time [UTC]; identified from {first} to {last}")
     axes.grid(alpha=0.3)
@@ -197,9 +199,9 @@ def _draw_trend(axes: Axes, trend: Trend) -> None:
         )
 
 
-def _told(trend: Trend) -> str:
-    told = f"{trend.drift:+.3g} ± {trend.half_width:.2g} N a month"
+def _drift_text(trend: Trend) -> str:
+    text = f"{trend.drift:+.3g} ± {trend.half_width:.2g} N a month"
     if trend.crossing is None:
-        return told
+        return text
     when = datetime.fromtimestamp(trend.crossing.time / 1e9, timezone.utc)
-    return f"{told}; {_NAMES[trend.crossing.limit.value]} expected {when:%Y-%m-%d}"
+    return f"{text}; {_NAMES[trend.crossing.limit.value]} expected {when:%Y-%m-%d}"

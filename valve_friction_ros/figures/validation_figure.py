@@ -1,4 +1,4 @@
-"""The figure of a validation: measured and simulated stem, what lies between, and the pressure."""
+"""The figure of a validation: measured and simulated stem, residual, and pressure."""
 
 import math
 
@@ -22,9 +22,9 @@ def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = 
     validation : Validation
         Record and simulated stem.
     valve : Valve
-        Tells the travel, for the title.
+        Gives the travel, for the title.
     drive : DriveScale
-        How the pressure is shown.
+        Unit of the pressure.
 
     Returns
     -------

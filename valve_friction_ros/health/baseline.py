@@ -64,7 +64,7 @@ class Baseline:
         return cls(friction.value, friction.half_width)
 
     def compared_with(self, friction: Parameter) -> Ratio:
-        """Ratio of an assessed friction to the baseline; nan where it is not identifiable.
+        """Ratio of an identified friction to the baseline; nan where it is not identifiable.
 
         The relative half widths of two independent estimates add in squares, and the interval
         is symmetric in the logarithm, so that a ratio and its inverse say the same.

@@ -1,4 +1,4 @@
-"""From an estimate to a verdict: whether friction has grown or collapsed, and what it costs."""
+"""From a result to the diagnosis: whether friction has grown or collapsed, and its consequence."""
 
 import math
 from dataclasses import dataclass, replace
@@ -47,11 +47,11 @@ class FrictionLimits:
     Attributes
     ----------
     warn_ratio : float
-        From here on the valve is worth maintenance.
+        Ratio from which the valve is worth maintenance.
     error_ratio : float
-        From here on friction is excessive.
+        Ratio from which friction is excessive.
     low_ratio : float
-        From here down friction has collapsed: the packing is worn and may leak.
+        Ratio below which friction has collapsed: the packing is worn and may leak.
 
     Raises
     ------
@@ -75,16 +75,16 @@ class FrictionLimits:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A verdict on the friction of a valve.
+    """The diagnosis of a valve: the state of its friction.
 
     Attributes
     ----------
     level : Level
         Severity.
     status_signal : StatusSignal
-        The same in the words of NE 107.
+        The severity as a status signal of NE 107.
     message : str
-        One sentence for people, with the consequence.
+        One sentence, with the consequence.
     ratio : Ratio or None
         Coulomb friction over its baseline, with its interval; None without a baseline or without
         an identifiable friction.
@@ -100,8 +100,8 @@ def dead_band(result: Result, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.
 
     After a move the sliding friction F_c still holds the spring off balance; to move back, the
-    actuator must undo it and overcome F_s: the pressure that does so would move a frictionless
-    stem by (F_c + F_s)/k. Where no slip jump was seen, F_s is F_c. The result is nan without a
+    actuator must reverse it and overcome F_s: the same change of pressure would move a
+    frictionless stem by (F_c + F_s)/k. Without a slip jump F_s is F_c. The result is nan without a
     spring, without travel stops, or where F_c or k is not identifiable.
     """
     values = result.values
@@ -139,7 +139,7 @@ def diagnose(
     result : Result
         The latest identification.
     valve : Valve
-        Tells the travel, for the dead band.
+        Gives the travel, for the dead band.
     baseline : Baseline, optional
         Coulomb friction of the healthy valve.
     limits : FrictionLimits, optional
@@ -149,56 +149,56 @@ def diagnose(
     -------
     Diagnosis
         A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
-        uncertain estimate raises no alarm: an unchanged valve would have to be misjudged by the
-        whole distance to the bound. A friction too small to be told has collapsed where even the
-        largest that it can be lies below the low bound. A valve that the model does not describe
-        is WARN at least.
+        uncertain result raises no alarm: on an unchanged valve it would have to be wrong by the
+        whole distance to the bound. A friction that is not identifiable has collapsed where even
+        its largest possible value lies below the low bound. A valve that the model does not
+        describe is WARN at least.
     """
     limits = limits or FrictionLimits()
     friction = result.parameters["coulomb_friction"]
     if math.isnan(friction.value):
         message = f"coulomb friction is not identifiable: {friction.reason}"
-        verdict = Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
+        diagnosis = Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
         if baseline is not None and _has_vanished(friction, baseline, limits):
             message = (
                 "friction collapsed, the packing may leak: coulomb friction is too small to be "
-                f"told, {friction.magnitude_bound:.2g} N at the most; its baseline is "
+                f"identified, at most {friction.magnitude_bound:.2g} N; its baseline is "
                 f"{baseline.coulomb_friction:.4g} N"
             )
-            verdict = Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, message, None)
-        return _with_model_doubt(verdict, result)
+            diagnosis = Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, message, None)
+        return _with_model_doubt(diagnosis, result)
     if friction.value < 0:
         message = (
-            f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, which cannot "
-            "be: check the direction of both signals"
+            f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, and "
+            "friction is above zero: check the direction of both signals"
         )
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
     effect = _consequence(result, valve)
     if baseline is None:
-        verdict = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
+        diagnosis = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
     else:
-        verdict = _against(baseline.compared_with(friction), limits, effect)
-    return _with_model_doubt(verdict, result)
+        diagnosis = _against(baseline.compared_with(friction), limits, effect)
+    return _with_model_doubt(diagnosis, result)
 
 
 def _has_vanished(friction: Parameter, baseline: Baseline, limits: FrictionLimits) -> bool:
-    """Tell whether a friction too small for a number of its own is surely below the low limit."""
+    """Return whether a friction that is too small to be identified lies below the low limit."""
     least = baseline.coulomb_friction - baseline.half_width
     return friction.magnitude_bound <= limits.low_ratio * least
 
 
-def _with_model_doubt(verdict: Diagnosis, result: Result) -> Diagnosis:
+def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
     misfit = result.misfit
     if misfit is None or misfit.describes:
-        return verdict
+        return diagnosis
     doubt = (
         "the Karnopp model does not describe this valve "
-        f"({misfit.systematic * 1e6:.3g} µm of misfit); {verdict.message}"
+        f"({misfit.systematic * 1e6:.3g} µm of misfit); {diagnosis.message}"
     )
-    if verdict.level >= Level.WARN:
-        return replace(verdict, message=doubt)
+    if diagnosis.level >= Level.WARN:
+        return replace(diagnosis, message=doubt)
     return replace(
-        verdict, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=doubt
+        diagnosis, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=doubt
     )
 
 

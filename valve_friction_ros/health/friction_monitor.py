@@ -1,4 +1,4 @@
-"""The monitor of one valve, without any ROS: gather, identify, remember, judge."""
+"""The monitor of one valve, without ROS: buffer, last result, baseline, diagnosis."""
 
 from dataclasses import dataclass, field, replace
 
@@ -26,22 +26,22 @@ __all__ = ["FrictionMonitor", "MonitorSettings", "identify_snapshot"]
 
 @dataclass(frozen=True)
 class MonitorSettings:
-    """What a monitor needs to know about its valve and its task.
+    """Settings of a monitor: its valve, its identification, its limits.
 
     Attributes
     ----------
     valve : Valve
         Geometry and sensor range.
     identification : IdentificationSettings
-        How records are identified.
+        Settings of the identification.
     method : str
         Name of the method of identification, among `METHODS`.
     limits : FrictionLimits
-        When friction is out of bounds.
+        Bounds of the friction.
     baseline : Baseline or None
-        Friction of the healthy valve, where it is known beforehand.
+        Friction of the healthy valve, if it is known.
     window : float
-        Length of the record that is kept and identified, s.
+        Length of the buffered and identified record, s.
     """
 
     valve: Valve
@@ -52,18 +52,18 @@ class MonitorSettings:
     window: float = 60.0
 
     def __post_init__(self) -> None:
-        """Refuse windows that cannot be, and methods that there are not."""
+        """Refuse impossible windows and unknown methods."""
         method_named(self.method)
         require_positive("window", self.window)
 
 
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
-    """Identify a snapshot of the buffer; needs nothing of the monitor, so any thread may run it.
+    """Identify a snapshot of the buffer. It does not use the monitor, so any thread may run it.
 
     Raises
     ------
     RefusalError
-        With the cause, and why the buffer was emptied if that is recent.
+        With the cause, and with the cause of a recent clearing of the buffer.
     """
     try:
         return method_named(settings.method)(
@@ -80,7 +80,7 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
 
 
 class FrictionMonitor:
-    """Watches one valve.
+    """The monitor of one valve.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class FrictionMonitor:
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
         self._baseline = settings.baseline
-        self._assessment: Result | None = None
+        self._result: Result | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
@@ -103,13 +103,13 @@ class FrictionMonitor:
 
     @property
     def baseline(self) -> Baseline | None:
-        """Friction to compare with."""
+        """Friction of the healthy valve."""
         return self._baseline
 
     @property
     def result(self) -> Result | None:
         """The latest result; a refusal leaves the one before it in place."""
-        return self._assessment
+        return self._result
 
     @property
     def stamp(self) -> int | None:
@@ -131,40 +131,39 @@ class FrictionMonitor:
         self._settings = settings
 
     def accept(self, result: Result, stamp: int) -> None:
-        """Remember an result made at `stamp` (ns)."""
-        self._assessment, self._stamp, self._refusal = result, stamp, None
+        """Remember a result made at `stamp` (ns)."""
+        self._result, self._stamp, self._refusal = result, stamp, None
 
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""
         self._refusal = str(refusal)
 
     def set_baseline(self) -> Baseline:
-        """Make the latest estimate the baseline and return it.
+        """Make the Coulomb friction of the latest result the baseline, and return it.
 
         Raises
         ------
         RefusalError
-            If there is no estimate, or its Coulomb friction is not identifiable or not above
-            zero.
+            If there is no result, or its Coulomb friction is not identifiable or not above zero.
         """
-        if self._assessment is None:
-            raise RefusalError("there is no estimate to take as baseline: identify first")
-        self._baseline = Baseline.of(self._assessment)
+        if self._result is None:
+            raise RefusalError("the valve has no result to take as baseline: identify it first")
+        self._baseline = Baseline.of(self._result)
         return self._baseline
 
     def take_baseline(self, baseline: Baseline) -> None:
-        """Compare with this baseline from now on."""
+        """Use this baseline from now on."""
         self._baseline = baseline
 
     def diagnosis(self) -> Diagnosis:
-        """Judge the latest estimate, also after a refusal; OK while there is none."""
-        if self._assessment is None:
+        """Return the diagnosis by the latest result, also after a refusal; OK without a result."""
+        if self._result is None:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
-        verdict = diagnose(
-            self._assessment, self._settings.valve, self._baseline, self._settings.limits
+        diagnosis = diagnose(
+            self._result, self._settings.valve, self._baseline, self._settings.limits
         )
         if self._refusal is None:
-            return verdict
+            return diagnosis
         message = f"the latest identification was refused: {self._refusal}; before: "
-        return replace(verdict, message=message + verdict.message)
+        return replace(diagnosis, message=message + diagnosis.message)

@@ -1,4 +1,4 @@
-"""What the history keeps: identifications of a valve, and its baselines."""
+"""Entries of the history: identifications of a valve, and its baselines."""
 
 import json
 import math
@@ -42,7 +42,7 @@ class Span(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How well a model reproduces its record; nan where that cannot be told.
+    """How well a model reproduces its record; nan where it is unknown.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Fit(NamedTuple):
     rms : float
         Distance between simulated and measured stem, m.
     systematic : float
-        What of it is not noise, m.
+        Part of it that is not noise, m.
     """
 
     share: float = math.nan
@@ -77,7 +77,7 @@ class FrictionPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class KeptBaseline:
-    """A baseline and where it comes from.
+    """A baseline and its source.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class KeptBaseline:
     time : int
         When it was set, ns since 1970 (UTC).
     since : int
-        When the estimate that it was taken from was identified, ns: with it a new trend begins.
+        When its result was identified, ns: a new trend begins there.
     """
 
     baseline: Baseline
@@ -103,13 +103,13 @@ class HistoryEntry:
     time : int
         When it ended, ns since 1970 (UTC) by the node's clock.
     valve : KeptValve
-        Whose it is.
+        The valve.
     span : Span or None
-        Its record; None if nothing was gathered.
+        Time of its record; None for an empty buffer.
     method : str
-        How it was identified.
+        Method of the identification.
     diagnosis : Diagnosis
-        The verdict on the valve that the operator was shown.
+        The diagnosis that the operator saw.
     limits : FrictionLimits
         The bounds in force.
     baseline : Baseline or None
@@ -117,13 +117,13 @@ class HistoryEntry:
     settings : str
         Settings of the identification, an object of JSON (`settings_text`).
     parameters : mapping of str to Parameter
-        What was identified; empty for a refusal.
+        The identified parameters; empty for a refusal.
     fit : Fit
         How well the model reproduces the record.
     warnings : tuple of str
-        What a reader of the numbers should know.
+        Limitations of the numbers.
     refusal : str
-        Why it was refused; empty for a success.
+        Cause of the refusal; empty for a success.
     version : str
         Version of this software.
     """
@@ -143,7 +143,7 @@ class HistoryEntry:
     version: str = __version__
 
     def __post_init__(self) -> None:
-        """Refuse an entry that is neither a success nor a refusal, or both."""
+        """Refuse an entry that is not exactly one of success and refusal."""
         if bool(self.parameters) == bool(self.refusal):
             raise ValueError("an entry holds either parameters or the reason of a refusal")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
@@ -154,10 +154,10 @@ class HistoryEntry:
         return self.parameters.get("coulomb_friction")
 
     def point(self) -> FrictionPoint | None:
-        """Return what this entry adds to a trend.
+        """Return the point of this entry in a trend, or None.
 
-        Only an identified or weak friction does: one that is fixed was not measured, one that is
-        not identifiable has no value.
+        Only an identified or weak friction counts: a fixed friction was not measured, and a
+        friction that is not identifiable has no value.
         """
         one = self.friction
         if one is None or one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
@@ -166,7 +166,7 @@ class HistoryEntry:
 
 
 def span_of(snapshot: Snapshot) -> Span | None:
-    """First and last stamp of what a snapshot holds of either signal."""
+    """First and last stamp of both signals of a snapshot."""
     ends = [
         (int(signal.stamps[0]), int(signal.stamps[-1]))
         for signal in (snapshot.pressure, snapshot.position)
@@ -176,14 +176,14 @@ def span_of(snapshot: Snapshot) -> Span | None:
 
 
 def _plain(value: object) -> Any:
-    """Return a value as JSON knows it; what is not finite is null."""
+    """Return a value in types of JSON; a number that is not finite becomes null."""
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def settings_text(settings: MonitorSettings) -> str:
-    """Write what an identification was asked to do as JSON, the same for the same settings."""
+    """Write the settings of an identification as JSON; equal settings give equal text."""
     content = {
         "valve": vars(settings.valve),
         "identification": vars(settings.identification),
@@ -204,13 +204,13 @@ def entry_of(
     Parameters
     ----------
     monitor : FrictionMonitor
-        Holds the result and the verdict.
+        Holds the result and the diagnosis.
     valve : KeptValve
         The valve.
     snapshot : Snapshot
-        What was identified.
+        The record.
     settings : MonitorSettings
-        How it was; those in force may have changed since.
+        Settings of this identification; those in force may differ by now.
     time : int
         Now, ns.
     """

@@ -1,4 +1,4 @@
-"""The history of a plant's valves: one file, that several processes write to at once."""
+"""The history of a plant's valves: one file that several processes write at once."""
 
 import sqlite3
 from collections.abc import Sequence
@@ -24,16 +24,19 @@ from valve_friction_ros.identification import Verdict
 __all__ = ["HistoryError", "HistoryFile"]
 
 _DAY = 86_400_000_000_000
+"""Nanoseconds of a day."""
+
 _END_OF_TIME = 2**63 - 1
-"""Largest whole number that SQLite keeps."""
+"""Largest integer in SQLite."""
 
 
 @dataclass(frozen=True)
 class HistoryFile:
-    """A history in SQLite; every method opens it anew, so it may be moved, mended or missing.
+    """A history in SQLite.
 
-    Each change is one transaction: a process that is killed leaves it done or not done, and the
-    file whole. All methods raise HistoryError if the file cannot be read or written.
+    Every method opens the file, so it may be moved, repaired or missing between two calls. Each
+    change is one transaction: a killed process leaves the change complete or absent, and
+    the file intact. All methods raise HistoryError if the file cannot be read or written.
 
     Attributes
     ----------
@@ -44,14 +47,14 @@ class HistoryFile:
     path: Path
 
     def prepare(self) -> None:
-        """Make the file if it is not there, and see whether it can be written."""
+        """Create the file if it is missing, and check that it can be written."""
         with writing(self.path):
             pass
 
     def add(self, entry: HistoryEntry, days: float = 0.0) -> None:
-        """Add an identification, and forget those of its valve that are `days` older; 0: none.
+        """Add an identification; delete those of its valve that are `days` older, none for 0.
 
-        The newest baseline stays, however old it is.
+        The newest baseline stays, at any age.
         """
         with writing(self.path) as connection:
             valve = valve_id(connection, entry.valve)
@@ -107,9 +110,9 @@ class HistoryFile:
         Parameters
         ----------
         valves : sequence of str, optional
-            Names of the valves that are wanted; by default all.
+            Names of the valves; by default all.
         since, until : int, optional
-            First time, and first time no longer, ns since 1970 (UTC).
+            First time, and end (not included), ns since 1970 (UTC).
         """
         with reading(self.path) as connection:
             try:
@@ -119,7 +122,7 @@ class HistoryFile:
 
 
 def _forget(connection: sqlite3.Connection, valve: int, before: int) -> None:
-    """Delete what a valve has from before a time (ns), with settings that nothing refers to."""
+    """Delete the rows of a valve from before a time (ns), and settings without a reference."""
     done = connection.execute(
         "DELETE FROM identification WHERE valve_id = ? AND time_ns < ?", (valve, before)
     )

@@ -1,4 +1,4 @@
-"""Between the history's value types and rows of its tables."""
+"""Conversion between the history's value types and the rows of its tables."""
 
 import math
 import sqlite3
@@ -20,7 +20,7 @@ __all__ = ["entries_in", "insert_baseline", "insert_entry", "valve_id"]
 
 
 def valve_id(connection: sqlite3.Connection, valve: KeptValve) -> int:
-    """Return the row of a valve, with its tag as it is now."""
+    """Return the row of a valve, with its tag updated."""
     connection.execute(
         "INSERT INTO valve (name, tag) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET "
         "tag = excluded.tag WHERE tag != excluded.tag",
@@ -44,7 +44,7 @@ def _insert(connection: sqlite3.Connection, table: str, **values: object) -> int
 
 
 def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry) -> None:
-    """Add an identification of a valve's row. SQLite keeps nan as NULL."""
+    """Add an identification to a valve. SQLite stores nan as NULL."""
     diagnosis, baseline = entry.diagnosis, entry.baseline
     begin, end = entry.span or (None, None)
     ratio, low, high = diagnosis.ratio or (None, None, None)
@@ -90,7 +90,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
 
 
 def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseline) -> None:
-    """Add a baseline of a valve's row."""
+    """Add a baseline to a valve."""
     _insert(
         connection,
         "baseline",
@@ -107,7 +107,7 @@ def _number(value: float | None) -> float:
 
 
 def _place(parameter: Parameter) -> int:
-    """Place of a parameter in an result."""
+    """Place of a parameter in a result."""
     names = [*PARAMETER_UNITS]
     return names.index(parameter.name) if parameter.name in names else len(names)
 

@@ -1,4 +1,4 @@
-"""A straight line through estimates that scatter more than their own intervals tell."""
+"""A straight line through values that scatter more than their own intervals."""
 
 import math
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ LEAST_ESTIMATES = 4
 
 
 class ScatteredLine(NamedTuple):
-    """A line y = level + slope·(t − centre), with what is uncertain about it.
+    """A line y = level + slope·(t − centre), with its uncertainty.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class ScatteredLine(NamedTuple):
         return self.quantile * np.hypot(self.level_error, self.slope_error * away)
 
     def crossing(self, level: float, level_error: float) -> tuple[float, float, float] | None:
-        """Tell when the line reaches a level.
+        """Return when the line reaches a level.
 
         By Fieller: the interval holds the times at which line and level do not differ at the 5 %
         level. It is finite exactly where the slope's own interval excludes zero.

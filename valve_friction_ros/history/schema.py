@@ -9,13 +9,13 @@ from urllib.parse import quote
 __all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
 
 SCHEMA_VERSION = 1
-"""Kept as the database's user_version."""
+"""The database's user_version."""
 
 _APPLICATION = 0x56465248
-"""Kept as its application_id, so that no other program's database is written to."""
+"""The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
 
 _PATIENCE = 10.0
-"""Time, s, for which another process's writing is waited for."""
+"""Longest wait, s, for another process that writes. Chosen: one transaction takes milliseconds."""
 
 _SCHEMA = """
 CREATE TABLE valve (
@@ -100,9 +100,15 @@ _REMEDIES = (
         "check that the folder is there and writable, or name another history_file",
     ),
     ("disk I/O error", "check the disk, its free space and the process's limits"),
-    ("locked", "find the process that holds it"),
-    ("not a database", "name the right file, or move this one away, and a new one is begun"),
-    ("malformed", "move it away, and a new one is begun; `sqlite3 FILE .recover` may save rows"),
+    ("locked", "find the process that holds it, and end it"),
+    (
+        "not a database",
+        "name the right file, or move this file away: the node then begins a new file",
+    ),
+    (
+        "malformed",
+        "move it away: the node then begins a new file; `sqlite3 FILE .recover` may save rows",
+    ),
 )
 
 
@@ -118,7 +124,7 @@ def _explained(path: Path, error: sqlite3.Error) -> HistoryError:
 
 @contextlib.contextmanager
 def _connection(path: Path, mode: str) -> Iterator[sqlite3.Connection]:
-    """Open a file by a URI's `mode`, and close it at the end; what fails is explained."""
+    """Open a file by a URI's `mode`, and close it at the end; errors name cause and remedy."""
     try:
         connection = sqlite3.connect(
             f"file:{quote(str(path.absolute()))}?{mode}",
@@ -139,25 +145,27 @@ def _pragma(connection: sqlite3.Connection, name: str) -> int:
 
 
 def _is_new(path: Path, connection: sqlite3.Connection) -> bool:
-    """Tell whether a database is empty; refuse one that is not a history of this schema."""
+    """Return whether a database is empty; refuse any other that is not a history of this schema."""
     application, version = (_pragma(connection, n) for n in ("application_id", "user_version"))
     if application != _APPLICATION:
         (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if application or version or tables:
-            raise HistoryError(f"{path}: another program's database: name another history_file")
+            raise HistoryError(
+                f"{path}: the database of another program: name another history_file"
+            )
         return True
     if version > SCHEMA_VERSION:
         raise HistoryError(
             f"{path}: written by a newer version of this package (schema {version}, this "
-            f"one knows {SCHEMA_VERSION}): update the package, or name another history_file"
+            f"version knows {SCHEMA_VERSION}): update the package, or name another history_file"
         )
     return False
 
 
 def _set_journal(connection: sqlite3.Connection) -> None:
-    """Write ahead, where the file system can; else by SQLite's older journal, as safe but slower.
+    """Use the write-ahead journal where the file system allows it, else the older, slower journal.
 
-    Either way a finished transaction is on the disk before the next statement.
+    With both a finished transaction is on the disk before the next statement.
     """
     with contextlib.suppress(sqlite3.OperationalError):
         connection.execute("PRAGMA journal_mode = WAL")
@@ -173,12 +181,12 @@ def _make_tables(connection: sqlite3.Connection) -> None:
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a history for one transaction, and make it if it is not there.
+    """Open a history for one transaction, and create it if it is missing.
 
     Raises
     ------
     HistoryError
-        If it cannot be written; then nothing of the transaction is.
+        If it cannot be written; then no part of the transaction is.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -204,8 +212,8 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
 def _reading_mode(path: Path) -> str:
     """Return the mode in which a file can be read.
 
-    The write-ahead journal needs files beside it. Where they cannot be made, nobody is writing,
-    and without a journal left behind the file itself is all there is.
+    The write-ahead journal needs files beside the database. Where they cannot be created, no
+    process writes; without a remaining journal the database file alone holds all rows.
     """
     try:
         with _connection(path, "mode=ro") as connection:
@@ -218,21 +226,21 @@ def _reading_mode(path: Path) -> str:
 
 @contextlib.contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a history that is there, for reading one state of it.
+    """Open an existing history, to read one state of it.
 
     Raises
     ------
     HistoryError
-        If it is not there, or cannot be read.
+        If it is missing, or cannot be read.
     """
     try:
         is_there = path.is_file()
     except OSError as error:
         raise HistoryError(f"{path}: {error.strerror}: check the folder") from None
     if not is_there:
-        raise HistoryError(f"{path}: there is no such file")
+        raise HistoryError(f"{path}: the file does not exist: check its name")
     with _connection(path, _reading_mode(path)) as connection:
         if _is_new(path, connection):
-            raise HistoryError(f"{path}: there is nothing in it")
+            raise HistoryError(f"{path}: the file is empty: no identification has been stored")
         connection.execute("BEGIN")
         yield connection

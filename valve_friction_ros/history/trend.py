@@ -18,20 +18,24 @@ from valve_friction_ros.model.checks import require_non_negative
 __all__ = ["MONTH", "Crossing", "Limit", "Trend", "trend_of"]
 
 DAY = 86_400e9
+"""Nanoseconds of a day."""
+
 MONTH = 365.25 / 12 * DAY
-"""Nanoseconds of a month."""
+"""Nanoseconds of a month: a twelfth of the Julian year."""
 
 _NORMAL = 1.959964
-"""Standard errors of a half width: that of a large sample, so that few strokes weigh less."""
+"""Standard errors in a half width of a large sample (95 %), so that few strokes weigh less."""
 
 _HORIZON = 2.0
-"""Spans of the estimates by which a crossing may lie ahead of the last one."""
+"""Largest distance of a crossing after the last point, in spans of the points.
+
+Chosen: a line is not evidence for a longer time."""
 
 _OUTLIER = 0.001
-"""Chance that a record without outliers is said to have one."""
+"""Chance to find an outlier in a history without outliers. Chosen."""
 
 _MOST_OUTLIERS = 0.1
-"""Share of the days that may be left out as outliers."""
+"""Largest share of the days left out as outliers. Chosen: more would be a change, not outliers."""
 
 
 class Limit(Enum):
@@ -100,7 +104,7 @@ class Trend:
 
     @property
     def is_significant(self) -> bool:
-        """Tell whether the interval of the drift excludes zero."""
+        """Return whether the interval of the drift excludes zero."""
         return abs(self.drift) > self.half_width
 
 
@@ -116,9 +120,9 @@ class _Days(NamedTuple):
 
 
 def _days(points: Sequence[FrictionPoint]) -> _Days:
-    """Let the points of a day, in UTC, count as one: their weighted mean.
+    """Combine the points of each day (UTC) to one point: their weighted mean.
 
-    The record of one identification overlaps that of the next, and both saw the same weather.
+    The records of one day may overlap, and share temperature and load.
     """
     times = np.array([point.time for point in points], dtype=np.int64)
     values = np.array([point.value for point in points])
@@ -133,10 +137,10 @@ def _days(points: Sequence[FrictionPoint]) -> _Days:
 
 
 def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
-    """Fit a line, and leave out days that it cannot be expected to have produced.
+    """Fit a line, and leave out outlying days.
 
-    The day with the largest residual is compared with what the others predict for it: it is left
-    out where a day without fault would lie as far off in 0.1 % of such records (Bonferroni).
+    The day with the largest residual is compared with the prediction of the other days. It is left
+    out where chance gives such a distance in 0.1 % of histories (Bonferroni).
     """
     line, outliers = fit_line(*days), 0
     for _ in range(int(_MOST_OUTLIERS * days.times.size)):
@@ -156,7 +160,7 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
 def _crossing(
     line: ScatteredLine, begin: int, end: int, baseline: Baseline, limits: FrictionLimits
 ) -> Crossing | None:
-    """Tell when the next limit is crossed, if that is not too far ahead."""
+    """Return when the next limit is crossed, if that is not too far ahead."""
     friction, span = baseline.coulomb_friction, end - begin
     now = line.at(span)
     rising = ((Limit.WARN, limits.warn_ratio), (Limit.ERROR, limits.error_ratio))
@@ -181,14 +185,14 @@ def trend_of(
 ) -> Trend | None:
     """Estimate the drift of the Coulomb friction.
 
-    Each point weighs by its interval, together with a scatter between days that the points
-    themselves tell (`fit_line`). All points of one day count as one. A day that does not belong to
-    the others is left out, a tenth of them at most.
+    The weight of a point follows from its interval and from the scatter between days, which
+    `fit_line` estimates. All points of one day count as one point. Outlying days are left out, a
+    tenth of all days at most.
 
     Parameters
     ----------
     points : sequence of FrictionPoint
-        Since the packing was last worked on, in any order.
+        Points since the last work on the packing, in any order.
     baseline : Baseline, optional
         Friction of the healthy valve, for the limits.
     limits : FrictionLimits, optional

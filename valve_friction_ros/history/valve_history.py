@@ -1,4 +1,4 @@
-"""What a history tells of one valve: its identifications, its baseline, its trend."""
+"""The history of one valve: its identifications, its baseline, its trend."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ __all__ = ["ValveHistory", "current_trend", "valve_histories"]
 
 @dataclass(frozen=True)
 class ValveHistory:
-    """A stretch of one valve's history.
+    """Part of one valve's history.
 
     Attributes
     ----------
@@ -24,8 +24,8 @@ class ValveHistory:
     set_baseline : KeptBaseline or None
         The last baseline that was set; the trend begins with it.
     trend : Trend or None
-        Drift by the method, and against the baseline and the limits, that were in force last.
-        Estimates of two methods may differ by themselves, so they make no common trend.
+        Drift of the results of the last method, against the last baseline and limits. Two methods
+        may differ by themselves, so a trend uses the results of one method.
     """
 
     valve: KeptValve
@@ -37,7 +37,7 @@ class ValveHistory:
 def valve_histories(
     history: HistoryFile, valves: tuple[KeptValve, ...], since: int, until: int
 ) -> tuple[ValveHistory, ...]:
-    """Read the histories of some valves from `since` to `until`, ns; those without any left out.
+    """Read the histories of some valves from `since` to `until`, ns; empty histories are left out.
 
     Raises
     ------

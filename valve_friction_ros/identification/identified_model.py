@@ -1,4 +1,4 @@
-"""From identified numbers to a model that can be simulated, with what stands in for the missing."""
+"""A model to simulate from identified values; substitutes replace what was not identified."""
 
 import math
 from collections.abc import Mapping
@@ -17,14 +17,14 @@ _NAMES = tuple(field.name for field in fields(KarnoppParameters))
 
 
 class IdentifiedModel(NamedTuple):
-    """A model to simulate, and what was used in place of numbers that were not identifiable.
+    """A model to simulate, and the substitutes for values that were not identified.
 
     Attributes
     ----------
     parameters : KarnoppParameters
         The model.
     notes : tuple of str
-        One sentence for each number that was not identified.
+        One sentence for each substitute.
     """
 
     parameters: KarnoppParameters
@@ -34,16 +34,16 @@ class IdentifiedModel(NamedTuple):
 def identified_model(
     values: Mapping[str, float], known: Mapping[str, float] | None = None
 ) -> IdentifiedModel:
-    """Build a model from identified values, of which some may be missing.
+    """Build a model from identified values; substitutes replace missing values.
 
     Parameters
     ----------
     values : mapping of str to float
-        Identified values by name, nan where one is not identifiable.
+        Identified values by name; nan where a value is not identifiable.
     known : mapping of str to float, optional
-        Nominal values that stand in, such as those of a valve file. Without one, the mass is the
-        assumed one of `IdentificationSettings`, F_s is F_c, and F_v is 2·√(k·m), the least with
-        which the stem does not swing.
+        Nominal values to substitute, such as those of a valve file. Without a nominal value the
+        mass is `IdentificationSettings.assumed_mass`, F_s is F_c, and F_v is 2·√(k·m), critical
+        damping: the smallest F_v without oscillation.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def identified_model(
     Raises
     ------
     RefusalError
-        If F_c or k is missing, or F_0 is and not known either.
+        If F_c or k is missing, or if F_0 is missing and has no nominal value.
     ValueError
         If a value is impossible; the message names it.
     """
@@ -62,23 +62,23 @@ def identified_model(
     for name in _NEEDED:
         if name not in found:
             raise RefusalError(
-                f"the estimate has no {name}, without which there is no model: identify a record "
-                "that tells it"
+                f"{name} was not identified, and a model needs it: identify a record that "
+                "determines it"
             )
     notes = []
     if found.get("viscous_friction", 0.0) < 0:
         notes.append(f"viscous_friction is negative ({found.pop('viscous_friction'):.4g} N·s/m)")
     if "spring_preload" not in found and "spring_preload" not in nominal:
         raise RefusalError(
-            "the estimate has no spring_preload: give it in the valve file, or identify a record "
-            "that tells it"
+            "spring_preload was not identified, and a model needs it: name it in the valve file, "
+            "or identify a record that determines it"
         )
     mass = found.get("mass", nominal.get("mass", IdentificationSettings().assumed_mass))
     substitutes = {
         "mass": (mass, "assumed"),
         "viscous_friction": (
             2 * math.sqrt(found["spring_constant"] * mass),
-            "the least with which the stem does not swing",
+            "critical damping, the smallest value without oscillation",
         ),
         "static_friction": (found["coulomb_friction"], "the coulomb_friction"),
         "spring_preload": (0.0, ""),
@@ -91,12 +91,12 @@ def identified_model(
     if found["static_friction"] < found["coulomb_friction"]:
         notes.append(
             f"static_friction ({found['static_friction']:.6g} N) lies below coulomb_friction: "
-            "taken equal to it"
+            "the model takes F_s equal to F_c"
         )
         found["static_friction"] = found["coulomb_friction"]
     if found.get(CLOCK_OFFSET):
         notes.append(
-            f"{CLOCK_OFFSET} is left out: it belongs to the clocks of the identified record"
+            f"{CLOCK_OFFSET} is not part of the model: it belongs to the clocks of the record"
         )
     model = {name: value for name, value in found.items() if name in _NAMES}
     return IdentifiedModel(KarnoppParameters(**model), tuple(notes))

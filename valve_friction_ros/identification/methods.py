@@ -1,4 +1,4 @@
-"""The methods of identification by name; all take and return the same."""
+"""The methods of identification by name; all have the same arguments and return type."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -21,7 +21,7 @@ class Method(Protocol):
     def __call__(
         self, recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
     ) -> Result:
-        """Identify a record; raises RefusalError for one that cannot tell."""
+        """Identify a record; raise RefusalError if it does not determine the friction."""
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
@@ -31,7 +31,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         signature.METHOD: signature.identify_signature,
     }
 )
-"""``refined``: the best; ``published``: the paper's model 1; ``signature``: its model 2."""
+"""``refined``: most accurate; ``published``: the paper's model 1; ``signature``: its model 2."""
 
 DEFAULT_METHOD = refined.METHOD
 
@@ -44,7 +44,7 @@ def method_named(name: str) -> Method:
     Raises
     ------
     ValueError
-        If there is none; the message lists them.
+        If no method has this name; the message lists the names.
     """
     if name not in METHODS:
         former = _FORMER_NAMES.get(name)
@@ -70,8 +70,8 @@ def identify(
     settings : IdentificationSettings, optional
         What is known beforehand, and the settings of the sweep.
     method : str
-        ``refined``, the best, with intervals; ``published``, the paper's model 1 as it is; or
-        ``signature``, its model 2, from a slow triangular wave.
+        ``refined``, the most accurate, with intervals; ``published``, the paper's model 1; or
+        ``signature``, the paper's model 2, from a slow triangular wave.
 
     Returns
     -------
@@ -81,9 +81,9 @@ def identify(
     Raises
     ------
     RefusalError
-        If the record cannot tell; the message says what to do.
+        If the record does not determine the friction; the message names cause and remedy.
     ValueError
-        If there is no such method.
+        If no method has this name.
 
     Examples
     --------

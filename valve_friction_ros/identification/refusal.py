@@ -1,10 +1,10 @@
-"""Refusal of a record that cannot be identified."""
+"""Refusal of a record that does not determine the friction."""
 
 __all__ = ["RefusalError"]
 
 
 class RefusalError(Exception):
-    """The record does not support an identification; the message says why and what to do.
+    """A record does not determine what was asked for; the message names cause and remedy.
 
     Examples
     --------

@@ -25,10 +25,11 @@ __all__ = [
 
 _HEADER = ("parameter", "value", "± 95 %", "unit", "verdict", "published")
 _ALIGNED_RIGHT = (1, 2, 5)
+"""Places of the columns of numbers in `_HEADER`."""
 
 
 def plain(value: object) -> Any:
-    """Return a value as JSON knows it; a number that is not finite becomes None."""
+    """Return a value in types of JSON; a number that is not finite becomes None."""
     if isinstance(value, Mapping):
         return {str(name): plain(each) for name, each in value.items()}
     if isinstance(value, Enum):
@@ -57,7 +58,7 @@ def parameter_mapping(parameter: Parameter) -> dict[str, Any]:
 
 
 def two_digits(value: float) -> str:
-    """Write a size with two digits, or all of its whole ones, and without an exponent."""
+    """Write a size with two significant digits, from 100 on as a whole number; no exponent."""
     return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
 
 
@@ -128,7 +129,7 @@ def html_of(shown: Mapping[str, Any]) -> str:
 
 
 def frame_of(shown: Mapping[str, Any]) -> "pd.DataFrame":
-    """Return the parameters as a pandas frame, a row each; columns as in `parameter_mapping`."""
+    """Return a pandas frame with a row for each parameter, columns as in `parameter_mapping`."""
     import pandas as pd  # noqa: PLC0415 - only where it is installed
 
     rows = {name: dict(each) for name, each in shown["parameters"].items()}

@@ -1,4 +1,4 @@
-"""The one result: what every method of identification returns."""
+"""The result: what every method of identification returns."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -49,13 +49,13 @@ class StemComparison(NamedTuple):
 
     @property
     def residual(self) -> NDArray[np.float64]:
-        """Simulated less measured position, m, shape (m,)."""
+        """Simulated minus measured position, m, shape (m,)."""
         return self.simulated - self.measured
 
     def autocorrelation(self, lags: int) -> NDArray[np.float64]:
         """Return the autocorrelation of the residual at lags of 0 … `lags` − 1 samples.
 
-        It is 1 at lag 0, and 0 everywhere for a residual that is nothing at all.
+        It is 1 at lag 0; a residual of zeros gives 0 at every lag.
         """
         residual = self.residual - self.residual.mean()
         size = 2 * residual.size
@@ -74,26 +74,26 @@ class Result:
     method : str
         Name of the method, as in `METHODS`.
     recording : Recording
-        What was identified.
+        The record that was identified.
     valve : Valve
-        Geometry that it was identified with.
+        Geometry of the valve.
     settings : IdentificationSettings
-        How it was identified.
+        Settings of the identification.
     parameters : mapping of str to Parameter
-        By name: those of `UNITS`, and behind them what the record demanded in addition.
+        By name: those of `UNITS`, then the extensions that the record demanded.
     fit : float
         Share of the stem's movement that the model reproduces, at most 1; of the force where no
         stem is simulated.
     rms : float
-        Root mean square of simulated less measured position, m; nan where no stem is simulated.
+        Root mean square of simulated minus measured position, m; nan where no stem is simulated.
     misfit : Misfit or None
         A test of the model; None in a method without one.
     derivative_window : int
         Derivative window that was used, samples.
     warnings : tuple of str
-        What a reader of the numbers should know, one sentence each.
+        Limitations of the numbers, one sentence each.
     evidence : mapping of str to object
-        Further numbers of the method, by name, SI units.
+        Further values of the method, by name, SI units.
     findings : tuple of str
         The evidence in words, one sentence each.
     model : KarnoppParameters or None
@@ -149,7 +149,7 @@ class Result:
         return {name: parameter.value for name, parameter in self.parameters.items()}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as a mapping of plain values, SI units; what is not finite is None.
+        """Return the result as a mapping of plain values, SI units; None replaces nan and infinity.
 
         Every other rendering (JSON, rows, diagnostics, tables) is derived from this mapping. Its
         keys are stable: ``method``, ``parameters.<name>`` with ``value``, ``standard_error``,
@@ -188,7 +188,7 @@ class Result:
         return rendering.html_of(self.to_dict())
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return the parameters as a pandas frame, a row each.
+        """Return the parameters as a pandas frame, one row per parameter.
 
         Raises
         ------

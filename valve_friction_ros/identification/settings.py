@@ -48,13 +48,13 @@ class IdentificationSettings:
     resolution : int
         Divisor Z of the top speed in (8), above `steps`.
     fixed : mapping of str to float
-        Parameters known beforehand, by name (see `FIXABLE`); they leave the regression. Fixing
+        Known parameters by name (see `FIXABLE`); the regression leaves them out. Fixing
         ``limit_velocity`` sets the threshold δv instead of choosing it from the sweep.
     position_bias : float, optional
         Bias x̄ of (10), m. Given, the regression takes the paper's form of four columns, and the
         preload is F_0 = k·x̄; by default the preload is a regressor of its own.
     assumed_mass : float
-        Mass, kg, above zero, that is assumed where the record does not tell it.
+        Mass, kg, above zero; used where the record does not determine the mass.
 
     Raises
     ------
@@ -107,7 +107,7 @@ class IdentificationSettings:
         return PUBLISHED_WINDOW if self.derivative_window is None else self.derivative_window
 
     def __reduce__(self) -> tuple[type["IdentificationSettings"], tuple[Any, ...]]:
-        """Tell pickle how to build it again in another process; it cannot copy `fixed`."""
+        """Let pickle rebuild the settings in another process; it cannot copy `fixed`."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return type(self), (*(values | {"fixed": dict(self.fixed)}).values(),)
 

@@ -1,4 +1,4 @@
-"""Names and units of the parameters, once for all methods and all renderings."""
+"""Names and units of the parameters, for all methods and all renderings."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -6,7 +6,7 @@ from types import MappingProxyType
 __all__ = ["CLOCK_OFFSET", "PARAMETER_UNITS", "UNITS"]
 
 CLOCK_OFFSET = "clock_offset"
-"""Time by which the stamps of the stem lag behind those of the pressure, s."""
+"""Parameter name. Its value, s, is positive where the stem's stamps are late."""
 
 UNITS: Mapping[str, str] = MappingProxyType(
     {
@@ -29,4 +29,4 @@ PARAMETER_UNITS: Mapping[str, str] = MappingProxyType(
         CLOCK_OFFSET: "s",
     }
 )
-"""Unit of every parameter that a result can hold; those after `UNITS` only on demand."""
+"""Unit of every parameter that a result can hold; those after `UNITS` only if demanded."""

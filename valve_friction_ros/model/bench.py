@@ -1,4 +1,4 @@
-"""The paper's bench valve, in the three states of packing that every check uses.
+"""The paper's bench valve with the three packings that every check uses.
 
 Sources: section 4 and Table 1 ("model 1") for the valve and its Teflon packing, lightly and
 strongly tightened; the bias of 1.13 mm follows (16). The graphite set shows a slip jump.
@@ -29,7 +29,10 @@ BENCH_VALVE = Valve(
 """Fisher ET globe valve; force counts from the bottom of the pressure range."""
 
 _POSITION_BIAS = 1.13e-3
+"""x̄, m: the mean of (16)."""
+
 _SPRING_CONSTANT = 2.05e5
+"""k of Table 1, model 1, N/m."""
 
 LOW_FRICTION = KarnoppParameters(
     mass=1.542,
@@ -39,7 +42,7 @@ LOW_FRICTION = KarnoppParameters(
     spring_constant=_SPRING_CONSTANT,
     spring_preload=_SPRING_CONSTANT * _POSITION_BIAS,
 )
-"""Packing lightly tightened."""
+"""Packing lightly tightened: Table 1, model 1."""
 
 HIGH_FRICTION = KarnoppParameters(
     mass=1.75,
@@ -49,7 +52,7 @@ HIGH_FRICTION = KarnoppParameters(
     spring_constant=_SPRING_CONSTANT,
     spring_preload=_SPRING_CONSTANT * _POSITION_BIAS,
 )
-"""Packing strongly tightened."""
+"""Packing strongly tightened: Table 1, model 1."""
 
 GRAPHITE_VALVE = Valve(
     diaphragm_area=BENCH_VALVE.diaphragm_area,

@@ -1,4 +1,4 @@
-"""The checks that value types share, with messages written for people."""
+"""Checks of the value types; their messages name the value and its rule."""
 
 import math
 

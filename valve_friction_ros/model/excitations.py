@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 ISA_STEP_SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
-"""Steps of the ISA test as shares of the input range."""
+"""Steps of the ISA test (section 5) as shares of the input range."""
 
 
 def pressure_at(share: float, pressure_range: tuple[float, float] = PRESSURE_RANGE) -> float:
@@ -166,7 +166,7 @@ class IsaSteps(Excitation):
 
 @dataclass(frozen=True, eq=False)
 class SampledPressure(Excitation):
-    """A pressure read from a file: linear between its samples, held after the last.
+    """Sampled pressure: linear between the samples, constant after the last.
 
     Attributes
     ----------
@@ -180,11 +180,11 @@ class SampledPressure(Excitation):
     pressures: NDArray[np.float64] = field(repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be played back, and freeze the arrays."""
+        """Refuse samples that do not make a signal, and freeze the arrays."""
         for name in ("times", "pressures"):
             values = np.array(getattr(self, name), dtype=np.float64)
             if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-                raise ValueError(f"{name} must be a row of finite numbers, at least one")
+                raise ValueError(f"{name} must be a non-empty row of finite numbers")
             values.flags.writeable = False
             object.__setattr__(self, name, values)
         if self.times.shape != self.pressures.shape:

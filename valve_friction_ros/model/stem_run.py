@@ -1,4 +1,4 @@
-"""The stem through all samples: short cuts where nothing happens, located events in between."""
+"""The stem through all samples: short cuts without events, located events between them."""
 
 import math
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from valve_friction_ros.model.stem_motion import (
 __all__ = ["run_stem"]
 
 _FALLEN = 6.0
-"""Speed over the Stribeck velocity above which the fall of the friction is below rounding."""
+"""Speed over the Stribeck velocity above which the remaining fall is below rounding: e⁻³⁶."""
 
 
 class _Slide(NamedTuple):
@@ -66,9 +66,9 @@ def _slide(dynamics: Dynamics, period: float) -> _Slide:
 
 @compiled
 def _has_short_cut(dynamics: Dynamics, period: float) -> bool:
-    """Tell whether the velocity of a sliding stem turns once at the most within a period.
+    """Return whether the velocity of a sliding stem turns at most once within a period.
 
-    Chords of a falling friction damp less than the viscous friction does, so the undamped swing
+    Chords of a falling friction damp less than the viscous friction, so the undamped oscillation
     decides there.
     """
     damping = dynamics.viscous_friction / dynamics.mass
@@ -106,7 +106,7 @@ def _rest_on(
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
 ) -> int:
-    """Fill in the samples through which the stem surely rests; return the last one."""
+    """Fill in the samples through which the stem certainly rests; return the last one."""
     held = upward.spring_constant * position
     highest, lowest = held + upward.static_friction, held - downward.static_friction
     if not lowest <= forces[sample] <= highest:
@@ -127,11 +127,11 @@ def _slide_on(
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
 ) -> int:
-    """Fill in the samples through which the stem surely slides on to `side`; return the last one.
+    """Fill in the samples through which the stem certainly slides to `side`; return the last one.
 
-    It surely does if it is faster than the limit velocity at both ends of a sample, and its speed
-    does not fall below that in between: it has no minimum there, or cannot fall so far. Nor may
-    it pass a travel stop.
+    That is certain if its speed exceeds the limit velocity at both ends of a sample and between
+    them: the speed has no minimum there, or cannot fall so far. The stem must not reach a travel
+    stop.
     """
     lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
     friction, spring, viscous = (
@@ -186,7 +186,7 @@ class _Ladder(NamedTuple):
 
 @compiled
 def _ladder(way: Dynamics, period: float) -> _Ladder:
-    """Set up the chords of one way of motion; none where friction does not fall."""
+    """Set up the chords of one direction; none where friction does not fall."""
     spacing = 0.5 * STRIBECK_STEP * way.stribeck_velocity
     rungs = int(_FALLEN * way.stribeck_velocity / spacing) + 1 if spacing > 0.0 else 0
     chords, slides = np.empty((rungs, 2)), np.empty((rungs, 9))
@@ -222,8 +222,8 @@ def _slide_on_falling(
 ) -> int:
     """Fill in samples as `_slide_on` where friction falls with the speed.
 
-    Each sample takes the chord at its speed, if that rises. The speed must not have a minimum
-    within the sample, nor leave the chord by more than half its width.
+    Each sample takes the chord at its speed, if friction rises on it. The speed must not have a
+    minimum within the sample, and must not leave the chord by more than half its width.
     """
     lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
     position, velocity = positions[sample], velocities[sample]
@@ -267,8 +267,8 @@ def run_stem(
 ) -> None:
     """Step through `forces` (actuator less preload, N) from the state at sample 0.
 
-    Stretches of rest and of sliding take short cuts; all samples between them, those with an
-    event among them, go through `advance_stem`.
+    Rest and sliding over several samples take short cuts; `advance_stem` steps all samples between
+    them, and so every sample with an event.
     """
     up, down = _slide(upward, period), _slide(downward, period)
     steps_up, steps_down = _ladder(upward, period), _ladder(downward, period)

@@ -1,4 +1,4 @@
-"""The valve as it is built: what is known before anything is identified."""
+"""The valve as built: what is known before an identification."""
 
 import math
 from dataclasses import dataclass
@@ -28,8 +28,7 @@ class Valve:
     travel : float
         The stem moves between stops at 0 and at `travel`, m. Infinity: no stops.
     pressure_minimum, pressure_maximum : float
-        Range of the pressure sensor, Pa. A reading outside it is a fault of the sensor,
-        not a pressure.
+        Range of the pressure sensor, Pa. A reading outside is a fault of the sensor.
 
     Raises
     ------
@@ -51,7 +50,7 @@ class Valve:
     pressure_maximum: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be built."""
+        """Refuse impossible values."""
         require_positive("diaphragm_area", self.diaphragm_area)
         require_finite("pressure_reference", self.pressure_reference)
         if self.travel != math.inf:
@@ -71,7 +70,7 @@ class Valve:
         return force / self.diaphragm_area + self.pressure_reference
 
     def sensor_reads(self, pressure: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell for each `pressure` in Pa whether it lies within the range of the sensor."""
+        """Return for each `pressure` in Pa whether it lies within the range of the sensor."""
         return (pressure >= self.pressure_minimum) & (pressure <= self.pressure_maximum)
 
     def share_of_travel(self, distance: float) -> float:

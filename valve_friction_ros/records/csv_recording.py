@@ -37,7 +37,7 @@ _LATEST_TIME = 9e9
 
 @dataclass(frozen=True)
 class CsvColumns:
-    """Headers of the columns of a recording; a machine without a diaphragm gives its force."""
+    """Headers of the columns of a recording; a machine without a diaphragm has a force."""
 
     time: str = "time_s"
     position: str = "position_m"
@@ -75,7 +75,7 @@ class CsvUnits:
 
 @dataclass(frozen=True)
 class CsvFormat:
-    """How a recording is written down."""
+    """Format of a recording: columns, units and layout."""
 
     columns: CsvColumns = field(default_factory=CsvColumns)
     units: CsvUnits = field(default_factory=CsvUnits)
@@ -120,12 +120,12 @@ def _position_unit(path: Path, unit: str, valve: Valve) -> Unit:
 
 
 def drive_column(path: Path, form: CsvFormat) -> str:
-    """Return the header of what drives the stem: the pressure, or else the force.
+    """Return the header of the signal that drives the stem: the pressure, or else the force.
 
     Raises
     ------
     ValueError
-        If the file cannot be read or has neither.
+        If the file cannot be read or has neither pressure nor force.
     """
     header = read_header(path, form.layout)
     columns = form.columns
@@ -136,7 +136,7 @@ def drive_column(path: Path, form: CsvFormat) -> str:
 
 
 def _pressure(table: CsvTable, drive: str, valve: Valve, form: CsvFormat) -> NDArray[np.float64]:
-    """Return the pressure in Pa; refuse what the sensor cannot read."""
+    """Return the pressure in Pa; refuse values outside the sensor's range."""
     driven_by_force = drive != form.columns.pressure
     unit = form.units.force if driven_by_force else form.units.pressure
     values = table.columns[drive]
@@ -151,7 +151,7 @@ def _pressure(table: CsvTable, drive: str, valve: Valve, form: CsvFormat) -> NDA
         raise ValueError(
             f"{table.place(sample, drive)}: {values[sample]:g} {unit} is outside the sensor's "
             f"range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use a stretch "
-            "of the record without it, name its unit, or mend the range"
+            "of the record without it, name its unit, or correct the range"
         )
     return pressure
 
@@ -164,20 +164,20 @@ def read_recording(
 ) -> Recording:
     """Read a recording of pressure, or force, and stem position.
 
-    Its samples pass through the same resampling as those of the topics, stamps rounded to
-    nanoseconds, so that a record gives the same numbers here as there.
+    Its samples pass through the same resampling as the samples of topics, with stamps in whole
+    nanoseconds, so that a recording gives the same numbers from a file and from topics.
 
     Parameters
     ----------
     path : Path
-        The file, gzipped or not; told by its first bytes.
+        The file, gzipped or not; its first bytes decide.
     valve : Valve
-        Turns force into pressure where the file holds a force; tells the sensor's range, and
-        the travel that percents are a share of.
+        Converts force into pressure where the file holds a force; gives the sensor's range, and
+        the travel for positions in percent.
     form : CsvFormat, optional
-        Columns, units and layout. A file with both pressure and force is read by its pressure.
+        Columns, units and layout. Pressure is read from a file with both pressure and force.
     stretch : Stretch, optional
-        Which part to read; what is wrong in the rest does not matter.
+        The part to read; errors outside it do not matter.
 
     Returns
     -------
@@ -187,7 +187,7 @@ def read_recording(
     Raises
     ------
     ValueError
-        If the file cannot be read or holds something impossible: the file, row and cause.
+        If the file cannot be read or holds an impossible value: file, row, cause and remedy.
     RefusalError
         If there is a gap, or only one sample.
     """
@@ -197,7 +197,7 @@ def read_recording(
     whole = read_table(path, (columns.time, columns.position, drive), form.layout)
     table = whole.where(stretch.select(whole.columns[columns.time] * NANOSECONDS[units.time]))
     if table.samples.size == 0:
-        raise RefusalError(f"{path}: there are no rows in the stretch that is asked for")
+        raise RefusalError(f"{path}: the chosen stretch holds no rows: choose another begin or end")
     table.require_finite()
     stamps = _stamps(table, columns.time, units.time)
     pressure = _pressure(table, drive, valve, form)

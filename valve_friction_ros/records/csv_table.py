@@ -17,27 +17,27 @@ from numpy.typing import NDArray
 __all__ = ["CsvLayout", "CsvTable", "no_column", "read_columns", "read_header", "read_table"]
 
 _FIRST_ROW = 2
-"""Number of the first row of data, as a spreadsheet counts."""
+"""Number of the first row of data: a spreadsheet counts from 1, and the header is row 1."""
 
 _LONGEST_QUOTE = 40
-"""Characters of a bad entry that a message repeats."""
+"""Characters of a bad entry in a message. Chosen: the message stays on one line."""
 
 
 @dataclass(frozen=True)
 class CsvLayout:
-    """What separates the entries of a row, and the decimals within them.
+    """Delimiter of the entries of a row, and decimal mark within them.
 
     Raises
     ------
     ValueError
-        If one of them is not a single character that can do its work.
+        If one of them is not a single usable character.
     """
 
     delimiter: str = ","
     decimal: str = "."
 
     def __post_init__(self) -> None:
-        """Refuse what csv and numpy could not read."""
+        """Refuse characters that csv and numpy cannot use."""
         if len(self.delimiter) != 1 or self.delimiter in '"\r\n+-.' or self.delimiter.isalnum():
             raise ValueError(
                 f"the delimiter must be one character such as ',', ';' or a tab, got "
@@ -60,7 +60,7 @@ def _is_gzipped(path: Path) -> bool:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[IO[str]]:
-    """Open a file, gzipped or not; what cannot be read to its end raises a ValueError."""
+    """Open a file, gzipped or not; raise ValueError if it cannot be read to its end."""
     try:
         if _is_gzipped(path):
             with gzip.open(path, "rt", encoding="utf-8-sig", newline="") as stream:
@@ -79,7 +79,7 @@ def read_header(path: Path, layout: CsvLayout = CsvLayout()) -> list[str]:
     Raises
     ------
     ValueError
-        If the file cannot be read or has none.
+        If the file cannot be read or has no headers.
     """
     with _opened(path) as stream:
         header = next(csv.reader(stream, delimiter=layout.delimiter), None)
@@ -91,7 +91,7 @@ def read_header(path: Path, layout: CsvLayout = CsvLayout()) -> list[str]:
 
 
 def _is_number(text: str) -> bool:
-    """Tell whether numpy reads a number; Python would take underscores and foreign digits too."""
+    """Return whether numpy reads a number; Python also accepts underscores and other digits."""
     try:
         float(text)
     except ValueError:
@@ -104,14 +104,14 @@ def _shortened(text: str) -> str:
 
 
 def _rows(stream: IO[str], layout: CsvLayout) -> Iterator[tuple[int, list[str]]]:
-    """Go through the rows under the header that are not blank, with their numbers."""
+    """Yield the rows under the header that are not blank, with their numbers."""
     rows = csv.reader(stream, delimiter=layout.delimiter)
     next(rows)
     return ((number, row) for number, row in enumerate(rows, start=_FIRST_ROW) if row)
 
 
 def _first_bad_entry(path: Path, wanted: Mapping[str, int], layout: CsvLayout) -> str:
-    """Find the entry that is no number, for the message of an error already met."""
+    """Find the entry that is not a number, for the message of an error."""
     with _opened(path) as stream:
         for number, row in _rows(stream, layout):
             for name, index in wanted.items():
@@ -120,21 +120,21 @@ def _first_bad_entry(path: Path, wanted: Mapping[str, int], layout: CsvLayout) -
                 if not _is_number(layout.number(row[index])):
                     return (
                         f"row {number}, column {name!r}: {_shortened(row[index])!r} is not a "
-                        "number: mend it or delete the row"
+                        "number: correct it or delete the row"
                     )
     return "the table cannot be read"
 
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Columns of numbers, and where each of them stands in its file.
+    """Columns of numbers, and their places in the file.
 
     Attributes
     ----------
     path : Path
         The file.
     layout : CsvLayout
-        How it is written.
+        Delimiter and decimal mark.
     columns : mapping of str to ndarray of float, shape (n,) each
         The columns by name.
     samples : ndarray of int, shape (n,)
@@ -152,14 +152,14 @@ class CsvTable:
         return CsvTable(self.path, self.layout, columns, self.samples[wanted])
 
     def place(self, sample: int, name: str) -> str:
-        """Tell file, row (as a spreadsheet counts) and column of an entry."""
+        """Return file, row (as a spreadsheet counts) and column of an entry."""
         with _opened(self.path) as stream:
             rows = _rows(stream, self.layout)
             row, _ = next(itertools.islice(rows, int(self.samples[sample]), None))
         return f"{self.path}: row {row}, column {name!r}"
 
     def require_finite(self) -> None:
-        """Raise ValueError, with its place, for the first entry that is not finite."""
+        """Raise ValueError, with file, row and column, for the first entry that is not finite."""
         for name, values in self.columns.items():
             finite = np.isfinite(values)
             if not finite.all():
@@ -171,7 +171,7 @@ class CsvTable:
 
 
 def no_column(path: Path, wanted: str, header: Sequence[str]) -> str:
-    """Word the refusal of a file without a column."""
+    """Return the message for a file without a column."""
     if len(header) == 1:
         only = _shortened(header[0])
         return f"{path}: no column {wanted}, only {only!r}: name the delimiter of the file"
@@ -188,7 +188,7 @@ def read_table(
     Parameters
     ----------
     path : Path
-        The file, gzipped or not; told by its first bytes.
+        The file, gzipped or not; its first bytes decide.
     names : sequence of str
         Headers of the wanted columns; others are ignored.
     layout : CsvLayout
@@ -204,7 +204,7 @@ def read_table(
         if name not in header:
             raise ValueError(no_column(path, repr(name), header))
         if header.count(name) > 1:
-            raise ValueError(f"{path}: column {name!r} is there twice: rename one of them")
+            raise ValueError(f"{path}: two columns are named {name!r}: rename one of them")
     wanted = {name: header.index(name) for name in names}
     try:
         with _opened(path) as stream, warnings.catch_warnings():
@@ -221,7 +221,7 @@ def read_table(
     except (ValueError, IndexError):
         raise ValueError(f"{path}: {_first_bad_entry(path, wanted, layout)}") from None
     if table.size == 0:
-        raise ValueError(f"{path}: there are no rows under the header")
+        raise ValueError(f"{path}: the file has no rows under its header")
     columns = {name: table[:, index] for index, name in enumerate(wanted)}
     return CsvTable(path, layout, columns, np.arange(table.shape[0]))
 

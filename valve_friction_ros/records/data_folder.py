@@ -1,4 +1,4 @@
-"""Where nodes keep files when nobody says otherwise."""
+"""Default folder of the files of nodes."""
 
 import os
 from pathlib import Path
@@ -13,5 +13,5 @@ def data_folder() -> Path:
 
 
 def history_file() -> Path:
-    """Return the file that the history is kept in."""
+    """Return the default file of the history."""
     return data_folder() / "history.sqlite"

@@ -1,4 +1,4 @@
-"""What a recorded file says about one valve."""
+"""The recording of one valve from a file."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +11,7 @@ __all__ = ["RecordedValve"]
 
 @dataclass(frozen=True, eq=False)
 class RecordedValve:
-    """The recording of one valve, or why there is none.
+    """The recording of one valve, or the reason that it has none.
 
     Attributes
     ----------
@@ -20,9 +20,9 @@ class RecordedValve:
     name : str
         Namespace of the valve in a bag; empty for a file that does not name its valve.
     outcome : Recording or RefusalError
-        The recording, or what was wrong with it.
+        The recording, or its refusal.
     notes : tuple of str
-        What a reader of the result should know: what was left out, and why.
+        Limitations of the recording: what was left out, and why.
     """
 
     path: Path
@@ -32,7 +32,7 @@ class RecordedValve:
 
     @property
     def label(self) -> str:
-        """What to call it in a message."""
+        """Name in a message."""
         return f"{self.path}, {self.name}" if self.name else f"{self.path}"
 
     def recording(self) -> Recording:
@@ -41,12 +41,12 @@ class RecordedValve:
         Raises
         ------
         RefusalError
-            If there is none: file, valve, cause and notes.
+            If the valve has no recording: file, valve, cause and notes.
         """
         if isinstance(self.outcome, RefusalError):
             raise self.refused(self.outcome)
         return self.outcome
 
     def refused(self, cause: RefusalError) -> RefusalError:
-        """Return a refusal with file and valve, and the notes, which may hold the reason for it."""
+        """Return a refusal with file, valve and notes; the notes may hold its reason."""
         return RefusalError("; ".join((f"{self.label}: {cause}", *self.notes)))

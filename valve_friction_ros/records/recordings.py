@@ -1,4 +1,4 @@
-"""Recorded files of any kind: one function reads them all."""
+"""Recorded files of any kind, read by one function."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,16 +16,16 @@ __all__ = ["ReadingOptions", "holds_force", "read_recordings"]
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """What a file does not say itself.
+    """Options for what a file does not state itself.
 
     Attributes
     ----------
     csv : CsvFormat
-        How a CSV file is written.
+        Format of a CSV file.
     topics : TopicChoice
-        What to read from a bag.
+        The topics to read from a bag.
     stretch : Stretch
-        Which part of the time to read.
+        The part of the time to read.
     """
 
     csv: CsvFormat = field(default_factory=CsvFormat)
@@ -34,12 +34,12 @@ class ReadingOptions:
 
 
 def holds_force(path: Path, options: ReadingOptions) -> bool:
-    """Tell whether a file holds the force of a machine without a diaphragm, and no pressure.
+    """Return whether a file holds the force of a machine without a diaphragm, and no pressure.
 
     Raises
     ------
     ValueError
-        If it is a CSV file that cannot be read, or has neither.
+        If it is a CSV file that cannot be read, or has neither pressure nor force.
     """
     return not is_bag(path) and drive_column(path, options.csv) != options.csv.columns.pressure
 
@@ -47,7 +47,7 @@ def holds_force(path: Path, options: ReadingOptions) -> bool:
 def read_recordings(
     path: Path, valve: Valve, options: ReadingOptions | None = None
 ) -> tuple[RecordedValve, ...]:
-    """Read the recordings of all valves in a CSV file or a bag, told by its content.
+    """Read the recordings of all valves in a CSV file or a bag; its content decides which it is.
 
     Parameters
     ----------
@@ -61,12 +61,13 @@ def read_recordings(
     Returns
     -------
     tuple of RecordedValve
-        One of a CSV file; of a bag one for each valve, with what was wrong where something was.
+        One from a CSV file; from a bag one for each valve, with a refusal where its signals are
+        bad.
 
     Raises
     ------
     ValueError, RefusalError
-        If nothing can be read: one line that names the file, the cause and what to do.
+        If nothing can be read: one line with file, cause and remedy.
     """
     options = options or ReadingOptions()
     if is_bag(path):

@@ -1,4 +1,4 @@
-"""Which part of a recorded file is wanted."""
+"""The part of a recorded file to read."""
 
 import math
 from dataclasses import dataclass
@@ -12,26 +12,26 @@ __all__ = ["Stretch"]
 
 
 def _nanoseconds(seconds: float) -> float:
-    """Convert seconds to whole nanoseconds, as stamps are; infinity stays what it is."""
+    """Convert seconds to whole nanoseconds, the unit of stamps; infinity stays infinity."""
     return nanoseconds(seconds) if math.isfinite(seconds) else seconds
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a recording; by default the whole.
+    """A part of a recording; by default the whole recording.
 
     Attributes
     ----------
     begin, end : float
         Times since the first sample of the file, s; both belong to the stretch.
     last : float
-        Only the last seconds of it, s: a recording that ends when a node identified, read with
-        the node's `window`, holds what the node's buffer held.
+        Length of its end, s. A recording that ends when a node identified, read with the
+        node's `window`, equals the node's buffer.
 
     Raises
     ------
     ValueError
-        If a time is not a number, or nothing lies between them.
+        If a time is not a number, or the stretch is empty.
     """
 
     begin: float = -math.inf
@@ -39,18 +39,18 @@ class Stretch:
     last: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse stretches that hold nothing."""
+        """Refuse empty stretches."""
         if not self.begin < self.end:
             raise ValueError(f"a stretch cannot begin at {self.begin:g} s and end at {self.end:g}")
         if not self.last > 0:
             raise ValueError(f"the last seconds must be above zero, got {self.last:g}")
 
     def contains(self, since_first: int) -> bool:
-        """Tell whether a time after the first sample, ns, lies between begin and end."""
+        """Return whether a time after the first sample, ns, lies between begin and end."""
         return _nanoseconds(self.begin) <= since_first <= _nanoseconds(self.end)
 
     def select(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Choose from times in ns, shape (n,); one that is not a number stays, to be refused.
+        """Choose from times in ns, shape (n,); a time that is not a number stays, to be refused.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Units that people's files are written in, and their sizes in SI units."""
+"""Units of recorded files, and their sizes in SI units."""
 
 from types import MappingProxyType
 from typing import NamedTuple
@@ -17,7 +17,7 @@ __all__ = [
 
 
 class Unit(NamedTuple):
-    """Size of a unit as a ratio, so that decimals are converted without a rounding of their own.
+    """Size of a unit as a ratio, so that decimals are converted with one rounding only.
 
     3.7 mm is 3.7/1000 m to the last bit, which 3.7·0.001 is not.
 
@@ -37,6 +37,7 @@ class Unit(NamedTuple):
 
 _POUND_FORCE = 4.4482216152605
 _KILOGRAM_FORCE = 9.80665
+"""N: exact by definition, the pound of 0.45359237 kg and the standard gravity of 9.80665 m/s²."""
 
 PRESSURE_UNITS = MappingProxyType(
     {
@@ -62,7 +63,7 @@ POSITION_UNITS = MappingProxyType(
 )
 
 PERCENT = "percent"
-"""Unit of a position that is told as a share of the travel, whose size the valve knows."""
+"""Unit of a position as a share of the travel; the valve gives its size."""
 
 FORCE_UNITS = MappingProxyType(
     {
@@ -76,4 +77,4 @@ FORCE_UNITS = MappingProxyType(
 NANOSECONDS = MappingProxyType(
     {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000, "min": 60_000_000_000}
 )
-"""Units of time in nanoseconds, which all stamps are counted in."""
+"""Units of time in nanoseconds, the unit of all stamps."""

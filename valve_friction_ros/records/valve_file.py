@@ -19,14 +19,14 @@ _GEOMETRY = tuple(field.name for field in fields(Valve))
 
 @dataclass(frozen=True)
 class ValveFile:
-    """A valve, and the parameters that its file names besides the geometry.
+    """A valve, and the nominal parameters in its file.
 
     Attributes
     ----------
     valve : Valve
         Geometry and sensor range.
     known : mapping of str to float
-        Nominal parameters by name: the mass is assumed where a record does not tell it, and
+        Nominal parameters by name: the mass is assumed where a record does not determine it, and
         each can be fixed by its name alone.
     """
 
@@ -35,10 +35,10 @@ class ValveFile:
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Refuses a key that stands twice, of which YAML would silently take the last."""
+    """Refuses a repeated key; YAML would silently take the last value."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Build a mapping of keys that differ."""
+        """Build a mapping; refuse a repeated key."""
         seen = set()
         keys = (key for key, _ in node.value if isinstance(key, yaml.ScalarNode))
         for key in keys:
@@ -64,7 +64,7 @@ def _numbers(path: Path) -> dict[str, Any]:
 
 
 def _number(key: str, value: object) -> float:
-    """Return a value as a float; YAML takes 2e5 for text and only 2.0e+5 for a number."""
+    """Return a value as a float; YAML reads 2e5 as text and 2.0e+5 as a number."""
     if not isinstance(value, bool):
         try:
             return float(value)  # type: ignore[arg-type]
@@ -74,7 +74,7 @@ def _number(key: str, value: object) -> float:
 
 
 def _require_possible(known: Mapping[str, float]) -> None:
-    """Apply the rules of the model to the nominal parameters; what is not given is harmless."""
+    """Apply the rules of the model to the nominal parameters; missing values are neutral."""
     harmless = {
         "mass": 1.0,
         "viscous_friction": 0.0,
@@ -86,7 +86,7 @@ def _require_possible(known: Mapping[str, float]) -> None:
 
 
 def read_valve_file(path: Path) -> ValveFile:
-    r"""Read a valve from YAML: ``diaphragm_area`` and what else is known, in SI units.
+    r"""Read a valve from YAML: ``diaphragm_area`` and further known values, in SI units.
 
     Raises
     ------
@@ -117,7 +117,9 @@ def read_valve_file(path: Path) -> ValveFile:
             hint = f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(names)}"
             raise ValueError(f"{path}: unknown key {key!r}{hint}")
     if "diaphragm_area" not in content:
-        raise ValueError(f"{path}: diaphragm_area is missing")
+        raise ValueError(
+            f"{path}: diaphragm_area is missing: add a line such as 'diaphragm_area: 0.0445'"
+        )
     try:
         numbers = {name: _number(name, value) for name, value in content.items()}
         known = {name: value for name, value in numbers.items() if name in FIXABLE}

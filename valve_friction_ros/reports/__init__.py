@@ -1,5 +1,6 @@
 """Reports for people: pages that stand in one file; no ROS."""
 
+from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
 from valve_friction_ros.reports.identification_report import identification_report
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import (
@@ -13,7 +14,6 @@ from valve_friction_ros.reports.page import (
     render,
 )
 from valve_friction_ros.reports.report_file import require_report_file, write_report
-from valve_friction_ros.reports.verdict_sentence import verdict_sentence
 
 __all__ = [
     "Block",
@@ -24,9 +24,9 @@ __all__ = [
     "Picture",
     "Section",
     "Table",
+    "diagnosis_sentence",
     "identification_report",
     "render",
     "require_report_file",
-    "verdict_sentence",
     "write_report",
 ]

@@ -1,4 +1,4 @@
-"""The report of one identification: a page from the verdict down to the settings."""
+"""The report of one identification: a page from the diagnosis to the settings."""
 
 import math
 from collections.abc import Iterator
@@ -14,6 +14,7 @@ from valve_friction_ros.figures.report_figures import (
 )
 from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import Estimate, StemComparison
+from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
 from valve_friction_ros.reports.identification_tables import (
     friction_table,
     parameter_table,
@@ -22,38 +23,37 @@ from valve_friction_ros.reports.identification_tables import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
-from valve_friction_ros.reports.verdict_sentence import verdict_sentence
 
 __all__ = ["identification_report"]
 
 _VERDICTS = (
-    "Identified: the interval reaches no further than 5 % of the value, and nothing else speaks "
-    "against it. Weak: it is wider, or there is another reason, which is told. Not identifiable: "
-    "the record holds nothing of it, and no number is shown. Fixed: it was given."
+    "Identified: half the interval is at most 5 % of the value, and no doubt is known. Weak: the "
+    "interval is wider, or the reason stands beside the verdict. Not identifiable: the record does "
+    "not determine the parameter, and no number is shown. Fixed: the value was given."
 )
 _FRICTION = "Friction against its baseline"
 _NO_STEM = (
-    "Without a spring, or without an identifiable one, nothing calls the stem back, so that it "
-    "cannot be simulated: there is no comparison, and no residual."
+    "The spring is zero or not identifiable, so the stem cannot be simulated: no force returns it. "
+    "This report therefore holds neither a comparison nor a residual."
 )
 
 
 def identification_report(record: IdentifiedRecord) -> Page:
-    """Return the page that tells what was identified from a record, and why.
+    """Return the page on an identified record: its parameters and the evidence for them.
 
     Parameters
     ----------
     record : IdentifiedRecord
-        Record, result, and what to judge it by.
+        Record, result, baseline and limits.
 
     Returns
     -------
     Page
-        The verdict in one sentence, then parameters, friction against its baseline, the record,
+        The diagnosis in one sentence, then parameters, friction against its baseline, the record,
         the valve signature, the sweep, the measured against the simulated position, the residual,
-        notes, settings and versions. What a method does not have is left out.
+        notes, settings and versions. Parts that a method does not have are left out.
     """
-    return Page(f"Friction of {record.name}", verdict_sentence(record), tuple(_sections(record)))
+    return Page(f"Friction of {record.name}", diagnosis_sentence(record), tuple(_sections(record)))
 
 
 def _sections(record: IdentifiedRecord) -> Iterator[Section]:
@@ -80,8 +80,8 @@ def _friction(record: IdentifiedRecord) -> Section:
     table = friction_table(record)
     if record.baseline is None:
         none = Paragraph(
-            "There is no baseline, so that nothing can be said of excess friction. It is the "
-            "Coulomb friction of this valve when it was healthy."
+            "Excess friction is unknown, because this valve has no baseline. The baseline is the "
+            "Coulomb friction of the healthy valve."
         )
         return Section(_FRICTION, (none, table))
     return Section(_FRICTION, (table,))
@@ -103,8 +103,8 @@ def _signature(record: IdentifiedRecord) -> Section:
     if result.signature is not None:
         share = percentage(result.signature.dead_zone_share)
         caption += (
-            f" P₁ and P₂ are where the stem breaks away upwards and downwards, the dashed lines "
-            f"its sliding. The dead zone, the loop's width, is {share} of the pressure's span."
+            f" The stem breaks away upwards at P₁ and downwards at P₂; on the dashed lines it "
+            f"slides. The dead zone, the loop's width, is {share} of the pressure's span."
         )
     picture = Picture(
         signature_loop_figure(result, record.drive),
@@ -138,10 +138,10 @@ def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section
     of_travel = f", {percentage(share)} of the travel" if math.isfinite(share) else ""
     picture = Picture(
         comparison_figure(comparison),
-        f"The measured stem, and dotted upon it the stem of the identified model under the same "
+        f"The measured stem and, dotted, the stem of the identified model under the same "
         f"{record.drive.label.partition(' [')[0]}. Fit {100 * result.fit:.2f} %, rms "
         f"{result.rms * 1e6:.3g} µm{of_travel}.",
-        "Measured and simulated stem position over the time, one upon the other.",
+        "Measured and simulated stem position over the time, in one panel.",
     )
     return Section("Measured and simulated position", (picture,))
 
@@ -149,9 +149,9 @@ def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section
 def _residual(record: IdentifiedRecord, comparison: StemComparison) -> Section:
     misfit = record.result.misfit
     caption = (
-        "What the model does not explain: simulated less measured position over the time, its "
-        "histogram, and its autocorrelation. Noise alone would keep the latter within the grey "
-        "band beyond lag 0."
+        "The residual, simulated minus measured position, over the time, its histogram, and its "
+        "autocorrelation. For noise alone the autocorrelation stays within the grey band beyond "
+        "lag 0."
     )
     if misfit is not None:
         caption += (

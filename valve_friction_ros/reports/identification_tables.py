@@ -36,14 +36,14 @@ _WORDS = {
 
 _NOTHING = "–"
 _WHOLE = 1e4
-"""Numbers from here on are written as whole ones."""
+"""Size from which numbers are written without decimals: five digits then remain."""
 
 _DATED = (1e9, 1e11)
-"""Start times between these, s, are taken for a clock that counts from 1970."""
+"""Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
 
 
 def _number(value: float) -> str:
-    """Write five digits or more, without an exponent where one can do without."""
+    """Write five digits or more, without an exponent if possible."""
     if not math.isfinite(value):
         return _NOTHING
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
@@ -55,12 +55,12 @@ def _interval(parameter: Parameter) -> str:
     return " to ".join(map(_number, parameter.interval))
 
 
-def _judged(parameter: Parameter) -> str:
+def _verdict(parameter: Parameter) -> str:
     return ": ".join(filter(None, (parameter.verdict.value, parameter.reason)))
 
 
 def parameter_table(record: IdentifiedRecord) -> Table:
-    """Return each parameter with interval and verdict, and its published value if there is one."""
+    """Return each parameter with interval and verdict, and its published value if known."""
     parameters = record.result.parameters
     columns = [
         Column("parameter"),
@@ -73,7 +73,7 @@ def parameter_table(record: IdentifiedRecord) -> Table:
             f"{_WORDS.get(name, name.replace('_', ' '))} [{PARAMETER_UNITS[name]}]",
             _number(one.value),
             _interval(one),
-            _judged(one),
+            _verdict(one),
         )
         for name, one in parameters.items()
     ]
@@ -133,7 +133,7 @@ def friction_table(record: IdentifiedRecord) -> Table:
 
 
 def record_table(record: IdentifiedRecord) -> Table:
-    """Return where the record comes from, and its extent."""
+    """Return the source of the record, and its extent."""
     recording, drive = record.recording, record.drive
     pressure, position = recording.pressure / drive.pascals, recording.position * 1e3
     rows = [("source", record.source)]
@@ -142,7 +142,7 @@ def record_table(record: IdentifiedRecord) -> Table:
         rows.append(("began", f"{began:%Y-%m-%d %H:%M:%S} UTC"))
     rows += [
         ("duration", f"{recording.duration:.4g} s"),
-        ("samples", f"{len(recording)}, one every {recording.sample_period * 1e3:.4g} ms"),
+        ("samples", f"{len(recording)}, sampled every {recording.sample_period * 1e3:.4g} ms"),
         (drive.label, f"{pressure.min():.5g} to {pressure.max():.5g}"),
         ("stem [mm]", f"{position.min():.4g} to {position.max():.4g}"),
     ]
@@ -150,7 +150,7 @@ def record_table(record: IdentifiedRecord) -> Table:
 
 
 def settings_table(record: IdentifiedRecord) -> Table:
-    """Return with what settings, valve and software the record was identified."""
+    """Return settings, valve and software of the identification."""
     result, valve = record.result, record.valve
     settings = result.settings
     fixed = ", ".join(f"{name} = {value:g}" for name, value in settings.fixed.items())
@@ -175,7 +175,7 @@ def settings_table(record: IdentifiedRecord) -> Table:
     rows += [
         ("given parameters", fixed or "none"),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
-        ("mass where the record does not tell it", f"{settings.assumed_mass:g} kg"),
+        ("mass where the record does not determine it", f"{settings.assumed_mass:g} kg"),
         ("diaphragm area S_a", f"{valve.diaphragm_area:g} m²"),
         ("pressure reference P_ref", f"{valve.pressure_reference:g} Pa"),
         (
@@ -188,7 +188,7 @@ def settings_table(record: IdentifiedRecord) -> Table:
 
 
 def _versions() -> str:
-    """Name the versions of the software that the numbers depend on."""
+    """Return the versions of the software on which the numbers depend."""
     versions = {
         "valve_friction_ros": valve_friction_ros.__version__,
         "numpy": np.__version__,

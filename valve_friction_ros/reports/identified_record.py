@@ -1,4 +1,4 @@
-"""What a report of an identification is made of."""
+"""The content of a report of an identification."""
 
 from dataclasses import dataclass, field
 
@@ -12,24 +12,24 @@ __all__ = ["IdentifiedRecord"]
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedRecord:
-    """A record, what was identified from it, and what to judge it by.
+    """A record, its result, and the baseline and limits for its diagnosis.
 
     Attributes
     ----------
     name : str
-        What to call the valve.
+        Name of the valve.
     source : str
-        Where the record comes from.
+        Source of the record.
     result : Result
-        What was identified.
+        Result of the identification.
     baseline : Baseline or None
         Friction of the healthy valve.
     limits : FrictionLimits
-        When friction is out of bounds.
+        Bounds of the friction.
     drive : DriveScale
-        How the pressure is shown.
+        Unit of the pressure.
     notes : tuple of str
-        What a reader of the result should know of the record, one sentence each.
+        Limitations of the record, one sentence each.
     """
 
     name: str
@@ -47,10 +47,10 @@ class IdentifiedRecord:
 
     @property
     def valve(self) -> Valve:
-        """Geometry that it was identified with."""
+        """Geometry of the valve."""
         return self.result.valve
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """The verdict on the friction."""
+        """The diagnosis of the valve."""
         return diagnose(self.result, self.valve, self.baseline, self.limits)

@@ -12,20 +12,22 @@ _ENDINGS = (".html", ".htm")
 
 
 def require_report_file(path: Path) -> None:
-    """Refuse a file that a report cannot be written to, before long work is done for it.
+    """Refuse a file that a report cannot be written to, before the work begins.
 
     Raises
     ------
     ValueError
-        If the ending is not that of a page, or the folder is not there or cannot be written to;
-        the message names it.
+        If the ending is not .html, or the folder does not exist or cannot be written; the
+        message names it.
     """
     if path.suffix.lower() not in _ENDINGS:
-        raise ValueError(f"{path}: a report is a page: give it a name that ends in .html")
+        raise ValueError(f"{path}: a report is an HTML page: give it a name that ends in .html")
     if not path.parent.is_dir():
-        raise ValueError(f"{path}: there is no folder {path.parent}")
+        raise ValueError(
+            f"{path}: the folder {path.parent} does not exist: create it, or name another folder"
+        )
     if path.is_dir():
-        raise ValueError(f"{path}: is a folder: give the report another name")
+        raise ValueError(f"{path}: this is a folder: give the report another name")
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
@@ -35,11 +37,11 @@ def require_report_file(path: Path) -> None:
 
 
 def write_report(page: Page, path: Path) -> None:
-    """Write a page as one HTML file, whole or not at all.
+    """Write a page as one HTML file, at once: a reader never finds part of it.
 
     Raises
     ------
     OSError
-        If it cannot be written; what was at its place stays as it was.
+        If it cannot be written; an existing file stays unchanged.
     """
     write_whole(path, render(page).encode())

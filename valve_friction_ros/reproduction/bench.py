@@ -1,4 +1,4 @@
-"""The benches on which the paper is reproduced, as their configuration files describe them."""
+"""The benches of the reproduction, from their configuration files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -13,7 +13,7 @@ from valve_friction_ros.model.checks import require_finite, require_positive
 __all__ = ["BENCH_NAMES", "Bench", "find_bench_folder", "read_bench"]
 
 BENCH_NAMES = ("low", "high", "graphite")
-"""The benches of ``config/bench_<name>.yaml``: the paper's two, and the packing it announces."""
+"""The benches of ``config/bench_<name>.yaml``: the paper's two packings, and graphite."""
 
 _PARAMETERS = tuple(field.name for field in fields(KarnoppParameters))
 
@@ -25,11 +25,11 @@ class Bench:
     Attributes
     ----------
     name : str
-        What the packing is called: low, high, graphite.
+        Name of the packing: low, high, graphite.
     valve : Valve
         Geometry.
     truth : KarnoppParameters
-        What the identification is to find.
+        True parameters, which the identification should find.
     square : SquareWave
         The identification signal.
     converter_lag : float
@@ -37,7 +37,7 @@ class Bench:
     sample_period : float
         Time between two samples of both sensors, s.
     noise : SensorNoise
-        Of both sensors; the stem feels the pressure without it.
+        Noise of both sensors; the pressure without noise acts on the stem.
     assumed_mass : float
         The nominal mass of the moving parts, kg.
     """
@@ -67,14 +67,14 @@ def find_bench_folder() -> Path:
     Raises
     ------
     ValueError
-        If it is nowhere.
+        If it is not found.
     """
     package = Path(__file__).resolve().parents[1]
     for above in package.parents:
         for folder in (above / "config", above / "share" / package.name / "config"):
             if (folder / f"bench_{BENCH_NAMES[0]}.yaml").is_file():
                 return folder
-    raise ValueError(f"the folder config of {package.name} is not there: give it by --config")
+    raise ValueError(f"the folder config of {package.name} does not exist: name it by --config")
 
 
 def read_bench(folder: Path, name: str) -> Bench:
@@ -83,7 +83,7 @@ def read_bench(folder: Path, name: str) -> Bench:
     Raises
     ------
     ValueError
-        In one line: the file, and what is wrong with it.
+        In one line: the file and the cause.
     """
     path = folder / f"bench_{name}.yaml"
     try:
@@ -127,7 +127,7 @@ class _Section:
         for key in ("/**", node, "ros__parameters"):
             inner = inner.get(key) if isinstance(inner, Mapping) else None
         if not isinstance(inner, Mapping):
-            raise ValueError(f"there are no parameters of {node}")
+            raise ValueError(f"the file has no parameters of {node}: add them")
         self._node, self._values = node, inner
 
     def __contains__(self, name: str) -> bool:
@@ -135,5 +135,5 @@ class _Section:
 
     def __getitem__(self, name: str) -> float:
         if name not in self._values:
-            raise ValueError(f"{self._node} has no {name}")
+            raise ValueError(f"{self._node} has no {name}: add it")
         return require_finite(f"{self._node}.{name}", self._values[name])

@@ -20,7 +20,8 @@ from valve_friction_ros.reproduction.bench import Bench
 __all__ = ["ISA", "SINE", "TRIANGLE", "Experiment", "Experiments", "Plan", "run", "run_all"]
 
 TRIANGLE = TriangleWave(pressure_at(0.1), pressure_at(0.8), 42.0)
-"""Triangle of the signature: as slow as the whole range in 60 s, and clear of the travel stops."""
+"""Triangle of the signature: the slope of the whole range in 60 s a period, without travel
+stops."""
 
 SINE = SineWave()
 """The paper's validation signal: 63.95 to 160.44 kPa in 35.5 s."""
@@ -31,14 +32,14 @@ ISA = IsaSteps()
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is recorded of each excitation.
+    """Length of the record of each excitation.
 
     Attributes
     ----------
     square_periods, triangle_periods, sine_periods : float
         Periods of each wave.
     isa : IsaSteps
-        The step sequence, which is recorded whole.
+        The step sequence, recorded completely.
     """
 
     square_periods: float = 6.0
@@ -49,16 +50,16 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What was commanded, what happened, and what the sensors saw of it.
+    """The command, the true motion, and the measured motion.
 
     Attributes
     ----------
     command : ndarray of float, shape (n,)
-        Pressure that the converter was asked for, Pa.
+        Commanded pressure, Pa.
     clean : Recording
-        Pressure behind the converter and stem as they were.
+        True pressure behind the converter, and true stem position.
     measured : Recording
-        The same through the sensors.
+        The same with the noise of the sensors.
     """
 
     command: NDArray[np.float64] = field(repr=False)
@@ -84,11 +85,11 @@ def run(bench: Bench, excitation: Excitation, duration: float, number: int = 0) 
     bench : Bench
         Valve, converter and sensors.
     excitation : Excitation
-        What the converter is asked for.
+        Commanded pressure.
     duration : float
         Length of the record, s.
     number : int
-        Of the experiment, so that each has noise of its own.
+        Number of the experiment; it selects the noise.
     """
     period = bench.sample_period
     command = excitation.sample(np.arange(round(duration / period) + 1) * period)

@@ -12,8 +12,11 @@ __all__ = ["ForceTerms", "force_terms"]
 
 _ORDER = 3
 _WINDOW = 0.25
+"""Order, and length in s, of the derivative windows. Chosen: short against the 35.5 s of the
+sine."""
+
 _REST = 0.05
-"""Share of the top speed below which the stem counts as resting."""
+"""Share of the top speed below which the stem counts as resting. Chosen: above its noise."""
 
 
 class ForceTerms(NamedTuple):
@@ -24,8 +27,8 @@ class ForceTerms(NamedTuple):
     time : ndarray of float, shape (n,)
         s since the first sample.
     terms : dict of str to ndarray of float, shape (n,) each
-        k·x, F_c·sgn ẋ, F_v·ẋ and m·ẍ, N, in this order; x counts from the bias of (10), and a
-        stem that rests has no sign.
+        k·x, F_c·sgn ẋ, F_v·ẋ and m·ẍ, N, in this order; x counts from the bias of (10), and the
+        sign of a resting stem is 0.
     """
 
     time: NDArray[np.float64]
@@ -35,7 +38,7 @@ class ForceTerms(NamedTuple):
 def force_terms(result: BenchResult) -> ForceTerms:
     """Evaluate the terms for the measured sine with model 1.
 
-    The derivative windows are a quarter of a second long, so that little of the noise is left.
+    The derivative windows are a quarter of a second long, so that the remaining noise is small.
     """
     recording, model = result.experiments.sine.measured, result.identified.published
     window = round(_WINDOW / recording.sample_period) | 1

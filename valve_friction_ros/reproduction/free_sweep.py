@@ -1,4 +1,4 @@
-"""The sweep as the paper regresses it: four parameters, the mass among them, told or not."""
+"""The sweep of the paper: four parameters, with the mass as regressed."""
 
 from typing import NamedTuple
 
@@ -17,14 +17,15 @@ from valve_friction_ros.signals import differentiate
 __all__ = ["FreeSweep", "free_sweep"]
 
 _REGION = 1.05
-"""σ_s up to this multiple of the least belongs to the region that the paper chooses from."""
+"""Multiple of the least σ_s that bounds the region of the paper's choice. Chosen: the paper gives
+no number."""
 
 
 class FreeSweep(NamedTuple):
-    """A sweep of all four parameters of (3), and the step that is chosen.
+    """A sweep of all four parameters of (3), and its chosen step.
 
-    `identify` regresses anew with an assumed mass where the record does not tell it; here the
-    regressed one stays, whatever it is worth.
+    `published_estimate` repeats the regression with an assumed mass where the record does not
+    determine it; here the regressed mass stays.
     """
 
     sweep: Sweep
@@ -50,7 +51,8 @@ class FreeSweep(NamedTuple):
     def region(self) -> tuple[float, float]:
         """From the least to the largest δv, m/s, with a σ_s within 5 % of the least.
 
-        Where samples are fewer than four derivative windows, σ_s means nothing and is left out.
+        Where samples are fewer than four derivative windows, σ_s is left out: too few samples are
+        independent.
         """
         sweep = self.sweep
         usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * self.window)

@@ -50,12 +50,12 @@ _ROUNDING = 5e-6
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What each method makes of the records of one bench.
+    """The result of each method on the records of one bench.
 
     Attributes
     ----------
     position_bias : float
-        x̄ that model 1 was given, m.
+        x̄ in model 1, m.
     published : Estimate
         Model 1, the sweep, from the square wave.
     free : FreeSweep
@@ -65,7 +65,7 @@ class Identified:
     refined : Result
         Model 1 refined by simulation, from the square wave.
     own_preload : Result
-        The same with F_0 a parameter of its own in place of x̄, and the nominal mass given.
+        The same with F_0 as a parameter in place of x̄, and with the nominal mass fixed.
     """
 
     position_bias: float
@@ -98,14 +98,14 @@ class Identified:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A model beside a record, and beside the stem without sensor noise.
+    """A model compared with a record, and with the stem without sensor noise.
 
     Attributes
     ----------
     validation : Validation
-        Against what the sensors saw.
+        Comparison with the measured stem.
     error : ndarray of float, shape (n,)
-        Stem of the model less that of the true valve, both under the true pressure, m.
+        Stem of the model minus the true stem, both under the true pressure, m.
     """
 
     validation: Validation
@@ -124,7 +124,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class BenchResult:
-    """All that the programme yields on one bench.
+    """All results on one bench.
 
     Attributes
     ----------
@@ -241,13 +241,13 @@ def _result(bench: Bench, experiments: Experiments, found: Identified) -> BenchR
 
 
 def progress_steps(benches: Mapping[str, Bench]) -> int:
-    """Count how often `run_programme` tells of its progress."""
+    """Return the number of calls of `progress` in `run_programme`."""
     return 2 * len(benches) + 1 + 2 * len(paper.PACKINGS)
 
 
 @contextmanager
 def _named(bench: str) -> Iterator[None]:
-    """Name the bench whose record is refused."""
+    """Add the name of the bench to a refusal."""
     try:
         yield
     except RefusalError as refusal:
@@ -267,11 +267,11 @@ def run_programme(
     benches : mapping of str to Bench
         By name, the paper's two packings among them; x̄ is shared between these, as in the paper.
     plan : Plan
-        How much is recorded.
+        Length of the records.
     seeds : int
-        Repetitions with other noise, for the scatter.
+        Repetitions with other noise, to estimate the scatter.
     progress : callable
-        Is told what is done next.
+        Called with the name of the next step.
 
     Returns
     -------
@@ -281,7 +281,7 @@ def run_programme(
     Raises
     ------
     RefusalError, ValueError
-        If the noise hides what a method needs; the message says what.
+        If the noise hides what a method needs; the message names it.
     """
     experiments, balances = {}, {}
     for name, bench in benches.items():

@@ -23,7 +23,7 @@ __all__ = ["report_page"]
 
 
 def report_page(programme: Programme, checks: Sequence[Check], pictures: Pictures) -> Page:
-    """Put the report together."""
+    """Return the report."""
     sections = [
         Section(f"{number}. {title}", (check_table([c for c in checks if c.item == number]), *rest))
         for number, (title, rest) in enumerate(_sections(programme, pictures), start=1)
@@ -87,7 +87,7 @@ def _sections(programme: Programme, pictures: Pictures) -> list[tuple[str, tuple
                     f"spread together leave is least ({low.identified.free.threshold:.2g} m/s, "
                     f"{high.identified.free.threshold:.2g} m/s). With high friction the stem does "
                     f"not exceed {high.identified.top_speed:.2g} m/s. R²_s as defined in (18) can "
-                    "exceed 1, since its regression has no constant."
+                    "exceed 1, because its regression has no constant."
                 ),
                 *(pictures[f"figure_{n}_{name}"] for name in paper.PACKINGS for n in (3, 4)),
             ),
@@ -100,11 +100,11 @@ def _sections(programme: Programme, pictures: Pictures) -> list[tuple[str, tuple
                 Paragraph(
                     "Model 1 is the sweep, model 2 the force balance. Refined is model 1 after "
                     "fitting its simulated stem to the measured one; with its own F_0 it takes the "
-                    f"nominal mass of {bench.assumed_mass:g} kg in place of x̄, and what the mass "
-                    "lacks of the true one goes into F_v and F_c, beyond their intervals. A number "
-                    "that the record does not tell is called not identifiable instead of being "
-                    f"shown; a mass that is not told is taken as {bench.assumed_mass:g} kg by the "
-                    "models. F_0 of the truth is k·x̄ with the paper's x̄ of 1.13 mm."
+                    f"nominal mass of {bench.assumed_mass:g} kg in place of x̄, and the error of "
+                    "that mass changes F_v and F_c by more than their intervals. A parameter that "
+                    "the record does not determine is shown as not identifiable, without a number; "
+                    f"for such a mass the models take {bench.assumed_mass:g} kg. F_0 of the truth "
+                    "is k·x̄ with the paper's x̄ of 1.13 mm."
                 ),
             ),
         ),
@@ -114,14 +114,14 @@ def _sections(programme: Programme, pictures: Pictures) -> list[tuple[str, tuple
             "Response metrics of the ISA test",
             (
                 Paragraph(
-                    "Not in the paper: the figures that ANSI/ISA-75.25.01 asks for. Times count "
-                    "from the step of the command, so that they hold the lag of the V/P converter."
+                    "Not in the paper: the figures of ANSI/ISA-75.25.01. Times count from the "
+                    "step of the command, so they include the lag of the V/P converter."
                 ),
                 step_summary_table((low, high, graphite)),
                 *(step_table(one) for one in (low, high)),
             ),
         ),
-        ("Noise, and none", _noise(programme)),
+        ("Effect of noise", _noise(programme)),
         ("Graphite packing, slip jump (section 6)", _graphite(programme, pictures)),
     ]
 
@@ -129,7 +129,7 @@ def _sections(programme: Programme, pictures: Pictures) -> list[tuple[str, tuple
 def _mass_by_bias(programme: Programme) -> Paragraph:
     below, middle, above = programme.mass_by_bias
     return Paragraph(
-        "That the mass of model 1 comes out near the truth at all is luck of the digits: without "
+        "The mass of model 1 is near the truth by chance of the digits: without "
         f"noise, low friction, it is {written(middle.mass, 3)} kg with x̄ = "
         f"{middle.position_bias * 1e3:g} mm, {written(below.mass, 3)} kg with "
         f"{below.position_bias * 1e3:g} mm and {written(above.mass, 3)} kg with "
@@ -141,7 +141,7 @@ def _validation(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
     low, high = (programme.results[name] for name in paper.PACKINGS)
     rivals = programme.scatter.rivals
     wins, runs = sum(one.wins for one in rivals), sum(len(one.model_1) for one in rivals)
-    verdict = (
+    finding = (
         "So the finding holds at this noise."
         if wins == runs
         else "So the finding does not hold at this noise, which biases model 1."
@@ -152,11 +152,11 @@ def _validation(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
     ]
     blocks: list[Block] = [
         Paragraph(
-            f"Model 1 came closer than model 2 in {wins} of {runs} repetitions. What that is worth "
-            f"is another matter: model 2 is off by {written(1e6 * min(ours), 2)} to "
+            f"Model 1 came closer than model 2 in {wins} of {runs} repetitions. The difference "
+            f"is small: model 2 is off by {written(1e6 * min(ours), 2)} to "
             f"{written(1e6 * max(ours), 2)} µm rms here, which no figure shows, while the numbers "
             f"that the paper gives for model 2 are off by {1e6 * min(theirs):.0f} to "
-            f"{1e6 * max(theirs):.0f} µm on the same bench. {verdict} The visible "
+            f"{1e6 * max(theirs):.0f} µm on the same bench. {finding} The visible "
             "deviation comes from the paper's values of model 2, not from the equations (11) to "
             "(19). This bench is model 1 by construction: it cannot say which of the paper's two "
             "models was nearer to the real valve, and it has none of a real valve's faults that "
@@ -184,9 +184,9 @@ def _noise(programme: Programme) -> tuple[Block, ...]:
     low = programme.results["low"]
     return (
         Paragraph(
-            "Table 1 tells one thing about the paper's noise: its two masses, 1.542 and 1.75 kg, "
-            "scatter about the nominal 1.6 kg. Inertia is some 0.02 N of 5 kN, and of everything "
-            "in Table 1 the mass feels noise first. The bench's noise "
+            "Table 1 shows one effect of the paper's noise: its two masses, 1.542 and 1.75 kg, "
+            "scatter about the nominal 1.6 kg. Inertia is some 0.02 N of 5 kN, so noise "
+            "changes the mass more than any other number of Table 1. The bench's noise "
             f"({low.bench.noise.position * 1e6:g} µm, {low.bench.noise.pressure:g} Pa, in "
             "config/bench_*.yaml) can be changed by --position-noise-um and --pressure-noise-pa. "
             "No level scatters the mass of both packings like the paper's. At 28.6 µm, 0.1 % of "
@@ -209,12 +209,12 @@ def _graphite(programme: Programme, pictures: Pictures) -> tuple[Block, ...]:
     return (
         Paragraph(
             "The paper's future work, F_s above F_c. The stem leaves with a jump, and the loop of "
-            "the signature is narrower than the breakaway points lie apart; that is how the force "
-            "balance tells F_c from F_s, while the sweep takes F_s from (9). "
+            "the signature is narrower than the distance of the breakaway points; so the force "
+            "balance separates F_c from F_s, while the sweep takes F_s from (9). "
             f"F_0 is {one.bench.truth.spring_preload:.0f} N, {preloads:.0f} times that of the "
             "Teflon packing, and an error of k in (15) weighs as much more in x̄ of (14), which "
             "model 1 is given; the refinement then explains the rest by a clock offset that the "
-            "bench has not. With F_0 identified instead, and the mass given, it needs none. "
+            "bench does not have. With F_0 identified instead, and the mass fixed, it finds none. "
             f"On the sine model 1 is off by {1e6 * one.sine['model 1'].true_rms:.2g} µm rms, "
             f"model 2 by {1e6 * one.sine['model 2'].true_rms:.2g} µm."
         ),

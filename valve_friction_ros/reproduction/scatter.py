@@ -1,4 +1,4 @@
-"""How sensor noise scatters the estimates and the validation: the programme with other seeds."""
+"""Scatter of the estimates and the validation by sensor noise: the programme with other seeds."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,12 +30,13 @@ NOISE_LEVELS = (
 
 _SCATTERED = ("mass", "viscous_friction", "coulomb_friction", "spring_constant")
 _SEED_STEP = 1000
+"""Distance of the seeds of two repetitions: larger than the number of experiments on a bench."""
 
 
 class Level(NamedTuple):
     """Mean and standard deviation over the seeds of what model 1 estimates, by parameter.
 
-    All as regressed at the chosen δv, the mass too, whether or not the record tells it.
+    All as regressed at the chosen δv; so is the mass, even where the record does not determine it.
     """
 
     packing: str
@@ -88,7 +89,7 @@ def true_rms(bench: Bench, experiment: Experiment, model: KarnoppParameters) -> 
 
 
 def _seeded(bench: Bench, noise: SensorNoise, number: int) -> Bench:
-    """Return the bench with other random numbers, far from those of its own experiments."""
+    """Return the bench with other random numbers than its own experiments."""
     return bench.with_noise(replace(noise, seed=bench.noise.seed + _SEED_STEP * (number + 1)))
 
 

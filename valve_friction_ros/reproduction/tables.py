@@ -24,7 +24,7 @@ __all__ = [
 
 
 def check_table(checks: Sequence[Check], caption: str = "") -> Table:
-    """List checks; those that did not match are marked, and say why."""
+    """List checks; mismatches are marked, with their reasons."""
     rows = tuple(
         (
             "✓" if one.matched else "✗",
@@ -93,7 +93,7 @@ def parameter_table(result: BenchResult) -> Table:
             regressed = found.free.chosen_estimates["mass"]
             model_1 = written(regressed)
             if key in found.published.fixed:
-                model_1 += " (not told)"
+                model_1 += " (not determined)"
         rows.append(
             (
                 f"{symbol} [{unit}]",
@@ -220,7 +220,7 @@ def _step_row(step: StepMetrics) -> tuple[str, ...]:
 
 
 def step_summary_table(results: Sequence[BenchResult]) -> Table:
-    """Show dead band and resolution of the ISA test, and what the friction lets expect."""
+    """Show dead band and resolution of the ISA test, and the dead band that friction predicts."""
     rows = []
     for one in results:
         expected = 2 * one.bench.truth.static_friction / one.bench.valve.diaphragm_area

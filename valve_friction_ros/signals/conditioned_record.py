@@ -1,4 +1,4 @@
-"""A record as the refinement takes it: pressure without its noise, at a rate that is enough."""
+"""The record that the refinement uses: smoothed pressure, at a sufficient sampling rate."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,12 @@ from valve_friction_ros.signals.smoothing import (
 __all__ = ["ConditionedRecord", "condition", "smoothed_pressure"]
 
 _SAMPLES_A_WINDOW = 32
+"""Samples of the thinned record in a smoothing window. Chosen: a cubic needs far fewer, so nothing
+that the window passes is lost."""
+
 _LONGEST_PERIOD = 5e-3
-"""Longest sample period to thin out to, s: within it a corner of the pressure may lie."""
+"""Longest sample period of a thinned record, s. Chosen: the error in the time of a corner of the
+pressure; an absolute time, 1/260 of the bench's converter lag."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +41,9 @@ class ConditionedRecord:
     noise : float
         Standard deviation of the noise of `position`, m.
     smoothing_window : int
-        Samples of the original record that the pressure was smoothed over.
+        Smoothing window of the pressure, samples of the original record.
     stride : int
-        Samples of the original record to each of these.
+        Samples of the original record for each sample of this record.
     """
 
     sample_period: float
@@ -52,10 +56,10 @@ class ConditionedRecord:
 
 
 def condition(recording: Recording) -> ConditionedRecord:
-    """Smooth the pressure as far as its noise asks for, and thin the record out accordingly.
+    """Smooth the pressure as far as its noise requires, and thin the record out accordingly.
 
-    The noise of the sensors sets the window (`longest_faithful_window`); a 32nd of it, or 5 ms, is
-    a sample period that loses nothing. A noiseless record passes unchanged.
+    The noise of the sensors sets the window (`longest_faithful_window`); a 32nd of it, or 5 ms
+    at most, is the new sample period. A noiseless record passes unchanged.
     """
     record = measured(recording)
     pressure, period = record.pressure, record.sample_period
@@ -63,7 +67,7 @@ def condition(recording: Recording) -> ConditionedRecord:
     stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / period)), 1)
     if window == 1:
         whole = pressure[::stride]
-        halves = whole, whole  # one object: there are no two looks to cross
+        halves = whole, whole  # one object: without noise there is nothing to cross
     else:
         whole = smooth_between(pressure, corners, window)[::stride]
         one, two = independent_halves(pressure, corners, window)
@@ -81,7 +85,7 @@ def condition(recording: Recording) -> ConditionedRecord:
 
 
 def smoothed_pressure(recording: Recording) -> NDArray[np.float64]:
-    """Smooth the pressure between its corners as far as its noise asks for, Pa, shape (n,)."""
+    """Smooth the pressure between its corners as far as its noise requires, Pa, shape (n,)."""
     corners, window = measured(recording).pressure_smoothing
     if window == 1:
         return recording.pressure
@@ -91,7 +95,7 @@ def smoothed_pressure(recording: Recording) -> NDArray[np.float64]:
 def _averaged(signal: NDArray[np.float64], stride: int) -> tuple[NDArray[np.float64], float]:
     """Average around every `stride`-th sample with weights that fall linearly to its neighbours.
 
-    These are the weights with which a straight line between two samples depends on them.
+    These are the weights of the two samples in linear interpolation.
     Returns the averages and the share of white noise that they keep.
     """
     if stride == 1:

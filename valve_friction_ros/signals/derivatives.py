@@ -27,7 +27,7 @@ class Derivatives(NamedTuple):
     margin: int
 
     def inner(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cut `samples`, shape (n,), to those that have derivatives, shape (n − d + 1,)."""
+        """Return the part of `samples`, shape (n,), with derivatives, shape (n − d + 1,)."""
         return samples[self.margin : samples.size - self.margin]
 
 
@@ -38,7 +38,7 @@ def differentiate(
 
     Equation (20) and the two that follow it, taken at the middle of each window: a
     Savitzky–Golay filter. The first and last (d − 1)/2 samples have no full window; they get no
-    derivative, rather than one from a lopsided window.
+    derivative, because that of a one-sided window is less accurate.
 
     Parameters
     ----------
@@ -66,7 +66,10 @@ def differentiate(
     A. Savitzky and M. J. E. Golay, Analytical Chemistry 36 (1964) 1627–1639.
     """
     if position.size < window:
-        raise ValueError(f"{position.size} samples are fewer than the window of {window}")
+        raise ValueError(
+            f"{position.size} samples are fewer than the derivative window of {window}: "
+            "use a longer record or a shorter window"
+        )
     velocity, acceleration = (
         np.convolve(
             position,

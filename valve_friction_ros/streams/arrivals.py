@@ -17,21 +17,23 @@ COLUMNS = ("time", "pressure", "position")
 
 
 _SECOND = 1_000_000_000
+"""Nanoseconds of a second."""
+
 _LATEST = 9.2e9
-"""Time, s, that 64 bits of nanoseconds can hold."""
+"""Largest time, s, rounded down: 64 bits of nanoseconds hold 9.22e9 s."""
 
 
 class Kind(IntEnum):
-    """What arrived."""
+    """Kind of a sample that arrived."""
 
     PRESSURE = 0
     POSITION = 1
     NO_POSITION = 2
-    """A message of the stem that holds no position of the joint."""
+    """A message of the stem without a position of the joint."""
 
 
 class Arrivals(NamedTuple):
-    """What arrived since it was last looked at.
+    """Samples that arrived since the last call.
 
     Attributes
     ----------
@@ -59,11 +61,11 @@ def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
     Parameters
     ----------
     table : array_like of float, shape (n, 3)
-        A row a sample. Its time is rounded to the finest decimal that floats of this size tell
-        apart: nanoseconds below 97 days, microseconds for seconds since 1970. So a time of whole
+        One row per sample. Its time is rounded to the finest decimal that floats of this size
+        resolve: nanoseconds below 97 days, microseconds for seconds since 1970. So a time of whole
         microseconds comes back exactly.
     labels : sequence of str
-        What the columns hold: those of `COLUMNS`, in their order.
+        Names of the columns: those of `COLUMNS`, in their order.
 
     Returns
     -------
@@ -73,7 +75,7 @@ def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
     Raises
     ------
     ValueError
-        If the table has another shape or other columns, or a time is no time of a 64-bit clock.
+        If the table has another shape or other columns, or a time does not fit a 64-bit clock.
     """
     if tuple(labels) != COLUMNS:
         raise ValueError(f"the columns are {','.join(labels)!r}, not {','.join(COLUMNS)!r}")
@@ -86,7 +88,9 @@ def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
 
 def _stamps(seconds: NDArray[np.float64]) -> NDArray[np.int64]:
     if not (np.abs(seconds) < _LATEST).all():
-        raise ValueError("a time is not finite, or beyond the years that nanoseconds can count")
+        raise ValueError(
+            "a time is not finite, or beyond the year 2262, the end of 64-bit nanoseconds"
+        )
     apart = 1e9 * np.spacing(np.abs(seconds).max(initial=0.0))
     step = 10 ** max(0, math.ceil(math.log10(apart)))
     whole = np.floor(seconds)

@@ -1,17 +1,17 @@
-"""Which of a message's joints is the stem."""
+"""The joint of a message that is the stem."""
 
 from collections.abc import Sequence
 
 __all__ = ["DEFAULT_JOINT", "joint_index", "joint_position", "only_joint"]
 
 DEFAULT_JOINT = "stem"
-"""Name of the stem's joint where nobody says otherwise."""
+"""Default name of the stem's joint."""
 
 
 def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
-    """Place of `joint` among `positions` positions; None if it is not there.
+    """Index of `joint` among `positions` positions; None if it is missing.
 
-    An empty name stands for the first joint, and so does any where the joints have no names.
+    An empty name means the first joint; so does every name where the joints have no names.
     """
     index = 0
     if joint and names:
@@ -22,7 +22,7 @@ def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
 
 
 def joint_position(names: Sequence[str], positions: Sequence[float], joint: str) -> float | None:
-    """Position of `joint`, of the first joint for an empty name; None if it is not there.
+    """Position of `joint`, of the first joint for an empty name; None if it is missing.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def joint_position(names: Sequence[str], positions: Sequence[float], joint: str)
 
 
 def only_joint(names: Sequence[str]) -> str:
-    """Name the stem's joint among `names` where nobody has: the only one, or the default name.
+    """Choose the stem's joint among `names`: the only joint, or the joint of the default name.
 
     Raises
     ------
     ValueError
-        If there are several, and none has the default name.
+        If there are several joints without the default name.
     """
     if len(names) <= 1:
         return "".join(names)

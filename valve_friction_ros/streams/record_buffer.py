@@ -1,4 +1,4 @@
-"""What an identifier has gathered: both signals of a valve, and what was wrong with them."""
+"""The buffer of an identifier: both signals of a valve, and the rejected samples."""
 
 import math
 from collections import Counter, deque
@@ -16,27 +16,30 @@ from valve_friction_ros.streams.uniform_grid import uniform_recording
 __all__ = ["Complaints", "RecordBuffer", "Rejection", "Snapshot"]
 
 _REJECTIONS_KEPT = 10_000
+"""Rejections in memory. Chosen: ten seconds at 1 kHz, so a broken sensor does not fill the
+memory."""
+
 _CLEARED = ": the buffer was cleared"
 
 
 class Rejection(NamedTuple):
-    """A sample that was not taken: its stamp (ns) and what was wrong with it."""
+    """A rejected sample: its stamp (ns) and the cause."""
 
     stamp: int
     cause: str
 
 
 class Complaints(NamedTuple):
-    """What was wrong with arrivals: the first rejection, and the first clearing of the buffer."""
+    """Faults of arrivals: the first rejection, and the first clearing of the buffer."""
 
     rejected: str | None = None
     cleared: str | None = None
 
 
 class Snapshot(NamedTuple):
-    """A copy of a buffer, to be identified while the buffer goes on.
+    """A copy of a buffer, to identify while the buffer takes further samples.
 
-    `cleared_because` tells why the buffer was last emptied, until it has filled again.
+    `cleared_because` is the cause of the last clearing, until the buffer is full again.
     """
 
     pressure: Samples
@@ -45,12 +48,12 @@ class Snapshot(NamedTuple):
     cleared_because: str | None
 
     def causes(self) -> str:
-        """Tell what was wrong with the rejected samples, and with how many of them."""
+        """Return the causes of the rejections, with the number of samples of each."""
         counts = Counter(rejection.cause for rejection in self.rejections)
         return "; ".join(f"{cause} ({count} samples)" for cause, count in counts.items())
 
     def recording(self) -> Recording:
-        """Bring both signals onto one grid.
+        """Put both signals on one time grid.
 
         Raises
         ------
@@ -59,14 +62,14 @@ class Snapshot(NamedTuple):
         """
         if self.rejections:
             raise RefusalError(
-                f"bad samples in the window: {self.causes()}; mend the source, then clear the "
-                "buffer or wait until they have left it"
+                f"bad samples in the window: {self.causes()}; correct the source, then clear the "
+                "buffer or wait until these samples have left it"
             )
         return uniform_recording(self.pressure, self.position)
 
 
 def _are_good(last_stamp: int | None, samples: Samples) -> bool:
-    """Tell whether all values are finite and all stamps later than the one before."""
+    """Return whether all values are finite and the stamps increase from the last stamp on."""
     stamps, values = samples
     if stamps.size == 0:
         return True
@@ -77,13 +80,13 @@ def _are_good(last_stamp: int | None, samples: Samples) -> bool:
 class RecordBuffer:
     """The last seconds of pressure and stem position of one valve.
 
-    A sample that cannot be true is not taken and is remembered with its cause; a stamp that
-    goes back means that time has jumped, and clears the buffer.
+    An impossible sample is rejected and kept with its cause. A stamp that goes back means that the
+    clock has jumped, and clears the buffer.
 
     Parameters
     ----------
     valve : Valve
-        Tells the range of the pressure sensor.
+        Gives the range of the pressure sensor.
     window : float
         Time to keep, s.
     """
@@ -113,7 +116,7 @@ class RecordBuffer:
         return max((stamp for stamp in last_stamps if stamp is not None), default=None)
 
     def add_pressure(self, stamp: int, pressure: float) -> str | None:
-        """Take a pressure (Pa) stamped `stamp` (ns); return what was wrong with it, if anything."""
+        """Take a pressure (Pa) stamped `stamp` (ns); return the cause of a rejection."""
         lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
         cause = None
         if not lowest <= pressure <= highest and math.isfinite(pressure):
@@ -121,9 +124,9 @@ class RecordBuffer:
         return self._add("actuator_pressure", self._pressure, stamp, pressure, cause)
 
     def add_position(self, stamp: int, position: float | None) -> str | None:
-        """Take a stem position (m) stamped `stamp` (ns); return what was wrong, if anything.
+        """Take a stem position (m) stamped `stamp` (ns); return the cause of a rejection.
 
-        None stands for a message that held no position.
+        None means a message without a position.
         """
         if position is None:
             return self._reject(stamp, "stem_state without a position of the joint")
@@ -132,8 +135,8 @@ class RecordBuffer:
     def add_arrivals(self, arrivals: Arrivals) -> Complaints:
         """Take samples of both signals in the order in which they came.
 
-        Arrivals without any fault are taken as a whole. Else each is taken or rejected for itself,
-        by the methods above: which samples a clearing leaves depends on their order.
+        Arrivals without a fault are taken as a whole. Otherwise each sample is taken or rejected by
+        the methods above, because the samples that a clearing leaves depend on their order.
         """
         pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
         lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
@@ -187,7 +190,7 @@ class RecordBuffer:
         return cause
 
     def clear(self, cause: str) -> None:
-        """Forget everything; `cause` is told with a refusal that follows from it."""
+        """Remove all samples; refusals name `cause` until the buffer is full again."""
         self._pressure.clear()
         self._position.clear()
         self._rejections.clear()

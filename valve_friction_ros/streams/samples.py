@@ -1,4 +1,4 @@
-"""One stamped signal: the samples of a stream, and the buffer that keeps its last seconds."""
+"""A stamped signal: the samples of a stream, and the buffer of its last seconds."""
 
 from collections import deque
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 __all__ = ["SampleBuffer", "Samples", "nanoseconds"]
 
 _CHUNK = 1024
-"""Samples that are kept and dropped together."""
+"""Samples that are kept and dropped together. Chosen: about 1 s at 1 kHz."""
 
 _LONGEST_OFFSET = int(np.iinfo(np.uint32).max)
 
@@ -20,7 +20,7 @@ def nanoseconds(seconds: float) -> int:
 
 
 class Samples(NamedTuple):
-    """A stretch of a stamped signal.
+    """Part of a stamped signal.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class SampleBuffer:
         self._last_stamp = None
 
     def _close(self) -> None:
-        """Keep the open chunk in its short form, and drop those that the window has left."""
+        """Compress the open chunk, and drop the chunks before the window."""
         self._closed.append(_Chunk.of(*self._open))
         self._filled = 0
         while self._closed[0].last < self._begin():

@@ -1,4 +1,4 @@
-"""Two stamped signals of any rates, brought onto one uniform time grid."""
+"""Two stamped signals of any rates on one uniform time grid."""
 
 import numpy as np
 
@@ -9,7 +9,9 @@ from valve_friction_ros.streams.samples import Samples
 __all__ = ["GapError", "uniform_recording"]
 
 _LARGEST_GAP = 10
-"""Longer pauses, in sampling periods of the signal, are gaps; shorter ones are interpolated."""
+"""Sampling periods of a signal above which a pause is a gap; shorter pauses are interpolated.
+
+Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
 
 
 class GapError(RefusalError):
@@ -18,7 +20,7 @@ class GapError(RefusalError):
     Parameters
     ----------
     name : str
-        What to call the signal.
+        Name of the signal in the message.
     samples : Samples
         The signal.
     sample : int
@@ -31,7 +33,7 @@ class GapError(RefusalError):
     seconds : float
         Length of the gap, s.
     what : str
-        The refusal without its advice.
+        The refusal without its remedy.
     """
 
     def __init__(self, name: str, samples: Samples, sample: int) -> None:
@@ -42,16 +44,16 @@ class GapError(RefusalError):
             f"gap of {self.seconds:.3g} s in {name}, {since_start:.3f} s after its first sample"
         )
         super().__init__(
-            f"{self.what}: use a record without it, or clear the buffer and gather anew"
+            f"{self.what}: use a record without a gap, or clear the buffer and record again"
         )
 
 
 def _checked(name: str, samples: Samples) -> int:
-    """Return the median sampling period in ns, or refuse a signal with nothing or a gap in it."""
+    """Return the median sampling period in ns; refuse a signal that is empty or has a gap."""
     if samples.stamps.size == 0:
-        raise RefusalError(f"no samples of {name}: is it published, and on this topic?")
+        raise RefusalError(f"no samples of {name}: check that it is published, and on this topic")
     if samples.stamps.size == 1:
-        raise RefusalError(f"only one sample of {name}")
+        raise RefusalError(f"only one sample of {name}: check that it is published continuously")
     pauses = np.diff(samples.stamps)
     period = int(np.median(pauses))
     longest = int(np.argmax(pauses))
@@ -68,9 +70,9 @@ def uniform_recording(
     """Put pressure and stem position on the time grid of the stem position.
 
     The grid starts at the first position inside the time that both signals cover and runs at
-    the median period of the positions; both signals are interpolated linearly. Where the
-    positions are uniform already they are taken as they are, to the last bit, and so is the
-    pressure where it shares their stamps.
+    the median period of the positions; both signals are interpolated linearly. Where
+    the positions are uniform already, their values stay unchanged to the last bit, and so do those
+    of the pressure where it shares their stamps.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ def uniform_recording(
     position : Samples
         Stem position, m.
     names : tuple of str
-        What to call the two signals in a refusal.
+        Names of the two signals in a refusal.
 
     Returns
     -------
@@ -101,7 +103,7 @@ def uniform_recording(
         apart = (position.stamps[0] - pressure.stamps[0]) / 1e9
         raise RefusalError(
             f"{names[0]} and {names[1]} do not overlap in time ({names[1]} begins {apart:.3g} s "
-            "later): their clocks differ, or one of them has stopped"
+            "later): check that their clocks agree and that both are published"
         )
     origin = inside[0]
     grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from valve_friction_ros.identification import Parameter, Verdict
-from valve_friction_ros.identification.trust.verdict import fixed, judged, not_identifiable
+from valve_friction_ros.identification.trust.verdict import fixed, not_identifiable, with_verdict
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -25,30 +25,30 @@ from valve_friction_ros.identification.trust.verdict import fixed, judged, not_i
     ],
 )
 def test_by_the_share_of_the_value(sign, width, verdict):
-    found = judged("mass", sign * 100.0, 1.0, width)
+    found = with_verdict("mass", sign * 100.0, 1.0, width)
     assert found.verdict is verdict
     assert bool(found.reason) == (verdict is not Verdict.IDENTIFIED)
 
 
 def test_weak_says_how_wide():
-    assert judged("mass", 100.0, 1.0, 12.0).reason == "its interval is ±12 % of its value"
+    assert with_verdict("mass", 100.0, 1.0, 12.0).reason == "its interval is ±12 % of its value"
 
 
 def test_a_zero_is_not_identifiable():
-    assert judged("viscous_friction", 0.0, 1.0, 2.0).verdict is Verdict.NOT_IDENTIFIABLE
+    assert with_verdict("viscous_friction", 0.0, 1.0, 2.0).verdict is Verdict.NOT_IDENTIFIABLE
 
 
 def test_a_withheld_value_leaves_the_largest_that_it_can_be():
     """−3 ± 4 N is 7 N at the most; of what the record does not hold nothing is known."""
-    assert judged("coulomb_friction", -3.0, 2.0, 4.0).magnitude_bound == 7.0
-    assert math.isnan(judged("coulomb_friction", 3.0, 0.1, 0.2).magnitude_bound)
+    assert with_verdict("coulomb_friction", -3.0, 2.0, 4.0).magnitude_bound == 7.0
+    assert math.isnan(with_verdict("coulomb_friction", 3.0, 0.1, 0.2).magnitude_bound)
     assert math.isnan(not_identifiable("coulomb_friction", "why").magnitude_bound)
 
 
 def test_doubt_makes_a_narrow_interval_weak_and_explains_a_wide_one():
-    narrow = judged("mass", 100.0, 0.1, 0.2, "a doubt")
+    narrow = with_verdict("mass", 100.0, 0.1, 0.2, "a doubt")
     assert (narrow.verdict, narrow.reason, narrow.value) == (Verdict.WEAK, "a doubt", 100.0)
-    wide = judged("mass", 100.0, 100.0, 200.0, "a doubt")
+    wide = with_verdict("mass", 100.0, 100.0, 200.0, "a doubt")
     assert (wide.verdict, wide.reason) == (Verdict.NOT_IDENTIFIABLE, "a doubt")
 
 
@@ -67,7 +67,7 @@ def test_fixed_has_no_width():
 @given(value=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), doubt=st.sampled_from(["", "doubt"]))
 def test_a_number_without_a_verdict_is_never_shown(value, width, doubt):
     """Either the interval is narrower than the value, or there is neither value nor interval."""
-    found = judged("mass", value, width / 2, width, doubt)
+    found = with_verdict("mass", value, width / 2, width, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE:
         assert math.isnan(found.value)
         assert found.reason

@@ -13,19 +13,30 @@ from valve_friction_ros.signals.noise import velocity_noise
 __all__ = ["Breakaway", "find_breakaways"]
 
 _AT_REST = 4.0
-"""A stem is at rest while its velocity is within this many standard deviations of zero …"""
+"""A stem rests while its speed is below this many standard deviations of the velocity's noise.
+
+White noise exceeds 4 standard deviations in 6 of 100,000 samples."""
 
 _AT_REST_SHARE = 1e-3
-"""… or, of a noiseless record, within this share of its top speed."""
+"""In a noiseless record a stem rests while its speed is below this share of its top speed.
+
+Chosen: above zero by far more than rounding, and below every speed that the sweep uses."""
 
 _FIRST_MARK, _SECOND_MARK = 4.0, 16.0
-"""Displacements, in standard deviations of the rest, that time the onset of motion."""
+"""Displacements, in standard deviations of the rest, whose instants locate the onset of motion.
+
+The first is above nearly all noise, as `_AT_REST`. The second is four times the first, chosen:
+far enough to measure the growth, near enough that the force still grows steadily."""
 
 _ROUNDING = 1e-12
+"""Rounding error of a displacement, m: a noiseless rest has the mark zero, and still lies within
+it.
+
+Four decades above the rounding of a position of 30 mm, 3e-18·m, and far below any sensor."""
 
 
 class Breakaway(NamedTuple):
-    """The last sample at which the stem still rests, and the way it leaves (+1 up, −1 down)."""
+    """The last sample of a rest, and the direction of the motion that follows (+1 up, −1 down)."""
 
     sample: int
     direction: int
@@ -44,7 +55,7 @@ def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
 
 
 def _onset(displacement: NDArray[np.float64], spread: float) -> int | None:
-    """Index of the last sample at rest of a displacement that grows, None if it cannot be told."""
+    """Index of the last sample at rest of a displacement that grows, None if it is not visible."""
     first = _last_within(displacement, _FIRST_MARK * spread)
     second = _last_within(displacement, _SECOND_MARK * spread)
     if first < 0 or second == displacement.size - 1:
@@ -66,10 +77,10 @@ def find_breakaways(recording: Recording, settings: IdentificationSettings) -> l
     """Find the instants at which the stem leaves a rest.
 
     A rest is a stretch of at least two derivative windows without a speed that the noise cannot
-    explain. Its part clear of the motion that follows gives position and noise of the rest.
+    explain. The part of the rest before the next motion gives its position and its noise.
     The instants t₁ and t₂ at which the displacement passes 4 and 16 standard deviations of that
     noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows with the time to the power p:
-    p = 2 under a growing force, p = 1 after a slip jump, whichever follows the samples better.
+    p = 2 under a growing force, p = 1 after a slip jump, whichever has the smaller residual.
     Without noise the three instants coincide.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What the published method finds."""
+"""The estimate: the parameters that the published method finds."""
 
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ __all__ = ["Estimate", "possible_model"]
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Identified parameters and how they came about.
+    """The parameters that the published method finds, with the figures of their sweep.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class Estimate:
     fixed : tuple of str
         Parameters that were given or assumed, not identified.
     warnings : tuple of str
-        What a reader of the numbers should know, one sentence each.
+        Limitations of the numbers, one sentence each.
     settings : IdentificationSettings
-        Settings that led here, an assumed mass among the fixed parameters.
+        Settings in force; an assumed mass is among the fixed parameters.
     sweep : Sweep
         The whole sweep.
     """

@@ -1,4 +1,4 @@
-"""What a result tells of the published sweep beside its parameters."""
+"""The figures of the published sweep in a result: as numbers, in words, beside the parameters."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,7 +22,7 @@ def sweep_evidence(estimate: Estimate) -> dict[str, float | int]:
 
 
 def sweep_finding(estimate: Estimate) -> str:
-    """Say the same in words."""
+    """Return the figures of the chosen threshold as a sentence."""
     return (
         f"published: threshold δv {estimate.threshold:.4g} m/s, {estimate.samples} samples above "
         f"it, σ_s {estimate.sigma:.4g} N, R² {estimate.r_squared:.6f}, window "
@@ -33,7 +33,7 @@ def sweep_finding(estimate: Estimate) -> str:
 def with_published(
     parameters: Mapping[str, Parameter], estimate: Estimate | None
 ) -> dict[str, Parameter]:
-    """Put what the published method finds beside each parameter of the Karnopp model."""
+    """Add the published value to each parameter of the Karnopp model."""
     if estimate is None:
         return dict(parameters)
     return {

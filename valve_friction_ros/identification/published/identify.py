@@ -27,6 +27,11 @@ from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 __all__ = ["PublishedFit", "published_estimate", "published_fit"]
 
 _MASS_TOLERANCE = 0.25
+"""Relative change of a regressed mass with half the derivative window, up to which it is kept.
+
+Chosen from 54 simulated records (3 packings, 3 excitations, 3 levels of noise, with and without
+x̄): masses within 10 % of the truth changed by 5 % at most; wrong masses, but one, by 45 % or
+more."""
 
 
 class PublishedFit(NamedTuple):
@@ -39,7 +44,7 @@ class PublishedFit(NamedTuple):
 def _sweep(
     regression: ForceBalanceRegression, settings: IdentificationSettings
 ) -> tuple[Sweep, int]:
-    """Sweep the thresholds (8), or take the one that is given; return the sweep and the choice."""
+    """Sweep the thresholds (8), or a fixed threshold; return the sweep and the chosen step."""
     given = settings.fixed.get("limit_velocity")
     if given is not None:
         thresholds = np.array([given])
@@ -56,15 +61,15 @@ def _mass_by_shorter_window(
     settings: IdentificationSettings,
     threshold: float,
 ) -> float:
-    """Mass at `threshold` with about half the derivative window; nan if that cannot be solved."""
+    """Mass at `threshold` with about half the derivative window; nan without a solution."""
     window = max((settings.published_window // 2) | 1, (settings.order + 2) | 1)
     derivatives = record.derivatives(window, settings.order)
     regression = force_balance_regression(force, record.position, derivatives, settings)
     return float(sweep_thresholds(regression, np.array([threshold])).estimates["mass"][0])
 
 
-def _why_mass_is_not_told(mass: float, other: float) -> str | None:
-    """Say why a regressed mass is no mass, or None if it is one."""
+def _why_mass_is_unknown(mass: float, other: float) -> str | None:
+    """Return why the record does not determine the mass, or None if it does."""
     if mass <= 0:
         return f"its estimate is {mass:.4g} kg"
     if not abs(other - mass) <= _MASS_TOLERANCE * mass:
@@ -84,7 +89,7 @@ def _static_friction(
     coulomb_friction = values["coulomb_friction"]
     if not breakaways:
         warnings.append(
-            "no breakaway from rest was seen: static_friction is taken equal to coulomb_friction"
+            "the record shows no breakaway from rest: static_friction is set to coulomb_friction"
         )
         return coulomb_friction
     samples = np.array([breakaway.sample for breakaway in breakaways])
@@ -122,16 +127,17 @@ def published_estimate(
     Raises
     ------
     RefusalError
-        If the record cannot tell: too short, no motion, one direction only, or too few samples.
+        If the record is too short, has no motion or one direction only, or too few samples.
 
     Notes
     -----
     Between two levels of pressure the force balance does not determine all five parameters: a
     square wave through a first-order lag moves the stem by two exponentials and a level each
-    way, which gives four equations. The weakest, the mass, is then a fiction of the derivative
-    window, so a regressed mass is kept only if it is positive and stays within 25 % when the
-    window is halved. Otherwise `assumed_mass` takes its place, with a warning; inertia is about
-    0.01 N in 5000 N on the bench valve, so the other parameters hardly notice.
+    way, which gives four equations. The weakest parameter, the mass, then depends on the derivative
+    window instead of the record. A regressed mass is therefore kept only if it is positive and
+    stays within 25 % when the window is halved. Otherwise `assumed_mass` replaces it, with a
+    warning. Inertia is about 0.01 N of 5000 N on the bench valve, so the other parameters hardly
+    change.
     """
     return published_fit(measured(recording), valve, settings or IdentificationSettings()).estimate
 
@@ -149,13 +155,13 @@ def published_fit(
     regression = force_balance_regression(force, record.position, derivatives, settings)
     sweep, chosen = _sweep(regression, settings)
     if "mass" not in settings.fixed:
-        reason = _why_mass_is_not_told(
+        reason = _why_mass_is_unknown(
             float(sweep.estimates["mass"][chosen]),
             _mass_by_shorter_window(record, force, settings, float(sweep.thresholds[chosen])),
         )
         if reason is not None:
             warnings.append(
-                f"the record does not tell the mass ({reason}): "
+                f"the record does not determine the mass ({reason}): "
                 f"{settings.assumed_mass:g} kg is assumed"
             )
             settings = replace(settings, fixed={**settings.fixed, "mass": settings.assumed_mass})
@@ -165,7 +171,7 @@ def published_fit(
     threshold = float(sweep.thresholds[chosen])
     for name, value in values.items():
         if value < 0 and name != "spring_preload":
-            warnings.append(f"{name} came out negative ({value:.4g}): the model does not fit")
+            warnings.append(f"{name} is negative ({value:.4g}): the model does not fit this record")
     static_friction = settings.fixed.get("static_friction")
     if static_friction is None:
         static_friction = _static_friction(record, force, settings, values, warnings)

@@ -24,13 +24,13 @@ __all__ = ["METHOD", "identify_published"]
 METHOD = "published"
 """Name of this method."""
 
-_NO_INTERVAL = "the published method states no interval"
+_NO_INTERVAL = "the published method gives no interval"
 
 
 def identify_published(
     recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
 ) -> Result:
-    """Identify a record as published (`published_estimate`); no number is more than weak.
+    """Identify a record as published (`published_estimate`); every verdict is weak or fixed.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def identify_published(
     valve : Valve
         Geometry.
     settings : IdentificationSettings, optional
-        The paper's by default, with the preload as a regressor of its own.
+        The paper's by default, with the preload as a separate regressor.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def identify_published(
     Raises
     ------
     RefusalError
-        If the record cannot tell; the message says what to do.
+        If the record does not determine the friction; the message names cause and remedy.
     """
     settings = settings or IdentificationSettings()
     record = measured(recording)

@@ -19,15 +19,15 @@ class ForceBalanceRegression:
     Attributes
     ----------
     names : tuple of str
-        The free parameters, one a column.
+        The free parameters, one per column.
     columns : ndarray of float, shape (n, p)
         Regressor of each free parameter.
     force : ndarray of float, shape (n,)
-        Actuator force less the share of the fixed parameters, N.
+        Actuator force minus the contribution of the fixed parameters, N.
     speed : ndarray of float, shape (n,)
         Absolute velocity, m/s.
     fixed : mapping of str to float
-        Parameters that do not take part.
+        Parameters outside the regression.
     position_bias : float or None
         x̄ of (10) where the preload follows from it.
     """
@@ -40,7 +40,7 @@ class ForceBalanceRegression:
     position_bias: float | None
 
     def complete(self, estimates: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Name the free `estimates`, shape (..., p), and put the fixed values beside them."""
+        """Name the free `estimates`, shape (..., p), and add the fixed values."""
         shape = estimates.shape[:-1]
         named = {name: estimates[..., index] for index, name in enumerate(self.names)}
         for name in REGRESSED:
@@ -51,7 +51,7 @@ class ForceBalanceRegression:
         return {name: named[name] for name in REGRESSED}
 
     def fixing(self, name: str, value: float) -> "ForceBalanceRegression":
-        """Take a free parameter as known: its share of the force leaves the regression."""
+        """Fix a free parameter: its contribution to the force leaves the regression."""
         index = self.names.index(name)
         return replace(
             self,

@@ -41,9 +41,9 @@ class RegressionUncertainty(NamedTuple):
 def regression_uncertainty(record: MeasuredRecord, fit: PublishedFit) -> RegressionUncertainty:
     """Scatter of the regression's normal equations between strokes.
 
-    Without a spring nothing calls the stem back, and a simulation drifts away from the record
-    whatever the parameters, so the regression is all there is. Its scores are the residual times
-    the regressors, φ_t·(F_t − φ_tᵀθ), at the samples above the chosen threshold.
+    Without a spring no force returns the stem, and its simulation drifts away from the record
+    whatever the parameters. Only the regression is left. Its scores are the residual times the
+    regressors, φ_t·(F_t − φ_tᵀθ), at the samples above the chosen threshold.
     """
     estimate, regression = fit
     settings = estimate.settings

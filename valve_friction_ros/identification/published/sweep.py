@@ -12,7 +12,10 @@ from valve_friction_ros.identification.published.triangular_factors import facto
 __all__ = ["Sweep", "sweep_thresholds"]
 
 _DEPENDENT = 1e-10
-"""A column of which less than this share is its own counts as a combination of the others."""
+"""Share of a column's length below which its independent part counts as zero.
+
+Chosen between rounding (1e-15) and the smallest share in 54 simulated records (6e-7, F_0 on a
+square wave without noise)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,7 @@ def sweep_thresholds(regression: ForceBalanceRegression, thresholds: NDArray[np.
     Returns
     -------
     Sweep
-        One estimate a threshold.
+        One estimate for each threshold.
 
     Notes
     -----
@@ -77,21 +80,23 @@ def sweep_thresholds(regression: ForceBalanceRegression, thresholds: NDArray[np.
     regressors, force = factors[:, :free, :free], factors[:, :free, free]
     own = np.abs(np.diagonal(regressors, axis1=1, axis2=2))
     lengths = np.linalg.norm(regressors, axis=1)
-    told = (samples > free + 1) & np.all(own > _DEPENDENT * lengths, axis=1)
+    determined = (samples > free + 1) & np.all(own > _DEPENDENT * lengths, axis=1)
 
     estimates = np.full((thresholds.size, free), np.nan)
     sigma, r_squared, log_information = (np.full(thresholds.size, np.nan) for _ in range(3))
-    solved = np.linalg.solve(regressors[told], force[told][..., None])[..., 0]
-    count, residual = samples[told], factors[told, free, free]
-    mean = sums[told, free] / count
-    explained = np.sum(force[told] ** 2, axis=1)
-    modelled = np.sum(sums[told, :free] * solved, axis=1)
+    solved = np.linalg.solve(regressors[determined], force[determined][..., None])[..., 0]
+    count, residual = samples[determined], factors[determined, free, free]
+    mean = sums[determined, free] / count
+    explained = np.sum(force[determined] ** 2, axis=1)
+    modelled = np.sum(sums[determined, :free] * solved, axis=1)
     spread = explained - 2 * mean * modelled + count * mean**2
     total = explained + residual**2 - count * mean**2
-    estimates[told] = solved
-    sigma[told] = np.abs(residual) / np.sqrt(count - free)
-    r_squared[told] = np.divide(spread, total, out=np.full(total.size, np.nan), where=total > 0)
-    log_information[told] = 2 * np.sum(np.log(own[told]), axis=1)
+    estimates[determined] = solved
+    sigma[determined] = np.abs(residual) / np.sqrt(count - free)
+    r_squared[determined] = np.divide(
+        spread, total, out=np.full(total.size, np.nan), where=total > 0
+    )
+    log_information[determined] = 2 * np.sum(np.log(own[determined]), axis=1)
     return Sweep(
         thresholds,
         regression.complete(estimates),

@@ -8,7 +8,9 @@ from valve_friction_ros.identification.refusal import RefusalError
 __all__ = ["choose_threshold"]
 
 _RESOLUTION = 1e-12
-"""Residuals below this share of the largest in the sweep are rounding, not misfit."""
+"""Residuals below this share of the largest in the sweep are rounding, not misfit.
+
+Chosen: double precision rounds forces at 1e-16, and the sweep adds up some 10,000 of them."""
 
 
 def choose_threshold(sweep: Sweep, window: int) -> int:
@@ -16,7 +18,7 @@ def choose_threshold(sweep: Sweep, window: int) -> int:
 
     The published rule takes the region of smallest σ_s. Taken by the letter it fails: far up the
     sweep a handful of samples, all of nearly one speed, fits any parameters, and σ_s is smallest
-    where it means least. What is wanted is the smallest uncertainty of the *estimates*, not of
+    where it means least. The criterion must be the smallest uncertainty of the *estimates*, not of
     the force. Their covariance is σ_s²·(ΦᵀΦ)⁻¹, and its determinant, the generalised variance,
 
         ln det = 2·n_P·ln σ_s − ln det ΦᵀΦ ,

@@ -1,4 +1,4 @@
-"""Method "refined": the published sweep, refined, with intervals, verdicts, a test of the model."""
+"""Method "refined": the published sweep, then a refinement with intervals and verdicts."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,15 +14,15 @@ from valve_friction_ros.identification.published.evidence import (
     with_published,
 )
 from valve_friction_ros.identification.published.identify import published_fit
-from valve_friction_ros.identification.published.judgement import judge_regression
 from valve_friction_ros.identification.published.regression_uncertainty import (
     RegressionUncertainty,
     regression_uncertainty,
 )
-from valve_friction_ros.identification.refined.judgement import judge_refinement
+from valve_friction_ros.identification.published.verdicts import regression_verdicts
 from valve_friction_ros.identification.refined.model_selection import with_demanded
 from valve_friction_ros.identification.refined.model_test import misfit_of
 from valve_friction_ros.identification.refined.output_error import SLIP, START, OutputError
+from valve_friction_ros.identification.refined.verdicts import refinement_verdicts
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -46,7 +46,9 @@ from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 __all__ = ["METHOD", "identify_refined"]
 
 _START_TIME = 0.02
-"""Time, s, whose median position is where the refinement begins."""
+"""Time, s, over which the median position is the first guess of the start position.
+
+Chosen: 20 samples at 1 kHz. The start position is refined, so only convergence depends on this."""
 
 METHOD = "refined"
 """Name of this method."""
@@ -55,11 +57,11 @@ METHOD = "refined"
 def identify_refined(
     recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
 ) -> Result:
-    """Identify a record and say how far each number can be trusted.
+    """Identify a record, with an interval and a verdict for each parameter.
 
-    The published method starts it, with a derivative window that fits the noise. The model is
-    then refined until its simulated stem follows the measured one, with as many extensions as
-    the record demands; the scatter between strokes gives the intervals, and these the verdicts.
+    The published method gives the start, with a derivative window that fits the noise. The model is
+    then refined until its simulated stem follows the measured stem, with as many extensions as
+    the record demands. The scatter between strokes gives the intervals, the intervals the verdicts.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ def identify_refined(
     Raises
     ------
     RefusalError
-        If the record cannot tell; the message says what to do.
+        If the record does not determine the friction; the message names cause and remedy.
     """
     settings = settings or IdentificationSettings()
     record = measured(recording)
@@ -131,7 +133,7 @@ def identify_refined(
 
 
 class _Outcome(NamedTuple):
-    """What a refinement, or without a spring a regression, comes to."""
+    """Outcome of a refinement or, without a spring, of a regression."""
 
     parameters: Mapping[str, Parameter]
     misfit: Misfit | None
@@ -157,14 +159,15 @@ def _refined(
     if misfit.is_gross:
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
-            f"{misfit.systematic * 1e3:.2g} mm of misfit): check for the wrong valve, clocks far "
-            "apart, or a packing that changed meanwhile (then clear the buffer and record anew)"
+            f"{misfit.systematic * 1e3:.2g} mm of misfit): check that both signals belong to this "
+            "valve and that their clocks agree; if the packing was changed during the record, "
+            "clear the buffer and record again"
         )
     warnings = []
     if not misfit.describes:
         warnings.append(
             f"the Karnopp model does not describe this valve: {misfit.systematic * 1e6:.3g} µm "
-            "between the simulated and the measured stem are not noise"
+            "between the simulated and the measured stem are more than noise"
         )
     if CLOCK_OFFSET in refinement.names:
         offset = refinement.coordinates[CLOCK_OFFSET]
@@ -174,7 +177,7 @@ def _refined(
         )
     conditioned = problem.record
     return _Outcome(
-        judge_refinement(refinement, misfit, settings),
+        refinement_verdicts(refinement, misfit, settings),
         misfit,
         warnings,
         problem.model(refinement.coordinates),
@@ -185,19 +188,19 @@ def _refined(
 def _regressed(
     estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
 ) -> _Outcome:
-    """Take the regression as it is: without a spring nothing calls a simulated stem back."""
-    parameters = judge_regression(estimate, regression, settings)
+    """Return the regression: without a spring a simulated stem drifts away from the record."""
+    parameters = regression_verdicts(estimate, regression, settings)
     return _Outcome(parameters, None, estimate.warnings, possible_model(estimate), None)
 
 
 def _published(
     record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
 ) -> tuple[Estimate | None, list[str]]:
-    """Identify as published; a refusal there is no more than a warning here."""
+    """Run the published method; its refusal becomes a warning."""
     try:
         return published_fit(record, valve, settings).estimate, []
     except RefusalError as refusal:
-        return None, [f"the published method has no answer: {refusal}"]
+        return None, [f"the published method refused the record: {refusal}"]
 
 
 def _finding(misfit: Misfit | None, force_fit: float, valve: Valve) -> str:
@@ -205,7 +208,7 @@ def _finding(misfit: Misfit | None, force_fit: float, valve: Valve) -> str:
         return f"the regression reproduces {100 * force_fit:.2f} % of the force"
     return (
         f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
-        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it are not noise"
+        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not noise"
     )
 
 
@@ -238,10 +241,10 @@ def _free_names(settings: IdentificationSettings) -> tuple[str, ...]:
 
 
 def _candidates(settings: IdentificationSettings) -> tuple[str, ...]:
-    """Extensions to test.
+    """Return the extensions to test.
 
-    Between the ways, Coulomb friction can be told apart only where the preload is known: a
-    larger F_c upwards and a smaller one downwards are just a larger F_0.
+    The asymmetry of F_c is tested only where the preload is known: a larger F_c upwards with a
+    smaller F_c downwards has the effect of a larger F_0.
     """
     known_preload = settings.position_bias is not None or "spring_preload" in settings.fixed
     candidates = {

@@ -1,4 +1,4 @@
-"""Output error: the simulated stem against the measured one, and how it depends on the model."""
+"""Output error: the simulated minus the measured stem, and its dependence on the model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from valve_friction_ros.signals.conditioned_record import ConditionedRecord
 __all__ = ["SLIP", "START", "Coordinates", "OutputError"]
 
 SLIP = "slip_force"
-"""F_s − F_c, in whose terms F_s is refined: it cannot be negative."""
+"""F_s − F_c, refined in place of F_s, because it cannot be negative."""
 
 START = "start_position"
 """Position at the first sample, refined beside the parameters."""
@@ -24,16 +24,29 @@ Coordinates = Mapping[str, float]
 """Value of every parameter of the model, `SLIP` in place of F_s, `START` and `CLOCK_OFFSET`."""
 
 _STEP = 1e-2
-"""Step of the differences, over the natural size: wide enough to look past single stick events."""
+"""Step of the differences, over the natural size (`OutputError.units`).
+
+Chosen: wide enough to average over single stick events, narrow enough for a linear change."""
+
 _SIGNED = frozenset(
     {"spring_preload", "coulomb_asymmetry", "viscous_asymmetry", START, CLOCK_OFFSET}
 )
 _FORCES = frozenset({"coulomb_friction", "spring_preload", SLIP})
 _UNITY = frozenset({"coulomb_asymmetry", "viscous_asymmetry", CLOCK_OFFSET})
 _LARGEST_ASYMMETRY = 0.95
+"""Largest asymmetry in a simulation. Chosen just below 1, where friction vanishes one way."""
+
 _LEAST_MASS = 1e-3
+"""Least mass in a simulation, kg. Chosen: below every real stem, above zero for (1)."""
+
 _UNIT_MASS = 1.0
+"""Least natural size of a change of the mass, kg. Chosen: the order of a stem; scales steps
+only."""
+
 _UNIT_SPEED = 0.1
+"""Speed, m/s, at which F_v·ẋ reaches F_c in the least natural size of F_v.
+
+Chosen: above the top speeds of valves (0.013 m/s on the bench); scales steps only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +56,13 @@ class OutputError:
     Attributes
     ----------
     record : ConditionedRecord
-        The measured stem; the pressure is given to each method, since there are three of it.
+        The measured stem. Each method takes the pressure, because a record has three forms of it.
     valve : Valve
         Geometry.
     position_bias : float or None
         x̄ of (10), where the preload follows from the spring constant.
     static_friction : float or None
-        F_s, N, where it is given; it then takes the place of `SLIP`, and is F_c at least.
+        F_s, N, where it is fixed; it then replaces `SLIP`, and the model takes at least F_c.
     """
 
     record: ConditionedRecord
@@ -58,7 +71,7 @@ class OutputError:
     static_friction: float | None = None
 
     def model(self, at: Coordinates) -> KarnoppParameters:
-        """Return the model at these coordinates, moved into what can exist."""
+        """Return the model at these coordinates, limited to possible values."""
         coulomb_friction = max(at["coulomb_friction"], 0.0)
         static_friction = (
             coulomb_friction + max(at[SLIP], 0.0)
@@ -92,7 +105,7 @@ class OutputError:
         return simulate(self.valve, self.model(at), pressure, period, start).position
 
     def residual(self, at: Coordinates, pressure: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return simulated less measured positions, m, shape (n,)."""
+        """Return simulated minus measured positions, m, shape (n,)."""
         return self.simulated(at, pressure) - self.record.position
 
     def sensitivity(
@@ -101,7 +114,7 @@ class OutputError:
         pressure: NDArray[np.float64],
         units: Mapping[str, float],
     ) -> NDArray[np.float64]:
-        """Differentiate the positions by the coordinates named in `units`, each over its unit.
+        """Differentiate the positions with respect to the coordinates in `units`, in those units.
 
         Returns
         -------
@@ -119,7 +132,7 @@ class OutputError:
         return columns
 
     def _range(self, name: str) -> tuple[float, float]:
-        """Range in which a coordinate changes the motion: beyond it the model stays at its end."""
+        """Range in which a coordinate changes the motion; `model` limits it to this range."""
         if name == START and np.isfinite(self.valve.travel):
             return 0.0, self.valve.travel
         return (-np.inf if name in _SIGNED else 0.0), np.inf

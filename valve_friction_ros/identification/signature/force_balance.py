@@ -34,8 +34,8 @@ from valve_friction_ros.identification.trust.uncertainty import half_width
 from valve_friction_ros.identification.trust.verdict import (
     Parameter,
     fixed,
-    judged,
     not_identifiable,
+    with_verdict,
 )
 from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.recording import Recording
@@ -48,16 +48,25 @@ METHOD = "signature"
 """Name of this method."""
 
 _FEWEST_EACH_WAY = 2
+"""Strokes each way: fewer leave no scatter within a direction, so no standard error."""
+
 _SURE = 4.0
 _LEAST_SLIP = 0.03
-"""A slip jump counts from this share of F_s on, and from four standard errors."""
+"""Least slip jump, in its standard errors and as a share of F_s.
+
+Chosen: F_s itself may be off by 1 % (`_BREAKAWAY_BIAS`), so a third of that limit is no
+evidence."""
 
 _LEAST_FIT = 0.9
-_HIDDEN = "the stem jumps as it breaks away, too fast or too little for this record to tell how"
+"""Least share of the motion that the model must reproduce. The limit of `Misfit.is_gross`."""
+
+_HIDDEN = "the stem jumps as it breaks away, too fast or too little to measure in this record"
 
 _BREAKAWAY_BIAS = 0.01
 _STIFFNESS_BIAS = 2e-3
-"""Shares by which F_s at the breakaway points, and k, can be wrong alike in every stroke."""
+"""Errors of F_s at the breakaway points, and of k, that all strokes share, as shares of the value.
+
+The largest errors in simulated records of three packings (Notes of `identify_signature`)."""
 
 
 def identify_signature(
@@ -69,7 +78,7 @@ def identify_signature(
 
     k is the mean of (15), x̄ follows from (14), F_s from (11) and (12) at the breakaway points,
     F_c is F_s, and F_v the mean of (19) while the stem slides. Intervals come from the scatter
-    between strokes, widened by what may be wrong alike in all of them: 1 % of F_s, 0.2 % of k.
+    between strokes, widened by the errors that all strokes may share: 1 % of F_s, 0.2 % of k.
 
     Parameters
     ----------
@@ -90,8 +99,8 @@ def identify_signature(
     Raises
     ------
     RefusalError
-        If the record is no valve signature, and the message says which excitation gives one, or
-        if the model does not reproduce it.
+        If the record is not a valve signature (the message names the excitation that gives
+        a signature), or if the model does not reproduce the record.
 
     Notes
     -----
@@ -120,29 +129,30 @@ def identify_signature(
     ways = [[one for one in way if one.breakaway is not None] for way in signature.ways]
     if min(map(len, ways)) < _FEWEST_EACH_WAY:
         raise RefusalError(
-            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest each way, and here are "
-            f"{len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
+            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest each way; the record "
+            f"has {len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
         )
     found = jackknife(ways, lambda some: _figures(some, settings))
     if found.values["static_friction"] <= 0:
         raise RefusalError(
-            f"the breakaway points give a friction of {found.values['static_friction']:.4g} N, "
-            "which cannot be: check the direction and the clocks of both signals"
+            f"the breakaway points give a static friction of "
+            f"{found.values['static_friction']:.4g} N, and friction is above zero: check the "
+            "direction and the clocks of both signals"
         )
-    parameters = _judged(found, ways, settings)
+    parameters = _parameters(found, ways, settings)
     values = {name: one.value for name, one in parameters.items()}
     mass = settings.fixed.get("mass", settings.assumed_mass)
     try:
         identified = identified_model({**values, "mass": mass})
     except ValueError as error:
         raise RefusalError(
-            f"the force balances give an impossible valve: {error}; check both signals"
+            f"the force balances give an impossible model: {error}; check both signals"
         ) from None
     validation = validate(record, valve, identified.parameters)
     if validation.fit < _LEAST_FIT:
         raise RefusalError(
             f"the model of the force balances does not reproduce the record (fit "
-            f"{100 * validation.fit:.0f} %): check what is fixed, both signals and their clocks"
+            f"{100 * validation.fit:.0f} %): check fixed parameters, both signals and their clocks"
         )
     return Result(
         method=METHOD,
@@ -188,7 +198,7 @@ def _findings(signature: ValveSignature, validation: Validation, valve: Valve) -
 
 
 def _figures(ways: Ways, settings: IdentificationSettings) -> dict[str, float]:
-    """Evaluate (11) to (15) and (19) on these strokes; what is fixed takes part as given."""
+    """Evaluate (11) to (15) and (19) on these strokes, with the fixed parameters as given."""
     given = settings.fixed
     spring_constant = given.get("spring_constant", mean_spring_constant(ways))
     bias = settings.position_bias
@@ -240,8 +250,10 @@ def _viscous_friction(
     return float(np.mean(means))
 
 
-def _judged(found: Jackknife, ways: Ways, settings: IdentificationSettings) -> dict[str, Parameter]:
-    """Judge every parameter by its scatter between strokes and the bias of the method."""
+def _parameters(
+    found: Jackknife, ways: Ways, settings: IdentificationSettings
+) -> dict[str, Parameter]:
+    """Give each parameter its verdict, from the scatter of strokes and the bias of the method."""
     values, errors = found.values, found.standard_errors
     speed = sliding_speed(ways)
     points = [point for way in ways for point in breakaway_points(way)]
@@ -260,25 +272,26 @@ def _judged(found: Jackknife, ways: Ways, settings: IdentificationSettings) -> d
     slow = (
         ""
         if speed >= FALL_SPEED
-        else f"holds at {speed * 1e3:.2g} mm/s, the speed here: "
+        else f"valid at {speed * 1e3:.2g} mm/s, the sliding speed of the record: "
         f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
     )
-    judgements = {
+    parameters = {
         "mass": not_identifiable(
-            "mass", f"a constant speed takes no inertia; {settings.assumed_mass:g} kg assumed"
+            "mass",
+            f"at a constant speed inertia has no effect; {settings.assumed_mass:g} kg is assumed",
         )
     }
     for name, bias in biases.items():
         is_sliding = name in ("coulomb_friction", "viscous_friction")
         source = f"{name} after a jump" if jumps and is_sliding else name
         if math.isnan(values[source]):
-            judgements[name] = not_identifiable(name, _HIDDEN)
+            parameters[name] = not_identifiable(name, _HIDDEN)
         elif name == "viscous_friction" and values[source] < 0:
-            reason = f"it came out negative ({values[source]:.4g} N·s/m)"
-            judgements[name] = not_identifiable(name, reason)
+            reason = f"its estimate is negative ({values[source]:.4g} N·s/m)"
+            parameters[name] = not_identifiable(name, reason)
         else:
             width = half_width(errors[source], found.freedom) + bias
             doubt = slow if is_sliding else ""
-            judgements[name] = judged(name, values[source], errors[source], width, doubt)
+            parameters[name] = with_verdict(name, values[source], errors[source], width, doubt)
     given = {name: fixed(name, value) for name, value in settings.fixed.items() if name in UNITS}
-    return {**judgements, **given}
+    return {**parameters, **given}

@@ -9,17 +9,21 @@ from scipy import optimize
 __all__ = ["Onset", "fit_onset"]
 
 _JUMP_GAIN = 12.0
-"""Fall of the sum of squares, in variances of the residual, that a jump has to bring: with one
-parameter more, chance brings it once in a thousand times."""
+"""Decrease of the sum of squares, in variances of the residual, above which a jump is kept.
+
+With one further parameter chance exceeds it in 5 of 10,000 records (χ² of 1 degree of freedom)."""
 
 _FEWEST = 8
+"""Samples of a fit: it has five parameters with a jump. Chosen: three samples more."""
+
 _LAGS = (0.02, 0.1, 0.4)
 _LATER = (0.0, 0.03)
-"""Lags, and delays of a jump after the onset without it, to start from, as shares of the time."""
+"""Starts of the fit, as shares of its time span: lags, and delays of a jump after the onset of the
+fit without a jump. Chosen: the best of all starts is kept."""
 
 
 class Onset(NamedTuple):
-    """When a stem leaves its rest, and how.
+    """When a stem leaves its rest, and at which speed.
 
     Attributes
     ----------
@@ -66,7 +70,7 @@ def _fit(
     growth: float,
     jumps: bool,
 ) -> tuple[float, float, NDArray[np.float64], float]:
-    """Least squares over onset and lag; what is linear is solved within.
+    """Least squares over onset and lag; the linear coefficients are solved within.
 
     Returns onset, lag, the linear coefficients and the sum of squares.
     """
@@ -107,10 +111,10 @@ def fit_onset(
         x(t) = x_r + v·(t' − τ·(1 − e^(−t'/τ))) + v_j·τ·(1 − e^(−t'/τ)),  t' = max(t − t_0, 0) .
 
     Where the rate itself changes, as behind a V/P converter, the ramp bends accordingly. The last
-    term is there only after a slip jump, at whose onset the stem has the speed v_j. It is kept
-    where it explains more than chance would and v_j is above v: a stem that leaves more slowly
-    than it then slides did not jump. Since all samples of the rest and of the motion take part,
-    sensor noise moves t_0 far less than a threshold would.
+    term belongs to a slip jump, at whose onset the stem has the speed v_j. It is kept where it
+    explains more than chance and v_j is above v: a stem that leaves more slowly than it slides
+    later did not jump. All samples of the rest and of the motion take part, so sensor noise moves
+    t_0 far less than the crossing of a level.
 
     Parameters
     ----------
@@ -119,14 +123,14 @@ def fit_onset(
     position : ndarray of float, shape (n,)
         Stem position, m: a rest, and the beginning of one motion.
     guess : float
-        About when it begins, s.
+        Approximate time of the onset, s.
     growth : float
         Relative change of the force's rate, 1/s, at the onset.
 
     Returns
     -------
     Onset
-        Exact where the motion is as above and there is no noise.
+        Exact for the motion above without noise.
 
     Raises
     ------

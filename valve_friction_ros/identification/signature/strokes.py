@@ -17,22 +17,43 @@ from valve_friction_ros.signals.noise import velocity_noise
 __all__ = ["BreakawayPoint", "SignatureStroke", "Sliding", "find_strokes", "velocity_window"]
 
 _ORDER = 3
+"""Polynomial order of the derivatives: the paper's n."""
+
 _RUN_SHARE = 0.5
 _REST_SHARE = 0.1
+"""Speeds above which a stroke runs and below which the stem rests, as shares of the usual speed.
+
+Chosen: a triangle has the usual speed and zero only, so any pair well apart separates them."""
+
 _LEAST_SPEED_SHARE = 0.1
+"""Speed over the top speed from which a sample counts for the usual speed. Chosen: leaves rests
+out."""
+
 _LEAST_STROKE_SHARE = 0.1
+"""Way of a stroke over the stem's range. Chosen: shorter runs are slips or disturbances."""
+
 _STEADY = 0.05
-"""The stem slides steadily while its velocity is within this share of the stroke's median."""
+"""The stem slides steadily while its velocity is within this share of the stroke's median.
+
+Chosen: more than three times `_VELOCITY_NOISE`, so that noise leaves steady samples in."""
 
 _VELOCITY_NOISE = 0.015
-"""Share of the speed that the velocity's noise may have; the derivative window grows until then."""
+"""Noise of the velocity over the usual speed; the derivative window grows until it is reached.
+
+Chosen: see `_STEADY`."""
 
 _ONSET_SHARE = 0.05
-"""Share of a stroke's way whose beginning tells the onset."""
+"""Share of a stroke's way that is fitted to locate the onset.
+
+Chosen: several time constants of the bench's stem; further on the rate of force may change."""
 
 _FEWEST = 8
+"""Samples that a fit of an onset needs (`fit_onset`)."""
+
 _SHORTEST_RECORD = 20
-"""Derivative windows that a record holds at least."""
+"""Fewest derivative windows in a record: the window grows no further.
+
+Chosen: five strokes each way hold two windows each."""
 
 
 class BreakawayPoint(NamedTuple):
@@ -92,11 +113,11 @@ class SignatureStroke:
     direction : int
         +1 up, −1 down.
     breakaway : BreakawayPoint or None
-        Where it begins; None where no rest before it was recorded.
+        Where it begins; None without a recorded rest before it.
     steadiness : float
-        Share of the stroke's way on which the speed was constant.
+        Share of the stroke's way at constant speed.
     sliding : Sliding
-        The instants at which it was.
+        The instants at constant speed.
     """
 
     direction: int
@@ -108,8 +129,8 @@ class SignatureStroke:
     def spring_constant(self) -> float:
         """Mean of (15) over the way that the stem slides, N/m.
 
-        The mean over the way, Σ dF_ext / Σ dx, is the one over the instants at a constant speed,
-        and noise on the speed does not bias it.
+        The mean over the way, Σ dF_ext / Σ dx, equals the mean over the instants at a constant
+        speed, and noise of the speed does not bias it.
         """
         return float(np.sum(self.sliding.force_rate) / np.sum(self.sliding.velocity))
 
@@ -127,7 +148,7 @@ def _usual_speed(speed: NDArray[np.float64]) -> float:
 
 
 def velocity_window(recording: Recording) -> int:
-    """Return a derivative window, samples, that leaves hardly any noise on the usual speed."""
+    """Return a derivative window, samples, with noise of at most 1.5 % of the usual speed."""
     record, period = measured(recording), recording.sample_period
     window = record.fitting_window(_ORDER)
     while window <= len(recording) // _SHORTEST_RECORD:
@@ -144,7 +165,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
 
     A stroke is a run at more than half the usual speed over at least a tenth of the stem's range.
     The breakaway is located by `fit_onset`, from the rest before the stroke and the first 5 % of
-    its way; the pressure there is read off a parabola through as many samples.
+    its way; a parabola through as many samples gives the pressure there.
 
     Parameters
     ----------
@@ -201,9 +222,9 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
 
 
 def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Find the samples of a run that are steady, in its longest stretch that is nearly so.
+    """Find the steady samples of a run, within its longest nearly steady stretch.
 
-    Elsewhere the velocity of a stem that jumps or stops only passes through the steady one.
+    Elsewhere a stem that jumps or stops passes through the steady velocity.
     """
     pace = float(np.median(run))
     distance = np.abs(run - pace)
@@ -216,7 +237,7 @@ def _breakaway(
 ) -> BreakawayPoint | None:
     """Locate the onset of a stroke from where its velocity rests, begins and ends.
 
-    A derivative window sees a jump half of its length too early, so half more is fitted.
+    A derivative window shows a jump half its length too early, so the fit is half a window longer.
     """
     rest, begin, end = (place + window // 2 for place in places)
     position, period = recording.position, recording.sample_period

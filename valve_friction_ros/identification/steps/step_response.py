@@ -1,7 +1,7 @@
 """Response of a valve to steps of its input: T_d, T63, T86, overshoot, gain, dead band, resolution.
 
 These are the figures that ANSI/ISA-75.25.01, *Test Procedure for Control Valve Response
-Measurement from Step Inputs*, asks for; the attributes say how each is computed here. The input
+Measurement from Step Inputs*, asks for; the attributes state how each is computed here. The input
 may be a command signal or a pressure, in any unit. With input and position both in percent of
 their spans the gain is the response gain of the standard.
 """
@@ -28,19 +28,29 @@ __all__ = ["Bracket", "StepMetrics", "StepTest", "step_test"]
 
 _T63 = -math.expm1(-1.0)
 _T86 = -math.expm1(-2.0)
+"""Shares that a first-order lag reaches after one and two time constants (ANSI/ISA-75.25.01)."""
+
 _SETTLED_SHARE = 0.05
+"""Share of a hold, at its end, that gives the steady value. Chosen: long enough to average
+noise."""
+
 _VISIBLE = 5.0
-"""Standard deviations of the noise, as smoothed, that a movement has to exceed to be seen."""
+"""Standard deviations of the smoothed noise above which a movement counts: 6 of 10⁷ by chance."""
 
 _LEAST_VISIBLE = 1e-3
-"""The least that is seen as a movement, as a share of the stem's range: settling leaves as much."""
+"""Least movement that counts, as a share of the stem's range.
+
+Chosen: about the movement of a stem that still settles after a hold of 10 s."""
 
 _LONGEST_SMOOTHING = 0.2
+"""Longest window that smooths the position, s. Chosen: it bounds the error of a dead time."""
+
 _NO_CORNERS = np.empty(0, dtype=np.intp)
+"""A position has inertia: its slope does not jump."""
 
 
 class Bracket(NamedTuple):
-    """Two values between which a quantity lies, in the unit of the input.
+    """Lower and upper bound of a quantity, in the unit of the input.
 
     Attributes
     ----------
@@ -63,14 +73,14 @@ class StepMetrics:
     time : float
         Beginning of the step, s since the first sample.
     input_change : float
-        Steady input after the step less that before, unit of the input. Steady values are
+        Steady input after minus before the step, unit of the input. Steady values are
         means over the last twentieth of the time before the next step.
     output_change : float
-        Steady position after the step less that before, unit of the position.
+        Steady position after minus before the step, unit of the position.
     moved : bool
-        Whether the position changed by more than its noise explains.
+        Whether the position changed by more than its noise.
     dead_time : float
-        T_d: from the beginning of the step to the first detectable movement its way, s.
+        T_d: from the beginning of the step to the first detectable movement in its direction, s.
     t63, t86 : float
         From the beginning of the step to 63.2 % (1 − 1/e) and 86.5 % (1 − 1/e²) of the steady
         change, s, dead time included. A first-order lag τ behind a delay has T_d + τ and T_d + 2·τ.
@@ -99,22 +109,22 @@ class StepMetrics:
 
 @dataclass(frozen=True)
 class StepTest:
-    """What a record of steps says about a valve.
+    """Step responses, dead band and resolution from a record of steps.
 
     Attributes
     ----------
     steps : tuple of StepMetrics
         In the order of time.
     dead_band : Bracket
-        Range through which the input can be varied, upon reversal, without a movement. From
-        below by the largest range that the input swept while the stem stayed, from above by the
-        smallest change that moved the stem after a reversal right after a movement.
+        Range of the input, after a reversal, without a movement. Lower bound: the largest range
+        that the input swept while the stem rested. Upper bound: the smallest change that moved
+        the stem at a reversal directly after a movement.
     resolution : Bracket
-        Smallest change of the input, in the way of the movement before, that moves the stem.
-        From below by the largest such change, step upon step, that did not, from above by the
-        smallest that did.
+        Smallest change of the input, in the direction of the last movement, that moves the stem.
+        Lower bound: the largest such change, over several steps, without a movement. Upper
+        bound: the smallest such change with a movement.
     smallest_movement : float
-        Movement that counts as seen, unit of the position.
+        Least movement that counts, unit of the position.
     smoothed : ndarray of float, shape (n,)
         Position without its noise, from which times and overshoot were read.
     """
@@ -145,11 +155,11 @@ def step_test(
         Time between two samples, s.
     starts : sequence of int, optional
         Sample at which each step begins, increasing; by default found in the input (`find_steps`).
-        Steps smaller than the noise of a measured input have to be given.
+        Steps smaller than the noise of a measured input are not found.
     smallest_movement : float, optional
         Change of the position that counts as a movement; by default five standard deviations of
-        the noise that smoothing leaves on the position, and at least 0.1 % of its range in the
-        record, which is about what a stem that still settles moves after a hold.
+        the smoothed noise of the position, and at least 0.1 % of its range in the record, about
+        the movement of a stem that still settles after a hold.
 
     Returns
     -------
@@ -161,7 +171,7 @@ def step_test(
     ValueError
         If the signals differ in length, hold values that are not finite, or a step lies outside.
     RefusalError
-        If there is no step.
+        If the input has no step.
 
     Examples
     --------
@@ -182,7 +192,7 @@ def step_test(
     measured = np.asarray(position, dtype=np.float64)
     if signal.ndim != 1 or signal.shape != measured.shape or signal.size == 0:
         raise ValueError(
-            f"input and position must be rows of as many samples, got shapes {signal.shape} and "
+            f"input and position must be rows of equal length, got shapes {signal.shape} and "
             f"{measured.shape}"
         )
     for name, values in (("input", signal), ("position", measured)):
@@ -190,7 +200,9 @@ def step_test(
             raise ValueError(f"the {name} is not finite at sample {np.argmin(np.isfinite(values))}")
     edges = [*(find_steps(signal) if starts is None else starts), signal.size]
     if len(edges) == 1:
-        raise RefusalError("there is no step in the input: record steps, or give their samples")
+        raise RefusalError(
+            "the input has no step: record steps, or give the samples at which they begin"
+        )
     if edges[0] < 1 or min(np.diff(edges)) < 1:
         raise ValueError(f"steps must begin at increasing samples from 1 to {signal.size - 1}")
     smooth, noise = _smoothed(measured, period)
@@ -208,7 +220,7 @@ def step_test(
 
 
 def _smoothed(position: NDArray[np.float64], period: float) -> tuple[NDArray[np.float64], float]:
-    """Smooth a position as far as its noise asks for; return it and the noise that is left."""
+    """Smooth a position as far as its noise requires; return it and the remaining noise."""
     noise = sensor_noise(position)
     longest = max(round(_LONGEST_SMOOTHING / period), 1)
     window = longest_faithful_window(position, _NO_CORNERS, noise, longest)
@@ -224,7 +236,7 @@ def _steady(hold: NDArray[np.float64]) -> float:
 
 
 def _first_beyond(response: NDArray[np.float64], level: float) -> float:
-    """Place at which a response first reaches a level, between samples; nan if it never does."""
+    """Return where a response first reaches a level, in samples; nan if it never does."""
     reached = np.flatnonzero(response >= level)
     if not reached.size:
         return math.nan
@@ -242,7 +254,7 @@ def _metrics(
     steady: tuple[tuple[float, float], tuple[float, float]],
     least: float,
 ) -> StepMetrics:
-    """Evaluate a step from the positions up to the next, and the steady inputs and positions."""
+    """Evaluate a step from the positions up to the next step and the steady values."""
     (input_before, input_after), (before, after) = steady
     input_change, output_change = input_after - input_before, after - before
     moved = abs(output_change) > least
@@ -261,7 +273,7 @@ def _metrics(
 
 
 def _dead_band(inputs: Sequence[float], steps: Sequence[StepMetrics]) -> Bracket:
-    """Bracket the dead band by what the stem ignored, and by what it answered upon reversal."""
+    """Bracket the dead band by the ranges that the stem ignored and the reversals that moved it."""
     ignored, answered = 0.0, math.inf
     lowest = highest = inputs[0]
     last_way, turn = 0.0, inputs[0]
@@ -278,7 +290,7 @@ def _dead_band(inputs: Sequence[float], steps: Sequence[StepMetrics]) -> Bracket
 
 
 def _resolution(steps: Sequence[StepMetrics]) -> Bracket:
-    """Bracket the resolution by changes in the way of the movement before."""
+    """Bracket the resolution by changes in the direction of the last movement."""
     ignored, answered = 0.0, math.inf
     last_way, change = 0.0, 0.0
     for step in steps:

@@ -17,19 +17,24 @@ from valve_friction_ros.signals.measured_record import measured
 __all__ = ["Validation", "measured_start", "validate"]
 
 _START_TIME = 0.1
+"""Longest part of the record, s, that gives the start. Chosen: the speed changes little within it;
+an absolute time, half the time constant F_v/k of the tight bench packing."""
+
 _START_ORDER = 3
+"""Polynomial order whose fitting window gives the length of that part: the paper's n."""
+
 _MOVES = 4.0
-"""Standard errors from zero at which the first slope is a motion."""
+"""Standard errors above which the first slope is a motion: 6 of 100,000 rests by chance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """A measured stem beside the simulated one.
+    """A measured and a simulated stem.
 
     Attributes
     ----------
     recording : Recording
-        What was measured.
+        The measured record.
     simulated : ndarray of float, shape (n,)
         Simulated stem position at the same times, m.
     """
@@ -39,14 +44,14 @@ class Validation:
 
     @property
     def residual(self) -> NDArray[np.float64]:
-        """Simulated less measured position, m, shape (n,)."""
+        """Simulated minus measured position, m, shape (n,)."""
         return self.simulated - self.recording.position
 
     @property
     def fit(self) -> float:
         """Share of the movement that is reproduced, 1 − ‖y − ŷ‖ / ‖y − ȳ‖, at most 1.
 
-        It is 0 for a model no better than the mean position, and below for a worse one.
+        It is 0 for the mean position in place of a model, and negative for a worse model.
         """
         position = self.recording.position
         moved = float(np.linalg.norm(position - position.mean()))
@@ -64,10 +69,10 @@ class Validation:
 
 
 def measured_start(recording: Recording, valve: Valve) -> StemState:
-    """Read the state of the stem at the first sample off the record.
+    """Estimate the state of the stem at the first sample.
 
-    A straight line through the first samples, as many as the noise asks for and 0.1 s at the
-    most, gives position and velocity; a slope that the noise could make counts as rest.
+    A straight line through the first samples, as many as the noise requires and 0.1 s at most,
+    gives position and velocity; a slope within the noise counts as rest.
     """
     record = measured(recording)
     longest = max(round(_START_TIME / recording.sample_period), 2)
@@ -86,13 +91,13 @@ def measured_start(recording: Recording, valve: Valve) -> StemState:
 
 
 def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) -> Validation:
-    """Simulate a recording with a model, and put the stem beside the measured one.
+    """Simulate a recording with a model, to compare the simulated with the measured stem.
 
-    The stem starts where, and as fast as, it was measured (`measured_start`); nothing is fitted
-    to this record. Position and velocity are the whole state of a Karnopp stem: where it rests
-    within its dead band, static friction holds it there, as in the machine. An error of the
-    start, from sensor noise at most, lasts until the stem first slides. The pressure is smoothed
-    as for the identification, since its noise would break the stem away early.
+    The stem starts at the measured position and velocity (`measured_start`); nothing is fitted to
+    this record. Position and velocity are the whole state of a Karnopp stem: within the dead band
+    static friction holds it at the start, as in the machine. An error of the start comes from
+    sensor noise only, and lasts until the stem first slides. The pressure is smoothed as for the
+    identification, because its noise would break the stem away early.
 
     Parameters
     ----------
@@ -111,8 +116,8 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
     Raises
     ------
     RefusalError
-        If the stem did not move, or the model has no spring: nothing calls such a stem back, and
-        a simulation drifts away from the record whatever the friction.
+        If the stem did not move, or the model has no spring: the simulation of such a stem drifts
+        away from the record whatever the friction.
 
     Examples
     --------
@@ -129,7 +134,8 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
     """
     if parameters.spring_constant == 0:
         raise RefusalError(
-            "a model without a spring cannot be validated: its simulated stem drifts away"
+            "a model without a spring cannot be validated: its simulated stem drifts away; use a "
+            "record of a valve with a spring"
         )
     record = measured(recording)
     require_motion(record)

@@ -1,4 +1,4 @@
-"""The equation whose root an estimate is, sample by sample."""
+"""The equation whose root is the estimate, sample by sample."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,16 +13,16 @@ __all__ = ["EstimatingEquation"]
 class EstimatingEquation:
     """Σ_t (S₁ᵀ·r₂ + S₂ᵀ·r₁) = 0, linear about the estimate.
 
-    Two looks at the same record, with independent noise in each, are crossed, so that noise of the
-    slopes does not correlate with noise of the residuals. Least squares is the case of two equal
-    looks.
+    S₁, r₁ and S₂, r₂ come from two halves of the samples of the pressure. Their noise is
+    independent, so noise of the slopes does not correlate with noise of the residuals. Least
+    squares is the case of two equal halves.
 
     Attributes
     ----------
     slopes : tuple of two ndarray of float, shape (n, p)
         Derivatives of the residuals by the free coordinates.
     residuals : tuple of two ndarray of float, shape (n,)
-        Model less measurement.
+        Model minus measurement.
     """
 
     slopes: tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -37,7 +37,7 @@ class EstimatingEquation:
 
     @property
     def scores(self) -> NDArray[np.float64]:
-        """Terms of the sum, a row a sample, shape (n, p)."""
+        """Terms of the sum, one row per sample, shape (n, p)."""
         (one, two), (first, second) = self.slopes, self.residuals
         return one * second[:, None] + two * first[:, None]
 
@@ -50,7 +50,7 @@ class EstimatingEquation:
 
     @property
     def is_definite(self) -> bool:
-        """Tell whether the curvature has an inverse, and its root is a minimum."""
+        """Return whether the curvature has an inverse, and the root is a minimum."""
         curvature = self.curvature
         scale = np.sqrt(np.abs(np.diag(curvature)))
         if not (scale > 0).all():

@@ -1,4 +1,9 @@
-"""What a record must hold before it is worth a regression."""
+"""What a record must hold to determine friction; a refusal names what is missing.
+
+Where a limit is given with "simulated records", it lies between two sets of records: those that
+`benchmark/cases.py` makes (4 excitations, 4 levels of noise, 1 kHz and 100 Hz, of the packings low,
+high, graphite and stribeck), which all determine the friction, and records that do not.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,30 +22,69 @@ __all__ = [
     "require_two_directions",
 ]
 
+_LEAST_WINDOWS = 10
+"""Derivative windows in a record. Chosen: fewer give no two strokes with a rest and a motion."""
+
 _MOTION_OVER_NOISE = 10.0
+"""Range of the position over its white noise.
+
+White noise alone spans 9 standard deviations in 60,000 samples; simulated records span 70 and
+more."""
+
 _LEAST_SHARE_OF_DIRECTION = 0.02
+"""Way in the rarer direction over the whole way.
+
+Zero for one direction; 0.41 and more in simulated records. Chosen: one short stroke back counts."""
+
 _LEAST_TRAVEL = 0.01
+"""Range of the position over the travel.
+
+0.14 and more in simulated records. Chosen: a motion below 1 % is mostly within the dead band."""
+
 _MOST_AT_A_STOP = 0.5
+"""Share of the time at a travel stop: 0.18 at most in simulated records. Chosen."""
+
 _OUTSIDE = 0.05
+"""Distance beyond a travel stop over the travel.
+
+Chosen: a sensor's zero may be off by a few percent; swapped signals or wrong units by far more."""
+
 _LEAST_FOLLOWED = 0.1
+"""Share of the pressure's variance that the moving stem explains.
+
+0.18 and more in simulated records; FOLLOWED_REASON"""
+
 _SURELY_FOLLOWED = 0.5
+"""The same share above which a negative slope means an inverted position. Chosen: near 1 for an
+inverted record; a small share has a slope by chance."""
+
 _FOLLOWED_BLOCK = 0.1
+"""Time, s, over which pressure and position are averaged before that test.
+
+Chosen: 100 samples at 1 kHz average noise; an absolute time, a tenth of a converter's lag."""
+
 _MOVING_SHARE = 0.05
+"""Speed over the top speed from which the stem counts as moving in that test. Chosen: leaves the
+rests out, where pressure changes within the dead band."""
+
 _LEAST_SAMPLES_A_STROKE = 10
+"""Samples that the whole range takes at the top speed; 11 and more in simulated records.
+
+Chosen: with fewer a stroke has no resting and sliding part, or the sample is a sensor's glitch."""
 
 
 def require_enough_samples(recording: Recording, window: int) -> None:
-    """Refuse a recording shorter than ten derivative windows."""
-    least = 10 * window
+    """Refuse a recording shorter than ten derivative windows of the published method."""
+    least = _LEAST_WINDOWS * window
     if len(recording) < least:
         raise RefusalError(
             f"the record is too short: {len(recording)} samples ({recording.duration:.3g} s), "
-            f"at least {least} are needed"
+            f"at least {least} are needed; record longer or sample faster"
         )
 
 
 def require_motion(recording: Recording) -> None:
-    """Refuse a recording whose stem did not move beyond its own noise."""
+    """Refuse a recording whose stem did not move by more than its noise."""
     span = float(np.ptp(recording.position))
     noise = measured(recording).white_noise
     if span == 0 or span < _MOTION_OVER_NOISE * noise:
@@ -51,7 +95,7 @@ def require_motion(recording: Recording) -> None:
 
 
 def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, float]:
-    """Distances moved up and down, turns smaller than `deadband` left out."""
+    """Return the distances moved up and down, without turns smaller than `deadband`."""
     up = down = 0.0
     highest = lowest = turn = float(position[0])
     direction = 0
@@ -71,9 +115,9 @@ def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, f
 
 
 def require_two_directions(recording: Recording, window: int) -> None:
-    """Refuse a stem that moves one way only, or hardly ever the other.
+    """Refuse a stem that moves in one direction only, or hardly in the other.
 
-    The position is averaged over `window` samples first, and turns within its noise are ignored.
+    The position is averaged over `window` samples first; turns within its noise do not count.
     """
     means = len(recording) // window
     position = recording.position[: means * window].reshape(means, window).mean(axis=1)
@@ -83,12 +127,12 @@ def require_two_directions(recording: Recording, window: int) -> None:
         way = "up" if up > down else "down"
         raise RefusalError(
             f"the stem moved {way} only ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
-            "friction cannot be told from the spring; record at least one stroke each way"
+            "friction and spring cannot be separated; record at least one stroke each way"
         )
 
 
 def require_travel(recording: Recording, valve: Valve) -> None:
-    """Refuse a stem that leaves the travel, or moves over hardly any of it."""
+    """Refuse a stem that leaves the travel, or moves over less than 1 % of it."""
     travel = valve.travel
     lowest, highest = float(recording.position.min()), float(recording.position.max())
     if not np.isfinite(travel):
@@ -96,7 +140,8 @@ def require_travel(recording: Recording, valve: Valve) -> None:
     if lowest < -_OUTSIDE * travel or highest > (1 + _OUTSIDE) * travel:
         raise RefusalError(
             f"the stem position runs from {lowest:.4g} to {highest:.4g} m, the travel from 0 to "
-            f"{travel:.4g} m: check for swapped signals, the unit (m), the zero and the travel"
+            f"{travel:.4g} m: check that the signals are not swapped, and check unit (m), zero "
+            "and travel"
         )
     if highest - lowest < _LEAST_TRAVEL * travel:
         raise RefusalError(
@@ -107,7 +152,7 @@ def require_travel(recording: Recording, valve: Valve) -> None:
 
 
 def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
-    """Refuse a stem that lies at a travel stop for most of the record."""
+    """Refuse a stem that rests at a travel stop for most of the record."""
     travel = valve.travel
     if not np.isfinite(travel):
         return
@@ -119,16 +164,16 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
         share = float(np.mean(distance < reach))
         if share > _MOST_AT_A_STOP:
             raise RefusalError(
-                f"the stem lies at its {name} stop for {100 * share:.0f} % of the record, where "
-                "pressure says nothing about friction: excite the valve around mid-travel"
+                f"the stem is at its {name} stop for {100 * share:.0f} % of the record, where "
+                "pressure holds no information on friction: excite the valve around mid-travel"
             )
 
 
 def _followed(recording: Recording) -> tuple[float, float]:
-    """Fit the pressure of the moving stem by its position and the way it moves.
+    """Fit the pressure of the moving stem by its position and its direction.
 
-    While the stem moves, pressure follows position, shifted up or down by the friction; while it
-    rests, pressure may do anything within the dead band, so rests are left out.
+    While the stem moves, pressure follows position, shifted up or down by the friction. While it
+    rests, any pressure within the dead band is possible, so rests are left out.
 
     Returns
     -------
@@ -156,18 +201,20 @@ def require_related_signals(recording: Recording) -> None:
     """Refuse pressure and stem that do not move together, or move too fast for the sampling."""
     pressure, position = recording.pressure, recording.position
     if np.ptp(pressure) == 0:
-        raise RefusalError("the pressure did not change: excite the valve, or check its sensor")
+        raise RefusalError(
+            "the pressure did not change: excite the valve, or check the pressure sensor"
+        )
     slope, share = _followed(recording)
     if share < _LEAST_FOLLOWED:
         raise RefusalError(
-            "pressure and stem do not move together (place and way of the moving stem explain "
-            f"{100 * share:.0f} % of the pressure): check for the wrong valve, a dead sensor, "
-            "swapped signals or clocks far apart"
+            "pressure and stem do not move together (position and direction of the moving stem "
+            f"explain {100 * share:.0f} % of the pressure): check that both signals belong to "
+            "this valve, are not swapped, come from working sensors, and share one clock"
         )
     if slope < 0 and share > _SURELY_FOLLOWED:
         raise RefusalError(
-            "the stem moves against the pressure: count the position in the direction in which "
-            "pressure pushes the stem"
+            "the stem moves against the pressure: invert the position, so that it grows in the "
+            "direction in which pressure pushes the stem"
         )
     step = float(np.max(np.abs(np.diff(position))))
     span = float(np.ptp(position))
@@ -175,5 +222,5 @@ def require_related_signals(recording: Recording) -> None:
         raise RefusalError(
             f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
             f"its range between two samples, {recording.sample_period:.3g} s apart; sample faster, "
-            "or look for a glitch of the stem sensor"
+            "or check the stem sensor for a glitch"
         )

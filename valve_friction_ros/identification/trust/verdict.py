@@ -1,4 +1,4 @@
-"""How far an identified number can be trusted."""
+"""The verdict on an identified number: how far it can be trusted."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,14 +6,16 @@ from enum import Enum
 
 from valve_friction_ros.identification.units import PARAMETER_UNITS
 
-__all__ = ["WEAK_SHARE", "Parameter", "Verdict", "fixed", "judged", "not_identifiable"]
+__all__ = ["WEAK_SHARE", "Parameter", "Verdict", "fixed", "not_identifiable", "with_verdict"]
 
 WEAK_SHARE = 0.05
-"""An interval that reaches further than this share of the value makes it weak."""
+"""Half width of an interval, as a share of the value, above which the verdict is weak.
+
+Chosen: a fifth of the 25 % growth of F_c that raises the first alarm (`FrictionLimits`)."""
 
 
 class Verdict(Enum):
-    """What an identified number is worth."""
+    """Whether an identified number can be used."""
 
     IDENTIFIED = "identified"
     WEAK = "weak"
@@ -36,14 +38,14 @@ class Parameter:
     half_width : float
         Half the width of its 95 % interval.
     verdict : Verdict
-        What the value is worth.
+        Whether the value can be used.
     reason : str
-        Why it is weak or not identifiable; else empty.
+        Why the value is weak or not identifiable; else empty.
     magnitude_bound : float
-        Of a value that is withheld for its wide interval the largest magnitude in that interval,
-        SI unit; else nan.
+        Largest magnitude in the interval of a value that was withheld because the interval is too
+        wide, SI unit; else nan.
     published : float
-        What the published method finds for it, SI unit; nan where it has no answer.
+        Estimate of the published method, SI unit; nan where that method refused the record.
     """
 
     name: str
@@ -57,7 +59,7 @@ class Parameter:
 
     @property
     def unit(self) -> str:
-        """SI unit, as written for people."""
+        """SI unit, as text."""
         return PARAMETER_UNITS.get(self.name, "")
 
     @property
@@ -66,18 +68,18 @@ class Parameter:
         return self.value - self.half_width, self.value + self.half_width
 
 
-def judged(
+def with_verdict(
     name: str, value: float, standard_error: float, half_width: float, doubt: str = ""
 ) -> Parameter:
-    """Judge a value by the width of its interval.
+    """Give a value its verdict, by the width of its interval.
 
     Parameters
     ----------
     name, value, standard_error, half_width
         As in `Parameter`.
     doubt : str
-        A reason, if there is one, why the value cannot be more than weak, however narrow its
-        interval is; otherwise the width of the interval is the reason.
+        A reason why the value is at most weak, however narrow its interval is. Without a doubt the
+        width of the interval is the reason.
 
     Returns
     -------
@@ -95,10 +97,10 @@ def judged(
 
 
 def not_identifiable(name: str, reason: str) -> Parameter:
-    """Withhold a value that means nothing, with the reason."""
+    """Withhold a value that the record does not determine, with the reason."""
     return Parameter(name, math.nan, math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, reason)
 
 
 def fixed(name: str, value: float, reason: str = "given") -> Parameter:
-    """Pass on a value that was given."""
+    """Return a parameter with a value that was given."""
     return Parameter(name, value, 0.0, 0.0, Verdict.FIXED, reason)

@@ -1,4 +1,4 @@
-"""A number of the paper beside ours, and whether they agree."""
+"""Comparison of a number of the paper with the reproduced number."""
 
 import math
 from collections.abc import Sequence
@@ -9,22 +9,22 @@ __all__ = ["Check", "compared", "summary", "within", "written"]
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that a reader of the paper ticks off.
+    """One comparison with the paper.
 
     Attributes
     ----------
     item : int
-        Section of the report that it belongs to, from 1.
+        Section of the report, from 1.
     name : str
-        What is compared, with its place in the paper.
+        Name of the number, with its place in the paper.
     paper, ours : str
         Both values, in the paper's unit.
     criterion : str
-        When they count as equal; chosen before they were known.
+        Criterion of a match; set before the values were known.
     matched : bool
-        Whether they do.
+        Whether the values match.
     why : str
-        The reason, where they do not.
+        The reason of a mismatch.
 
     Raises
     ------
@@ -41,20 +41,20 @@ class Check:
     why: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a mismatch that nobody explains."""
+        """Refuse a mismatch without a reason."""
         if self.matched == bool(self.why):
-            raise ValueError(f"{self.name}: a reason belongs to a mismatch, and to nothing else")
+            raise ValueError(f"{self.name}: a mismatch needs a reason, and a match has none")
 
 
 def compared(
     item: int, name: str, paper: str, ours: str, criterion: str, matched: bool, why: str
 ) -> Check:
-    """Return a check that keeps the reason only where it did not match."""
+    """Return a check; a match drops the reason."""
     return Check(item, name, paper, ours, criterion, bool(matched), "" if matched else why)
 
 
 def written(value: float, digits: int = 4) -> str:
-    """Write a number with so many digits, or all of its whole ones; a dash if there is none."""
+    """Write a number with `digits` digits, without decimals if it is large; nan as a dash."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
@@ -73,7 +73,7 @@ def within(
     why: str,
     digits: int = 4,
 ) -> Check:
-    """Compare two numbers: equal within a share of the paper's."""
+    """Compare two numbers: they match within a share of the paper's number."""
     return compared(
         item,
         name,
@@ -86,7 +86,7 @@ def within(
 
 
 def summary(checks: Sequence[Check]) -> str:
-    """Say in one line how many checks matched, and name those that did not."""
+    """Return one line: the number of matches, and the names of the mismatches."""
     missed = [check.name for check in checks if not check.matched]
     count = f"{len(checks) - len(missed)} of {len(checks)} matched"
     return f"{count}; not matched: {'; '.join(missed)}." if missed else f"{count}."

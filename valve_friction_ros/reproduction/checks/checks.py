@@ -1,4 +1,4 @@
-"""Everything that is compared with the paper, in its order; criteria are fixed beforehand."""
+"""All comparisons with the paper, in its order; their criteria were set beforehand."""
 
 from collections.abc import Iterator
 
@@ -206,12 +206,12 @@ def _table(one: BenchResult) -> Iterator[Check]:
 def _terms(high: BenchResult) -> Iterator[Check]:
     peaks = {name: float(np.max(np.abs(term))) for name, term in force_terms(high).terms.items()}
     spring, coulomb, viscous, inertia = peaks.values()
-    told = f"{spring:.0f}, {coulomb:.0f}, {viscous:.0f}, {inertia:.2g} N"
+    forces = f"{spring:.0f}, {coulomb:.0f}, {viscous:.0f}, {inertia:.2g} N"
     yield compared(
         6,
         "Fig. 5, order of the terms, high",
         "k·x, then F_c",
-        told,
+        forces,
         "largest k·x, F_c next",
         spring > coulomb > max(viscous, inertia),
         "the noise of this run hides it",

@@ -1,4 +1,4 @@
-"""What the paper has no number for, compared with the truth of the simulation."""
+"""Comparisons with the truth of the simulation, where the paper has no number."""
 
 from collections.abc import Iterator
 
@@ -16,6 +16,8 @@ from valve_friction_ros.reproduction.programme import BenchResult, Programme
 __all__ = ["dead_band_checks", "graphite_checks", "noise_checks"]
 
 _EXACT = 1e-4
+"""Largest relative error without noise. Chosen: the error of derivatives over 31 samples is
+smaller."""
 
 
 def dead_band_checks(low: BenchResult, high: BenchResult) -> Iterator[Check]:
@@ -48,7 +50,7 @@ def noise_checks(programme: Programme) -> Iterator[Check]:
             f"off by {100 * max(errors.values()):.1g} %, m by {100 * mass:.1f} %",
             "k, F_v, F_c, F_s within 0.01 %, m within 10 %",
             max(errors.values()) <= _EXACT and mass <= TOLERANCES["mass"],
-            "the configured bench is another than the one that this holds for",
+            "the configured bench differs from the bench of this criterion",
         )
     masses = np.array([paper.MODEL_1[name].mass for name in paper.PACKINGS])
     published = float(np.sqrt(np.mean((masses / paper.NOMINAL_MASS - 1) ** 2)))

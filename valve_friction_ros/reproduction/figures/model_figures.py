@@ -16,7 +16,7 @@ __all__ = ["estimates_figure", "quality_figure", "validation_figure"]
 
 _SWEPT = ("mass", "viscous_friction", "coulomb_friction", "spring_constant")
 _SHOWN = (2.0, 98.0)
-"""Percentiles of an estimate between which the axis reaches; its ends are off any scale."""
+"""Percentiles of an estimate at the ends of the axis; the extremes are far outside."""
 
 
 def _mark(axes: Axes, result: BenchResult) -> None:
@@ -74,7 +74,7 @@ def quality_figure(result: BenchResult) -> Figure:
 def validation_figure(
     result: BenchResult, experiment: Experiment, models: dict[str, Comparison]
 ) -> Figure:
-    """Draw one of Figs. 6 to 9: measured stem and models, and what lies between them."""
+    """Draw one of Figs. 6 to 9: measured stem, models, and their errors."""
     styles = {
         "model 1": (COLOURS[0], "-"),
         "model 2": (COLOURS[1], "--"),

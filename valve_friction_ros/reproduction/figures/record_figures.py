@@ -28,13 +28,13 @@ def new_figure(height: float) -> Figure:
 
 
 def packing_name(result: BenchResult) -> str:
-    """Say which packing a result is of."""
+    """Return the name of a result's packing."""
     name = result.bench.name
     return f"{name} friction" if name in paper.PACKINGS else f"{name} packing"
 
 
 def _draw_pressure(axes: Axes, experiment: Experiment, duration: float) -> None:
-    """Draw what was commanded and what came, of the first part of a record."""
+    """Draw commanded and actual pressure of the first part of a record."""
     recording = experiment.measured
     count = min(round(duration / recording.sample_period) + 1, len(recording))
     time = recording.time[:count]
@@ -115,7 +115,7 @@ def signatures_figure(*results: BenchResult) -> Figure:
         draw_breakaway_points(axes, signature, colour=colour)
         _draw_dead_zone(axes, result, colour)
     handles, labels = axes.get_legend_handles_labels()
-    # P1 and P2 of the packings are alike; they stand behind the loops.
+    # P1 and P2 look alike for all packings; the legend lists them last.
     kept = dict(sorted(zip(labels, handles, strict=True), key=lambda one: one[0].startswith("$")))
     axes.legend(kept.values(), kept.keys(), loc="upper left", frameon=False)
     axes.set_xlabel("actuator pressure [kPa]")

@@ -7,7 +7,7 @@ import pytest
 
 from valve_friction_ros.health import Baseline, FrictionLimits, Level
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.reports import verdict_sentence
+from valve_friction_ros.reports import diagnosis_sentence
 
 BASELINE = Baseline(100.0)
 NAN = float("nan")
@@ -69,7 +69,7 @@ def ratio_told(value, share):
 )
 def test_against_a_baseline(with_friction, friction, half_width, begin, effect, advice):
     record = with_friction(friction, half_width, baseline=BASELINE)
-    assert verdict_sentence(record) == (
+    assert diagnosis_sentence(record) == (
         f"{begin}, and the stem ignores reversals smaller than {effect} of its travel: {advice}."
     )
 
@@ -77,11 +77,11 @@ def test_against_a_baseline(with_friction, friction, half_width, begin, effect, 
 def test_limits_are_those_of_the_record(with_friction):
     narrow = FrictionLimits(warn_ratio=1.01, error_ratio=1.05)
     record = with_friction(110.0, baseline=BASELINE, limits=narrow)
-    assert verdict_sentence(record).startswith("The friction is excessive, 1.10 times")
+    assert diagnosis_sentence(record).startswith("The friction is excessive, 1.10 times")
 
 
 def test_without_a_baseline(with_friction):
-    assert verdict_sentence(with_friction(152.7, 1.2)) == (
+    assert diagnosis_sentence(with_friction(152.7, 1.2)) == (
         "The friction is 152.7 ± 1.2 N, and the stem ignores reversals smaller than 5.3 % of its "
         "travel: whether it has grown cannot be said without a baseline, the friction of the "
         "healthy valve."
@@ -90,23 +90,23 @@ def test_without_a_baseline(with_friction):
 
 def test_a_weak_or_a_given_number_is_called_so(with_friction):
     weak = with_friction(400.0, 30.0, Verdict.WEAK, "two strokes only", baseline=BASELINE)
-    assert ", a weak estimate (two strokes only), and the stem" in verdict_sentence(weak)
+    assert ", a weak estimate (two strokes only), and the stem" in diagnosis_sentence(weak)
     given = with_friction(150.0, 0.0, Verdict.FIXED, "given")
-    assert verdict_sentence(given).startswith(
+    assert diagnosis_sentence(given).startswith(
         "The friction is 150 N, which was given and not identified, and the stem"
     )
 
 
 def test_what_is_not_identifiable_has_no_number(with_friction):
     record = with_friction(NAN, NAN, Verdict.NOT_IDENTIFIABLE, "too few strokes", baseline=BASELINE)
-    assert verdict_sentence(record) == (
+    assert diagnosis_sentence(record) == (
         "This record does not tell the friction (too few strokes): move the valve through several "
         "fast strokes both ways and identify it again."
     )
 
 
 def test_an_impossible_friction_names_the_signals(with_friction):
-    assert verdict_sentence(with_friction(-20.0, baseline=BASELINE)) == (
+    assert diagnosis_sentence(with_friction(-20.0, baseline=BASELINE)) == (
         "The friction comes out as -20 N, which cannot be: check the direction of both signals and "
         "identify it again."
     )
@@ -120,9 +120,9 @@ def test_a_model_that_does_not_describe_the_valve_comes_first(with_friction, ide
     )
     normal = with_friction(100.0, baseline=BASELINE, misfit=misfit)
     assert normal.diagnosis.level is Level.WARN
-    assert verdict_sentence(normal).startswith(f"{doubt}is normal, ")
-    assert verdict_sentence(normal).endswith(
+    assert diagnosis_sentence(normal).startswith(f"{doubt}is normal, ")
+    assert diagnosis_sentence(normal).endswith(
         "check the sensors and their mounting, then identify it again."
     )
     excessive = with_friction(400.0, baseline=BASELINE, misfit=misfit)
-    assert verdict_sentence(excessive).startswith(f"{doubt}is excessive, ")
+    assert diagnosis_sentence(excessive).startswith(f"{doubt}is excessive, ")

@@ -1,4 +1,4 @@
-"""The verdict on a valve in one sentence, for those who plan its maintenance."""
+"""The diagnosis of a valve in one sentence, for those who plan its maintenance."""
 
 import math
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from valve_friction_ros.health import StatusSignal, dead_band, percentage
 from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
-__all__ = ["verdict_sentence"]
+__all__ = ["diagnosis_sentence"]
 
 
 class _Finding(NamedTuple):
@@ -15,7 +15,7 @@ class _Finding(NamedTuple):
     advice: str
 
 
-_AGAIN = "identify it again from a longer record with more strokes before anything is done"
+_AGAIN = "before any work, identify it again from a longer record with more strokes"
 _CHECK = "check the sensors and their mounting, then identify it again"
 
 _ALARMS = {
@@ -32,24 +32,24 @@ _ALARMS = {
 }
 
 
-def verdict_sentence(record: IdentifiedRecord) -> str:
-    """Return one sentence: what was found, how sure it is, what follows from it, what to do.
+def diagnosis_sentence(record: IdentifiedRecord) -> str:
+    """Return one sentence: finding, certainty, consequence and advice.
 
-    It says in plain words what the diagnosis of the monitor says.
+    It states the diagnosis of the monitor in words for readers outside control engineering.
     """
     friction = record.result.parameters["coulomb_friction"]
     alarm = _ALARMS.get(record.diagnosis.status_signal)
     if math.isnan(friction.value) and alarm is not None:
-        size = f"{friction.magnitude_bound:.2g} N at the most, too small to be told"
+        size = f"at most {friction.magnitude_bound:.2g} N, too small to be identified"
         finding = _Finding(alarm.what.format(ratio=size), alarm.advice)
     elif math.isnan(friction.value):
         finding = _Finding(
-            f"this record does not tell the friction ({friction.reason})",
-            "move the valve through several fast strokes both ways and identify it again",
+            f"this record does not determine the friction ({friction.reason})",
+            "move the valve through several fast strokes in both directions and identify it again",
         )
     elif friction.value < 0:
         finding = _Finding(
-            f"the friction comes out as {friction.value:.4g} N, which cannot be",
+            f"the identified friction is {friction.value:.4g} N, and friction is above zero",
             "check the direction of both signals and identify it again",
         )
     else:
@@ -67,11 +67,10 @@ def _found(record: IdentifiedRecord) -> _Finding:
             size += f" ± {friction.half_width:.2g}"
         return _Finding(
             f"the friction is {size} N{_sureness(friction)}",
-            "whether it has grown cannot be said without a baseline, the friction of the healthy "
-            "valve",
+            "to find out whether it has grown, set a baseline, the friction of the healthy valve",
         )
     ratio = (
-        f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % sure: "
+        f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % interval: "
         f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
     )
     if diagnosis.status_signal in _ALARMS:
@@ -81,15 +80,15 @@ def _found(record: IdentifiedRecord) -> _Finding:
         return _Finding(f"the friction has perhaps grown, {ratio}", _AGAIN)
     if diagnosis.ratio.value <= record.limits.low_ratio:
         return _Finding(f"the friction has perhaps collapsed, {ratio}", _AGAIN)
-    advice = _CHECK if _doubt(record) else "nothing needs to be done"
+    advice = _CHECK if _doubt(record) else "no action is needed"
     return _Finding(f"the friction is normal, {ratio}", advice)
 
 
 def _sureness(friction: Parameter) -> str:
-    """Say what stands behind the number, unless it is identified."""
+    """Return the limitation of the number, or an empty string if it is identified."""
     words = {
         Verdict.IDENTIFIED: "",
-        Verdict.WEAK: f", a weak estimate ({friction.reason})",
+        Verdict.WEAK: f", with the verdict weak ({friction.reason})",
         Verdict.FIXED: ", which was given and not identified",
     }
     return words[friction.verdict]
@@ -100,7 +99,7 @@ def _doubt(record: IdentifiedRecord) -> str:
     if misfit is None or misfit.describes:
         return ""
     return (
-        "to be taken with caution, since the model does not describe this valve "
+        "use this with caution, because the model does not describe this valve "
         f"({misfit.systematic * 1e6:.3g} µm of the stem's motion remain unexplained): "
     )
 

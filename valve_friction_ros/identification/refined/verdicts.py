@@ -23,30 +23,30 @@ from valve_friction_ros.identification.trust.uncertainty import (
 from valve_friction_ros.identification.trust.verdict import (
     Parameter,
     fixed,
-    judged,
     not_identifiable,
+    with_verdict,
 )
 from valve_friction_ros.identification.units import CLOCK_OFFSET, UNITS
 
-__all__ = ["judge_refinement"]
+__all__ = ["refinement_verdicts"]
 
 _SPRING = ("mass", "spring_constant", "spring_preload", CLOCK_OFFSET)
-"""What is told as well where the model of the friction is doubted."""
+"""Parameters whose verdicts stand where the friction model is doubted: no friction enters them."""
 
 _RECTANGLE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) / math.sqrt(3)
 """Half width of an interval over the half width of a rectangular distribution."""
 
 
-def judge_refinement(
+def refinement_verdicts(
     refinement: Refinement, misfit: Misfit, settings: IdentificationSettings
 ) -> dict[str, Parameter]:
-    """Judge every parameter of a refined model.
+    """Give each parameter of a refined model its verdict.
 
     The half width of an interval is the standard error by the scatter between strokes, times
-    Student's quantile. Where a mass is assumed, what an error of it would do is added in squares,
-    the error taken to lie anywhere within the mass's own size. Where the misfit is more than
-    noise, what it can have done at the worst (`worst_case`) is added in full. No half width is
-    less than 0.05 % of its value, of a spring constant 0.02 %.
+    Student's quantile. Where a mass is assumed, the effect of its error is added in squares; the
+    error is taken as uniform within plus or minus the mass itself. Where the misfit exceeds noise,
+    its largest possible effect (`worst_case`) is added in full. No half width is less than 0.05 %
+    of its value, or 0.02 % of a spring constant.
     """
     covariance = refinement.covariance
     samples = refinement.simulated.size
@@ -59,18 +59,19 @@ def judge_refinement(
     few = too_few_strokes(samples // max(refinement.stroke, 1))
     doubt = _doubt(refinement, misfit)
     extras = (name for name in refinement.names if name not in (*UNITS, SLIP, START))
-    judgements = {}
+    parameters = {}
     for name in (*UNITS, *extras):
         gradient = _gradient(refinement, name, settings)
         if name in settings.fixed:
-            judgements[name] = fixed(name, settings.fixed[name])
+            parameters[name] = fixed(name, settings.fixed[name])
         elif name == "mass" and name not in refinement.names:
             assumed = refinement.coordinates["mass"]
-            judgements[name] = not_identifiable(
-                name, f"inertia is too small a part of the force to be seen; {assumed:g} kg assumed"
+            parameters[name] = not_identifiable(
+                name,
+                f"inertia is too small a part of the force to measure; {assumed:g} kg is assumed",
             )
         elif name == "static_friction" and SLIP not in refinement.names:
-            judgements[name] = not_identifiable(name, NO_SLIP)
+            parameters[name] = not_identifiable(name, NO_SLIP)
         else:
             error = covariance.standard_error(gradient)
             bound = _root(float(gradient @ systematic @ gradient))
@@ -78,14 +79,14 @@ def judge_refinement(
             width = math.hypot(covariance.half_width(gradient), lean) + bound
             width = max(width, finest_half_share(name, settings) * abs(values[name]))
             reason = few or ("" if name in _SPRING else doubt)
-            judgements[name] = judged(name, values[name], error, width, reason)
-    return judgements
+            parameters[name] = with_verdict(name, values[name], error, width, reason)
+    return parameters
 
 
 def _shift_by_assumed_mass(
     refinement: Refinement, settings: IdentificationSettings
 ) -> NDArray[np.float64]:
-    """Change of the free coordinates with an assumed mass that is wrong by its own size."""
+    """Change of the free coordinates where the assumed mass is wrong by 100 %."""
     if "mass" in settings.fixed or "mass" in refinement.names:
         return np.zeros(len(refinement.names))
     at = refinement.coordinates
@@ -102,7 +103,7 @@ def _root(variance: float) -> float:
 
 
 def _doubt(refinement: Refinement, misfit: Misfit) -> str:
-    """Say why the friction cannot be more than weak, or nothing."""
+    """Return why the friction is at most weak, or an empty string."""
     if not misfit.describes:
         return (
             "the Karnopp model does not describe this valve: "
@@ -111,8 +112,8 @@ def _doubt(refinement: Refinement, misfit: Misfit) -> str:
     speed = refinement.top_speed
     if speed < FALL_SPEED:
         return (
-            f"holds up to {speed * 1e3:.2g} mm/s, the fastest here: "
-            f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
+            f"valid up to {speed * 1e3:.2g} mm/s, the top speed of the record: "
+            f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s; record faster strokes"
         )
     return ""
 
@@ -120,7 +121,7 @@ def _doubt(refinement: Refinement, misfit: Misfit) -> str:
 def _gradient(
     refinement: Refinement, name: str, settings: IdentificationSettings
 ) -> NDArray[np.float64]:
-    """Differentiate a parameter by the free coordinates of the refinement."""
+    """Differentiate a parameter with respect to the free coordinates of the refinement."""
     gradient = np.zeros(len(refinement.names))
     if name == "static_friction":
         for part in ("coulomb_friction", SLIP):

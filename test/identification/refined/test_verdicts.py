@@ -5,9 +5,9 @@ import pytest
 from problems import FREE, perfect_problem, true_coordinates
 
 from valve_friction_ros.identification import IdentificationSettings, Verdict
-from valve_friction_ros.identification.refined.judgement import judge_refinement
 from valve_friction_ros.identification.refined.output_error import SLIP
 from valve_friction_ros.identification.refined.refinement import refine
+from valve_friction_ros.identification.refined.verdicts import refinement_verdicts
 from valve_friction_ros.identification.trust.limits import FALL_SPEED, FEWEST_STROKES
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.uncertainty import worst_case
@@ -44,12 +44,12 @@ def square(refined):
     return refined(SquareWave(), 41.6)
 
 
-def judged(refinement, misfit=GOOD, **settings):
-    return judge_refinement(refinement, misfit, IdentificationSettings(**settings))
+def with_verdict(refinement, misfit=GOOD, **settings):
+    return refinement_verdicts(refinement, misfit, IdentificationSettings(**settings))
 
 
 def test_no_doubt(square):
-    found = judged(square)
+    found = with_verdict(square)
     assert square.top_speed > FALL_SPEED
     for name in (*FRICTION, *SPRING):
         assert found[name].verdict is Verdict.IDENTIFIED
@@ -59,20 +59,20 @@ def test_no_doubt(square):
 
 
 def test_static_friction_without_a_slip_jump(square):
-    one = judged(square)["static_friction"]
+    one = with_verdict(square)["static_friction"]
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
     assert np.isnan(one.value)
     assert one.reason == "no slip jump seen: F_s cannot be told from F_c"
 
 
 def test_mass_that_is_not_seen(square):
-    one = judged(square)["mass"]
+    one = with_verdict(square)["mass"]
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
     assert one.reason == "inertia is too small a part of the force to be seen; 1.75 kg assumed"
 
 
 def test_misfit_doubts_the_friction_and_widens_every_interval(square):
-    found = judged(square, BAD)
+    found = with_verdict(square, BAD)
     bound = worst_case(square.equation.curvature, square.simulated.size, BAD.excess)
     for name in FRICTION:
         assert found[name].verdict is not Verdict.IDENTIFIED
@@ -87,7 +87,7 @@ def test_misfit_doubts_the_friction_and_widens_every_interval(square):
 def test_slow_record_cannot_tell_how_far_the_friction_falls(refined):
     slow = refined(TriangleWave(), 120.0)
     assert slow.top_speed < FALL_SPEED
-    found = judged(slow)
+    found = with_verdict(slow)
     for name in FRICTION:
         assert found[name].verdict is Verdict.WEAK
         assert found[name].reason == (
@@ -99,7 +99,7 @@ def test_slow_record_cannot_tell_how_far_the_friction_falls(refined):
 
 def test_few_strokes_are_weak_whatever_else(refined):
     short = refined(SquareWave(), 15.0)  # up and down
-    found = judged(short, BAD)
+    found = with_verdict(short, BAD)
     for name in (*FRICTION, *SPRING):
         assert found[name].verdict is not Verdict.IDENTIFIED
         assert found[name].reason == (
@@ -110,7 +110,7 @@ def test_few_strokes_are_weak_whatever_else(refined):
 def test_fixed_parameters(refined):
     names = tuple(name for name in FREE if name != "viscous_friction")
     fixed = {"viscous_friction": 4.48e4, "mass": 1.75, "static_friction": 606.0}
-    found = judged(refined(SquareWave(), 41.6, names, static_friction=606.0), fixed=fixed)
+    found = with_verdict(refined(SquareWave(), 41.6, names, static_friction=606.0), fixed=fixed)
     for name, value in fixed.items():
         assert (found[name].verdict, found[name].value) == (Verdict.FIXED, value)
         assert found[name].half_width == 0.0
@@ -121,7 +121,7 @@ def test_preload_from_the_bias_has_the_spring_s_interval(refined):
     bias = 1.13e-3
     names = tuple(name for name in FREE if name != "spring_preload")
     refinement = refined(SquareWave(), 41.6, names, 3e-4, position_bias=bias)
-    found = judged(refinement, position_bias=bias)
+    found = with_verdict(refinement, position_bias=bias)
     spring, preload = found["spring_constant"], found["spring_preload"]
     assert preload.value == pytest.approx(bias * spring.value, rel=1e-12)
     assert preload.standard_error == pytest.approx(bias * spring.standard_error, rel=1e-12)
@@ -136,7 +136,7 @@ def test_static_friction_adds_slip_and_coulomb_friction(bench_trajectory, benche
     recording = Recording(1e-3, pressure, motion.position + noise)
     problem = perfect_problem(valve, recording)
     refinement = refine(problem, true_coordinates(parameters, motion.position[0]), (*FREE, SLIP))
-    found = judged(refinement)
+    found = with_verdict(refinement)
     from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
 
     covariance = block_covariance(refinement.equation, stroke_length(refinement.simulated)).matrix

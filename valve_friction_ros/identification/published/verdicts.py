@@ -13,32 +13,32 @@ from valve_friction_ros.identification.trust.limits import (
 from valve_friction_ros.identification.trust.verdict import (
     Parameter,
     fixed,
-    judged,
     not_identifiable,
+    with_verdict,
 )
 
-__all__ = ["judge_regression"]
+__all__ = ["regression_verdicts"]
 
 
-def judge_regression(
+def regression_verdicts(
     estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
 ) -> dict[str, Parameter]:
-    """Judge every parameter of a regression, for a machine without a spring."""
+    """Give each parameter of a regression its verdict, for a machine without a spring."""
     covariance = regression.covariance
     few = too_few_strokes(regression.strokes)
-    judgements = {}
+    parameters = {}
     for name, value in estimate.values.items():
         if name in settings.fixed:
-            judgements[name] = fixed(name, settings.fixed[name])
+            parameters[name] = fixed(name, settings.fixed[name])
         elif name == "static_friction":
-            judgements[name] = not_identifiable(name, NO_SLIP)
+            parameters[name] = not_identifiable(name, NO_SLIP)
         elif name not in regression.names:
-            judgements[name] = not_identifiable(name, "the record does not tell it")
+            parameters[name] = not_identifiable(name, "the record does not determine it")
         else:
             gradient = np.eye(len(regression.names))[regression.names.index(name)]
             error = covariance.standard_error(gradient)
             width = max(
                 covariance.half_width(gradient), finest_half_share(name, settings) * abs(value)
             )
-            judgements[name] = judged(name, value, error, width, few)
-    return judgements
+            parameters[name] = with_verdict(name, value, error, width, few)
+    return parameters
