@@ -31,7 +31,6 @@ setup(
     ],
     install_requires=[
         "setuptools",
-        "apsw",
         "backports.zstd",
         "Jinja2",
         "lz4",

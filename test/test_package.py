@@ -58,7 +58,7 @@ def test_manifest_names_every_message_package_and_library():
         name: f"python3-{name}" for name in ("matplotlib", "numba", "numpy", "rich", "scipy")
     }
     # rosbags brings the libraries that it reads bags with.
-    keys |= dict.fromkeys(("rosbags", "apsw", "backports", "lz4"), "python3-rosbags-pip")
+    keys |= dict.fromkeys(("rosbags", "backports", "lz4"), "python3-rosbags-pip")
     own = set(sys.stdlib_module_names) | {NAME}
     for path in [*(PROJECT / NAME).rglob("*.py"), *(PROJECT / "launch").glob("*.py")]:
         for module in imported_modules(path) - own:

@@ -1,17 +1,36 @@
-"""The output file: what a kill leaves of it is recognised, and no row is lost or doubled."""
+"""The results: rows survive a kill, none is lost or doubled, the output holds them all."""
 
+import csv
+import json
+import signal
+import sqlite3
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from valve_friction_ros.fleet import ResultsFile, error_cells, key_cells
+from valve_friction_ros.fleet import COLUMNS, ResultsFile, database_of, error_cells, key_cells
 
 TEXTS = st.text(st.characters(categories=("L", "N", "P", "S", "Zs")), max_size=20)
 FLEETS = st.lists(st.tuples(st.integers(1, 3), TEXTS), min_size=1, max_size=5)
 ENDINGS = st.sampled_from([".csv", ".jsonl"])
+A_FEW = settings(max_examples=25, deadline=None)  # each of them flushes a disk several times
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from test_results_file import rows_of
+from valve_friction_ros.fleet import ResultsFile
+results = ResultsFile(Path(sys.argv[1]))
+results.append(rows_of(0, 1, "one"))
+results.append(rows_of(1, 2, "two"))
+results._connection.execute("INSERT INTO result (recording, valve) VALUES ('half', '')")
+os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 def rows_of(number, valves, text):
@@ -24,32 +43,38 @@ def recordings_in(results):
     return [(entry.recording, len(entry.rows)) for entry in results.entries()]
 
 
+def written(path):
+    """The rows of an output, an empty cell as None."""
+    with path.open(newline="", encoding="utf-8") as stream:
+        if path.suffix == ".jsonl":
+            return [json.loads(line) for line in stream]
+        rows = csv.DictReader(stream)
+        assert (*rows.fieldnames,) == COLUMNS
+        return [{name: cell or None for name, cell in row.items()} for row in rows]
+
+
+@A_FEW
 @given(FLEETS, ENDINGS, st.data())
-def test_cut_anywhere_and_gone_on_with(fleet, ending, data):
+def test_closed_and_gone_on_with(fleet, ending, data):
     entries = [rows_of(number, *one) for number, one in enumerate(fleet)]
+    part = data.draw(st.integers(0, len(entries)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"out{ending}")
-        ends = []
+        for some in (entries[:part], entries[part:]):
+            with ResultsFile(path) as results:
+                for entry in some:
+                    results.append(entry)
         with ResultsFile(path) as results:
-            ends.append(path.stat().st_size)
-            for entry in entries:
-                results.append(entry)
-                ends.append(path.stat().st_size)  # on the disk as soon as append returns
-        whole = path.read_bytes()
-        cut = data.draw(st.integers(0, len(whole)))
-        path.write_bytes(whole[:cut])
-
-        complete = sum(end <= cut for end in ends[1:])
-        with ResultsFile(path) as results:
-            assert path.read_bytes() == whole[: ends[complete]]
-            for entry in entries[complete:]:
-                results.append(entry)
             assert recordings_in(results) == [
                 (entry[0]["recording"], len(entry)) for entry in entries
             ]
-        assert path.read_bytes() == whole
+        texts = [{c: row.get(c) or None for c in COLUMNS} for entry in entries for row in entry]
+        if ending == ".csv":
+            texts = [{c: cell and str(cell) for c, cell in row.items()} for row in texts]
+        assert [{c: cell or None for c, cell in row.items()} for row in written(path)] == texts
 
 
+@A_FEW
 @given(FLEETS, ENDINGS, st.data())
 def test_what_is_kept_stays_as_it_is(fleet, ending, data):
     entries = [rows_of(number, *one) for number, one in enumerate(fleet)]
@@ -58,60 +83,80 @@ def test_what_is_kept_stays_as_it_is(fleet, ending, data):
     names = {entry[0]["recording"] for entry in kept}
     with tempfile.TemporaryDirectory() as folder:
         path, expected = Path(folder, f"out{ending}"), Path(folder, f"expected{ending}")
+        new = rows_of(9, 2, "new")
         with ResultsFile(path) as results, ResultsFile(expected) as other:
             for entry in entries:
                 results.append(entry)
             assert results.keep(lambda entry: entry.recording in names) == wanted.count(False)
-            results.append(entries[0])
-            for entry in [*kept, entries[0]]:
+            results.append(new)
+            for entry in [*kept, new]:
                 other.append(entry)
         assert path.read_bytes() == expected.read_bytes()
-        assert set(Path(folder).iterdir()) == {path, expected}
+        outputs = {path, expected}
+        assert set(Path(folder).iterdir()) == outputs | {database_of(one) for one in outputs}
+
+
+def test_numbers_come_back_to_the_last_bit(tmp_path):
+    row = rows_of(0, 1, "one")[0] | {"coulomb_friction_n": 0.1 + 0.2, "samples": 2000, "fit": 1.0}
+    for name in ("out.csv", "out.jsonl"):
+        with ResultsFile(tmp_path / name) as results:
+            results.append([row])
+    (text,), (number,) = (written(tmp_path / name) for name in ("out.csv", "out.jsonl"))
+    assert (number["coulomb_friction_n"], number["fit"]) == (0.1 + 0.2, 1.0)
+    assert (text["coulomb_friction_n"], text["samples"], text["fit"]) == (
+        "0.30000000000000004",
+        "2000",
+        "1.0",
+    )
+
+
+def test_a_kill_loses_nothing_finished(tmp_path):
+    path = tmp_path / "out.csv"
+    killed = subprocess.run(
+        [sys.executable, "-c", KILLED, str(path)], cwd=Path(__file__).parent, check=False
+    )
+    assert killed.returncode == -signal.SIGKILL
+    assert not path.exists()
+    with ResultsFile(path) as results:
+        assert recordings_in(results) == [("0, one", 1), ("1, two", 2)]
+    assert [row["recording"] for row in written(path)] == ["0, one", "1, two", "1, two"]
 
 
 @pytest.mark.parametrize(
     ("name", "content"),
-    [
-        ("data.csv", "time_s,position_m\n0,1\n"),
-        ("data.csv", "time_s,posi"),
-        ("data.jsonl", '{"a": 1}\n'),
-        ("data.jsonl", '{"a": 1}'),
-        ("data.jsonl", "[1, 2]\n"),
-        ("data.jsonl", "\0\0\0\n"),
-    ],
+    [("data.csv", "time_s,position_m\n0,1\n"), ("data.csv", ""), ("data.jsonl", '{"a": 1}\n')],
 )
 def test_the_file_of_another_program_is_left_alone(tmp_path, name, content):
     path = tmp_path / name
     path.write_text(content)
     before = path.stat()
-    with pytest.raises(ValueError, match="line 1 is no row of this command"):
+    with pytest.raises(ValueError, match=f"it is there, but not {name}.sqlite"):
         ResultsFile(path)
     assert path.read_text() == content
     assert path.stat().st_mtime_ns == before.st_mtime_ns
+    assert [*tmp_path.iterdir()] == [path]
 
 
-@pytest.mark.parametrize("ending", [".csv", ".jsonl"])
-def test_damage_before_the_end_is_told_by_its_line(tmp_path, ending):
-    path = tmp_path / f"out{ending}"
-    with ResultsFile(path) as results:
-        results.append(rows_of(0, 1, "first"))
-        results.append(rows_of(1, 2, "second"))
-        results.append(rows_of(2, 1, "third"))
-    lines = path.read_bytes().splitlines(keepends=True)
-    number = len(lines) - 1  # the last row of the second recording
-    for damaged in (
-        [*lines[: number - 1], b"\0\n", *lines[number:]],
-        lines[: number - 1] + lines[number:],
-    ):
-        path.write_bytes(b"".join(damaged))
-        with pytest.raises(ValueError, match=f"line {number} is no row"):
-            ResultsFile(path)
-        assert path.read_bytes() == b"".join(damaged)
+def test_another_database_is_left_alone(tmp_path):
+    path = tmp_path / "out.csv"
+    with sqlite3.connect(database_of(path)) as other:
+        other.execute("CREATE TABLE result (name)")
+    other.close()
+    before = database_of(path).read_bytes()
+    with pytest.raises(ValueError, match="results of another version: give another output"):
+        ResultsFile(path)
+    database_of(path).write_bytes(b"no database at all" * 100)
+    with pytest.raises(ValueError, match="file is not a database"):
+        ResultsFile(path)
+    database_of(path).write_bytes(before)
+    assert not path.exists()
 
 
 def test_one_writer_at_a_time(tmp_path):
     path = tmp_path / "out.csv"
     with ResultsFile(path) as results:
+        with pytest.raises(ValueError, match="another run is writing it"):
+            ResultsFile(path)
         results.append(rows_of(0, 1, "one"))
         with pytest.raises(ValueError, match="another run is writing it"):
             ResultsFile(path)
@@ -120,6 +165,8 @@ def test_one_writer_at_a_time(tmp_path):
             ResultsFile(path)
     with ResultsFile(path) as results:
         assert recordings_in(results) == []
+        with pytest.raises(ValueError, match="another run is writing it"):  # nothing was written
+            ResultsFile(path)
 
 
 def test_a_draft_that_a_kill_left_and_a_link_do_not_disturb(tmp_path):
@@ -131,5 +178,6 @@ def test_a_draft_that_a_kill_left_and_a_link_do_not_disturb(tmp_path):
         results.append(rows_of(1, 1, "two"))
         assert results.keep(lambda entry: entry.recording.startswith("1")) == 1
     assert link.is_symlink()
+    assert {one.name for one in tmp_path.iterdir()} == {"there.csv", "out.csv", "there.csv.sqlite"}
     with ResultsFile(path) as results:
         assert recordings_in(results) == [("1, two", 1)]

@@ -23,14 +23,15 @@ from valve_friction_ros.fleet import (
     Job,
     ResultsFile,
     Tally,
+    database_of,
     error_cells,
     find_recordings,
     identify_job,
     in_processes,
     key_cells,
-    row_format,
     tally,
     usable_cores,
+    writer_of,
 )
 from valve_friction_ros.fleet.row import Cell
 from valve_friction_ros.identification import FIXABLE
@@ -61,7 +62,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="FILE",
-        help="FILE.csv or FILE.jsonl (JSON lines); rows are in the order in which they finished",
+        help="FILE.csv or FILE.jsonl (JSON lines), written at the end and when interrupted; until "
+        "then the rows, in the order in which they finished, are in FILE.csv.sqlite",
     )
     parser.add_argument(
         "--valve",
@@ -91,7 +93,7 @@ def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once what would be refused of every recording."""
     if options.jobs < 1:
         raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
-    row_format(options.output)
+    writer_of(options.output)
     if not options.output.parent.is_dir():
         raise ValueError(f"{options.output}: there is no folder {options.output.parent}")
     reading_options(options)
@@ -101,7 +103,7 @@ def _require_sense(options: argparse.Namespace) -> None:
 
 
 def _planned(options: argparse.Namespace) -> dict[str, Plan]:
-    findings = find_recordings(options.folder, options.output)
+    findings = find_recordings(options.folder, options.output, database_of(options.output))
     if findings.skipped:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
         more = len(findings.skipped) - _SHOWN_SKIPPED

@@ -2,9 +2,8 @@
 
 from valve_friction_ros.fleet.discovery import Findings, FoundRecording, find_recordings
 from valve_friction_ros.fleet.job import Job, Options, identify_job
-from valve_friction_ros.fleet.results_file import Entry, ResultsFile
+from valve_friction_ros.fleet.results_file import Entry, ResultsFile, database_of, writer_of
 from valve_friction_ros.fleet.row import COLUMNS, error_cells, key_cells
-from valve_friction_ros.fleet.row_format import row_format
 from valve_friction_ros.fleet.tally import REFUSED, Reason, Tally, tally
 from valve_friction_ros.fleet.workers import DeadWorker, in_processes, usable_cores
 
@@ -20,12 +19,13 @@ __all__ = [
     "Reason",
     "ResultsFile",
     "Tally",
+    "database_of",
     "error_cells",
     "find_recordings",
     "identify_job",
     "in_processes",
     "key_cells",
-    "row_format",
     "tally",
     "usable_cores",
+    "writer_of",
 ]

@@ -116,7 +116,7 @@ def _can_be_written(name: str) -> bool:
     return name.isprintable()
 
 
-def find_recordings(folder: Path, left_out: Path | None = None) -> Findings:
+def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and in those below it.
 
     A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
@@ -128,8 +128,8 @@ def find_recordings(folder: Path, left_out: Path | None = None) -> Findings:
     ----------
     folder : Path
         Where to search.
-    left_out : Path, optional
-        A file that is neither a recording nor worth a word: the output.
+    *left_out : Path
+        Files that are neither recordings nor listed as skipped: the output.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def find_recordings(folder: Path, left_out: Path | None = None) -> Findings:
         raise ValueError(f"{folder}: no such folder")
     unreadable: list[OSError] = []
     recordings, skipped = [], []
-    own = None if left_out is None else left_out.resolve()
+    own = {path.resolve() for path in left_out}
     for place, folders, files in os.walk(folder, onerror=unreadable.append):
         here = Path(place)
         below = here.relative_to(folder)
@@ -153,7 +153,7 @@ def find_recordings(folder: Path, left_out: Path | None = None) -> Findings:
         folders[:] = sorted(set(folders) - closed)
         for name in files:
             path = here / name
-            if path.resolve() == own or is_valve_file(name):
+            if path.resolve() in own or is_valve_file(name):
                 continue
             if name.startswith(".") or not _is_recording(name) or not path.is_file():
                 skipped.append((below / name).as_posix())

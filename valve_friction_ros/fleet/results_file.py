@@ -1,18 +1,19 @@
-"""The output file of many identifications, which outlives the death of its writer."""
+"""The results of many identifications: kept in SQLite, written out as CSV or JSON lines."""
 
+import contextlib
 import csv
-import fcntl
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import json
+import sqlite3
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO
+from typing import TextIO
 
-from valve_friction_ros.fleet.row import Cell
-from valve_friction_ros.fleet.row_format import row_format
+from valve_friction_ros.fleet.row import COLUMNS, Cell
 
-__all__ = ["Entry", "ResultsFile"]
+__all__ = ["Entry", "ResultsFile", "database_of", "writer_of"]
 
 _Row = Mapping[str, Cell]
 
@@ -47,49 +48,88 @@ class Entry:
         return all(row["error"] for row in self.rows)
 
 
-def _entry(rows: Sequence[_Row]) -> Entry:
-    recording, content, settings = (
-        str(rows[0][column] or "") for column in ("recording", "content", "settings")
-    )
-    return Entry(recording, content, settings, tuple(rows))
+def _write_csv(stream: TextIO, rows: Iterable[_Row]) -> None:
+    writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
 
 
-def _flush(stream: BinaryIO) -> None:
-    stream.flush()
-    os.fsync(stream.fileno())
+def _write_json_lines(stream: TextIO, rows: Iterable[_Row]) -> None:
+    for row in rows:
+        stream.write(json.dumps(row, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-class ResultsFile:
-    """Rows that are appended as they finish, and are on the disk when `append` returns.
+_WRITERS = {".csv": _write_csv, ".jsonl": _write_json_lines}
 
-    The rows of a recording stand together. Those that a killed writer left incomplete, a torn
-    line or some of a bag's valves, are at the end of the file and are cut off when it is opened.
-    Only one process at a time can open it.
 
-    Parameters
-    ----------
-    path : Path
-        The file, made if it is not there; its ending tells the format.
+def writer_of(output: Path) -> Callable[[TextIO, Iterable[_Row]], None]:
+    """Return what writes rows in the format that the name of the output ends in.
 
     Raises
     ------
     ValueError
-        If the file is another program's, is damaged elsewhere than at its end, or another process
-        writes it.
-    OSError
-        If it cannot be opened.
+        If it is not known; the message lists the known ones.
+    """
+    known = _WRITERS.get(output.suffix.lower())
+    if known is None:
+        raise ValueError(f"{output}: the output must end in {' or '.join(_WRITERS)}")
+    return known
+
+
+def database_of(output: Path) -> Path:
+    """Return the file in which the rows of an output are kept, beside it."""
+    place = output.resolve()
+    return place.with_name(f"{place.name}.sqlite")
+
+
+class ResultsFile:
+    """Rows that are on the disk when `append` returns; leaving the context writes the output.
+
+    They are kept in the table ``result`` of `database_of` the output, in its columns and in the
+    order in which they were appended. Only one process at a time can open it.
+
+    Parameters
+    ----------
+    path : Path
+        The output; the ending of its name is the format.
+
+    Raises
+    ------
+    ValueError
+        If the output or its database is another program's, or the database cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._format = row_format(path)
-        self._stream: BinaryIO = path.open("a+b")  # leaves the time of change of a stranger alone
-        try:
-            self._lock(self._stream)
-            self._recover()
-        except BaseException:
-            self._stream.close()
-            raise
+        self._write = writer_of(path)
+        database = database_of(path)
+        if path.exists() and not database.exists():
+            raise ValueError(
+                f"{path}: it is there, but not {database.name}, which it would have been written "
+                "from: give another output, or move the file away"
+            )
+        with self._explained():
+            self._connection = sqlite3.connect(database, timeout=0)
+            try:
+                self._open()
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def _open(self) -> None:
+        """Take the database for this process alone, and see that it is one."""
+        self._connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+        self._connection.execute("PRAGMA journal_mode = WAL")  # one flush of the disk a recording
+        self._connection.execute("PRAGMA synchronous = FULL")
+        self._connection.execute("BEGIN EXCLUSIVE")
+        self._connection.execute(
+            f"CREATE TABLE IF NOT EXISTS result ({', '.join(COLUMNS)}, "
+            "PRIMARY KEY (recording, valve))"
+        )
+        self._connection.commit()
+        found = self._connection.execute("SELECT * FROM result LIMIT 0").description
+        if tuple(name for name, *_ in found) != COLUMNS:
+            raise ValueError(f"{self.path}: results of another version: give another output")
 
     def __enter__(self) -> "ResultsFile":
         return self
@@ -100,112 +140,50 @@ class ResultsFile:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Close the file."""
-        self._stream.close()
-
-    def _lock(self, stream: BinaryIO) -> None:
+        """Write the output and close the database."""
         try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ValueError(f"{self.path}: another run is writing it: wait for its end") from None
-
-    def _recover(self) -> None:
-        """Cut off what is incomplete; begin a new file with its header."""
-        end = max((place for place, _ in self._scan()), default=0)
-        self._stream.truncate(end)
-        if end == 0:
-            self._stream.write(self._format.header)
-        _flush(self._stream)
-        self._flush_folder()
-
-    def _flush_folder(self) -> None:
-        descriptor = os.open(self.path.resolve().parent, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
+            self._write_output()
         finally:
-            os.close(descriptor)
+            self._connection.close()
 
-    def _stranger(self, number: int) -> ValueError:
-        return ValueError(
-            f"{self.path}: line {number} is no row of this command and version: give another "
-            "output, or mend the file"
-        )
-
-    def _row(self, line: bytes, number: int) -> _Row:
+    @contextlib.contextmanager
+    def _explained(self) -> Iterator[None]:
         try:
-            row = self._format.decode(line)
-            if not row["recording"] or int(row["valves"] or 0) < 1:
-                raise self._stranger(number)
-        except (ValueError, csv.Error, TypeError):
-            raise self._stranger(number) from None
-        return row
+            yield
+        except sqlite3.Error as error:
+            locked = "another run is writing it: wait for its end"
+            cause = locked if "locked" in str(error) else str(error)
+            raise ValueError(f"{database_of(self.path)}: {cause}") from None
 
-    def _scan(self) -> Iterator[tuple[int, Entry | None]]:
-        """Go through the complete entries, each with the place where it ends in the file.
+    def _rows(self) -> Iterator[_Row]:
+        with self._explained():
+            for cells in self._connection.execute("SELECT * FROM result ORDER BY rowid"):
+                yield dict(zip(COLUMNS, cells, strict=True))
 
-        The header counts as an entry of nothing.
-        """
-        form = self._format
-        self._stream.seek(0)
-        rows: list[_Row] = []
-        place = 0
-        for number, line in enumerate(self._stream, start=1):
-            in_header = number == 1 and form.header
-            if not line.endswith(b"\n"):
-                expected = form.header if in_header else form.beginning
-                length = min(len(line), len(expected))
-                if line[:length] != expected[:length] or (in_header and len(line) > length):
-                    raise self._stranger(number)
-                return
-            place += len(line)
-            if in_header:
-                if line != form.header:
-                    raise self._stranger(number)
-                yield place, None
-                continue
-            rows.append(self._row(line, number))
-            entry = _entry(rows)
-            if rows[-1]["recording"] != entry.recording:
-                raise self._stranger(number)
-            if len(rows) == int(rows[-1]["valves"] or 0):
-                rows = []
-                yield place, entry
-
-    def entries(self) -> Iterator[Entry]:
-        """Read the complete entries, one by one."""
-        return (entry for _, entry in self._scan() if entry is not None)
-
-    def keep(self, wanted: Callable[[Entry], bool]) -> int:
-        """Drop the entries that are not wanted, all at once; return their number.
-
-        The file is written anew beside its place and renamed, so that a kill leaves the one or
-        the other.
-        """
-        dropped = sum(not wanted(entry) for entry in self.entries())
-        if dropped == 0:
-            return 0
+    def _write_output(self) -> None:
+        """Replace the output as a whole."""
         place = self.path.resolve()
         draft = place.with_name(f".{place.name}.draft")
-        stream: BinaryIO = draft.open("a+b")
-        try:
-            self._lock(stream)
-            stream.truncate(0)  # of what a kill left
-            stream.write(self._format.header)
-            for entry in self.entries():
-                if wanted(entry):
-                    stream.writelines(map(self._format.encode, entry.rows))
-            _flush(stream)
-            draft.rename(place)
-        except BaseException:
-            stream.close()
-            draft.unlink(missing_ok=True)
-            raise
-        self._stream.close()
-        self._stream = stream
-        self._flush_folder()
-        return dropped
+        with draft.open("w", encoding="utf-8", newline="") as stream:
+            self._write(stream, self._rows())
+        draft.replace(place)
+
+    def entries(self) -> Iterator[Entry]:
+        """Go through the recordings."""
+        for recording, group in groupby(self._rows(), lambda row: str(row["recording"])):
+            rows = tuple(group)
+            yield Entry(recording, str(rows[0]["content"]), str(rows[0]["settings"]), rows)
+
+    def keep(self, wanted: Callable[[Entry], bool]) -> int:
+        """Drop the entries that are not wanted, all at once; return their number."""
+        dropped = [(entry.recording,) for entry in self.entries() if not wanted(entry)]
+        with self._explained(), self._connection:
+            self._connection.executemany("DELETE FROM result WHERE recording = ?", dropped)
+        return len(dropped)
 
     def append(self, rows: Sequence[_Row]) -> None:
-        """Write the rows of a recording at the end; they are on the disk on return."""
-        self._stream.write(b"".join(map(self._format.encode, rows)))
-        _flush(self._stream)
+        """Add the rows of a recording, all at once; they are on the disk on return."""
+        marks = ", ".join("?" * len(COLUMNS))
+        cells = [[row.get(column) for column in COLUMNS] for row in rows]
+        with self._explained(), self._connection:
+            self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa: S608

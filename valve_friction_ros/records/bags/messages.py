@@ -5,12 +5,10 @@ from typing import Any
 
 from backports import zstd
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
 
-__all__ = ["TYPES", "UndecodableError", "decode", "encode", "header", "stamp_of"]
+from valve_friction_ros.records.bags.rosbags_internals import TYPES, decoded
 
-TYPES = get_typestore(Stores.ROS2_JAZZY)
-"""Message types; those of pressure and stem have not changed since ROS 2 began."""
+__all__ = ["UndecodableError", "decode", "encode", "header", "stamp_of"]
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _NANOSECONDS = 1_000_000_000
@@ -22,9 +20,6 @@ class UndecodableError(ValueError):
 
 def decode(data: bytes, kind: str) -> Any:
     """Decode a message, compressed by its recorder or not.
-
-    Bytes after its end are ignored: rclpy's serialisation may leave some there, which the
-    typestore's own `deserialize_cdr` would refuse.
 
     Raises
     ------
@@ -38,13 +33,10 @@ def decode(data: bytes, kind: str) -> Any:
             raise UndecodableError(str(error)) from None
     if len(data) < 4 or data[0] != 0 or data[1] > 1:
         raise UndecodableError("not in CDR")
-    definition = TYPES.get_msgdef(kind)
-    read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
     try:
-        message, _ = read(data[4:], 0, definition.cls, TYPES)
+        return decoded(data[4:], kind, bool(data[1]))
     except (SerdeError, struct.error, ValueError, IndexError) as error:
         raise UndecodableError(str(error)) from None
-    return message
 
 
 def encode(message: object, kind: str) -> bytes:

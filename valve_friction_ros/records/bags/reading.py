@@ -7,8 +7,8 @@ from pathlib import Path
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.files import DamagedFileError, opened, storage_files
-from valve_friction_ros.records.bags.salvage import Storage
+from valve_friction_ros.records.bags.files import opened, storage_files
+from valve_friction_ros.records.bags.storage import DamagedFileError, Storage
 from valve_friction_ros.records.bags.topics import Topic, TopicChoice, ValveTopics, valves_in
 from valve_friction_ros.records.bags.valve_feed import ValveFeed
 from valve_friction_ros.records.recorded_valve import RecordedValve

@@ -1,20 +1,18 @@
-"""What can still be read of a storage file that is damaged, or whose recorder was killed."""
+"""What can still be read of an MCAP file that is damaged, or whose recorder was killed."""
 
 import io
-import sqlite3
 import struct
 from binascii import crc32
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import BinaryIO
 
 from backports import zstd
 from lz4.frame import LZ4FrameDecompressor
 
-from valve_friction_ros.records.bags.sqlite_pages import messages_after
 from valve_friction_ros.records.bags.topics import Topic
 
-__all__ = ["SalvagedMcap", "SalvagedSqlite", "Storage", "write_ahead_log"]
+__all__ = ["SalvagedMcap"]
 
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x03, 0x04, 0x05, 0x06
 _ENDS = {0x00, 0x0F}
@@ -23,15 +21,6 @@ _MAGIC_SIZE = 8
 _WANTED = {_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK}
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
 _CHUNK_HEADER = struct.Struct("<QQQI")
-
-
-class Storage(Protocol):
-    """One storage file of a bag, open for reading."""
-
-    topics: Collection[Topic]
-
-    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Go through the messages of some topics in the order of their recording."""
 
 
 def _text(stream: io.BytesIO) -> str:
@@ -119,54 +108,3 @@ class SalvagedMcap:
                 channel, *_ = _MESSAGE_HEADER.unpack_from(content)
                 if channel in wanted:
                     yield wanted[channel], content[_MESSAGE_HEADER.size :]
-
-
-def write_ahead_log(path: Path) -> Path:
-    """Where SQLite keeps what it has not yet put into a database file."""
-    return path.with_name(f"{path.name}-wal")
-
-
-class SalvagedSqlite:
-    """A SQLite3 file read row by row until a row of it is missing or damaged.
-
-    Rows that are still in a write-ahead log beside the file are read as well, and rows that the
-    file still holds but no longer leads to.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        mode = "mode=ro" if write_ahead_log(path).exists() else "immutable=1"
-        self._uri = f"{path.absolute().as_uri()}?{mode}"
-        self._numbers: dict[int, Topic] = {}
-        for number, name, kind in self._rows("SELECT id, name, type FROM topics"):
-            self._numbers[number] = Topic(name, kind)
-        self.topics: Collection[Topic] = set(self._numbers.values())
-
-    def _rows(self, query: str) -> Iterator[tuple[Any, ...]]:
-        connection = sqlite3.connect(self._uri, uri=True)
-        try:
-            # Else SQLite refuses to open a file that is shorter than its header says.
-            connection.execute("PRAGMA writable_schema = ON")
-            yield from connection.execute(query)
-        except sqlite3.DatabaseError:
-            return
-        finally:
-            connection.close()
-
-    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
-        """Go through the messages of some topics in the order of their recording."""
-        wanted = {number: topic for number, topic in self._numbers.items() if topic in topics}
-        query = "SELECT id, topic_id, data FROM messages NOT INDEXED ORDER BY id"
-        last = 0
-        for row, number, data in self._rows(query):
-            last = row
-            if number in wanted and isinstance(data, bytes):
-                yield wanted[number], data
-        for message in messages_after(self._path, last):
-            if message.topic in wanted:
-                yield wanted[message.topic], message.data

@@ -16,7 +16,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.messages import TYPES, encode, header
+from valve_friction_ros.records.bags.messages import encode, header
+from valve_friction_ros.records.bags.rosbags_internals import TYPES
 from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, StreamNames
 from valve_friction_ros.streams.record_buffer import Snapshot
 from valve_friction_ros.streams.samples import Samples

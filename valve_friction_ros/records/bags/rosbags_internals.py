@@ -1,0 +1,100 @@
+"""All that is used of rosbags beyond its documented names: the file to mend when they move.
+
+Checked with rosbags 0.11.9; `test_rosbags_internals.py` names what a newer version lacks.
+
+- `McapReader`: the documented `Reader` judges a file by the ending of its name, and refuses an
+  MCAP file without index whose receive times go back, as those of several topics may.
+- The decoders of `Typestore.get_msgdef`: the documented `deserialize_cdr` refuses a message with
+  bytes after its end, which rclpy's serialisation may leave.
+"""
+
+import struct
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+from backports import zstd
+from rosbags.rosbag2 import ReaderError
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.typesys import Stores, get_typestore
+
+from valve_friction_ros.records.bags.storage import DamagedFileError
+from valve_friction_ros.records.bags.topics import Topic
+
+__all__ = ["TYPES", "McapFile", "decoded"]
+
+TYPES = get_typestore(Stores.ROS2_JAZZY)
+"""Message types; those of pressure and stem have not changed since ROS 2 began."""
+
+_DAMAGE = (
+    ReaderError,
+    zstd.ZstdError,
+    struct.error,
+    ArithmeticError,
+    AssertionError,
+    EOFError,
+    MemoryError,
+    OSError,
+    LookupError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+"""What `McapReader` lets through when a file is damaged."""
+
+
+def decoded(body: bytes, kind: str, little_endian: bool) -> Any:
+    """Decode the body of a CDR message, whatever follows its end."""
+    definition = TYPES.get_msgdef(kind)
+    read = definition.deserialize_cdr_le if little_endian else definition.deserialize_cdr_be
+    message, _ = read(body, 0, definition.cls, TYPES)
+    return message
+
+
+class McapFile:
+    """An undamaged MCAP file.
+
+    Parameters
+    ----------
+    path : Path
+        The file that messages name.
+    file : Path
+        The file to read: `path`, or what was unpacked of it.
+
+    Raises
+    ------
+    DamagedFileError
+        If it is damaged, now or while its messages are gone through.
+    """
+
+    def __init__(self, path: Path, file: Path) -> None:
+        self._path = path
+        self._reader = McapReader(file)
+        try:
+            self._reader.open()
+        except _DAMAGE as error:
+            cause = str(error).replace(str(file), path.name)
+            raise DamagedFileError(path, cause) from None
+        self._topics = {
+            connection.id: Topic(connection.topic, connection.msgtype)
+            for connection in self._reader.connections
+        }
+        self.topics: Collection[Topic] = set(self._topics.values())
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
+        """Go through the messages of some topics in the order of their recording."""
+        reader = self._reader
+        connections = [each for each in reader.connections if self._topics[each.id] in topics]
+        if not connections:
+            return
+        indexed = reader.chunks and all(chunk.channel_count for chunk in reader.chunks)
+        read = reader.messages if indexed else reader.messages_scan
+        try:
+            for connection, _, data in read(connections):
+                yield self._topics[connection.id], data
+        except _DAMAGE as error:
+            raise DamagedFileError(self._path, str(error)) from None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._reader.close()
