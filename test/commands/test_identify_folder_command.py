@@ -202,7 +202,7 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
         # The worker's libraries have one thread, which may change the order of a sum.
         assert float(row["coulomb_friction_n"]) == pytest.approx(friction.value, rel=1e-9)
         assert row["coulomb_friction_verdict"] == friction.verdict.value
-        assert float(row["rms_um"]) == pytest.approx(1e6 * result.rms, rel=1e-9)
+        assert float(row["rms_m"]) == pytest.approx(result.rms, rel=1e-9)
         assert (row["samples"], row["duration_s"]) == ("2000", "19.99")
 
 

@@ -1,31 +1,14 @@
 """A row of the output: its columns, with units in their names, and its cells."""
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from valve_friction_ros.identification import PARAMETER_UNITS, Parameter, Result
+from valve_friction_ros.identification import PARAMETER_UNITS, Result, parameter_columns
 from valve_friction_ros.model import Recording
 
 __all__ = ["COLUMNS", "Cell", "error_cells", "key_cells", "result_cells"]
 
 Cell = str | float | int | None
-
-_SUFFIXES = {
-    "kg": "_kg",
-    "N": "_n",
-    "N·s/m": "_n_s_per_m",
-    "N/m": "_n_per_m",
-    "m/s": "_m_per_s",
-    "s": "_s",
-    "1": "",
-}
-
-
-def _parameter_columns(name: str) -> tuple[str, str, str]:
-    suffix = _SUFFIXES[PARAMETER_UNITS[name]]
-    return f"{name}{suffix}", f"{name}_half_width{suffix}", f"{name}_verdict"
-
 
 COLUMNS: tuple[str, ...] = (
     "recording",
@@ -34,9 +17,9 @@ COLUMNS: tuple[str, ...] = (
     "content",
     "settings",
     "method",
-    *(column for name in PARAMETER_UNITS for column in _parameter_columns(name)),
+    *(column for name in PARAMETER_UNITS for column in parameter_columns(name, None)),
     "fit",
-    "rms_um",
+    "rms_m",
     "samples",
     "duration_s",
     "warnings",
@@ -47,18 +30,6 @@ COLUMNS: tuple[str, ...] = (
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _parameter_cells(name: str, parameter: Parameter | None) -> Mapping[str, Cell]:
-    columns = _parameter_columns(name)
-    if parameter is None:
-        return dict.fromkeys(columns)
-    cells = (_number(parameter.value), _number(parameter.half_width), parameter.verdict.value)
-    return dict(zip(columns, cells, strict=True))
 
 
 def result_cells(
@@ -77,16 +48,16 @@ def result_cells(
     notes : sequence of str
         Notes of the reading, which join the warnings.
     """
-    cells: dict[str, Cell] = {"valve": _one_line(valve), "method": result.method}
+    shown = result.to_dict()
+    cells: dict[str, Cell] = {"valve": _one_line(valve), "method": shown["method"]}
     for name in PARAMETER_UNITS:
-        cells |= _parameter_cells(name, result.parameters.get(name))
-    warnings = "; ".join(map(_one_line, (*notes, *result.warnings)))
+        cells |= parameter_columns(name, shown["parameters"].get(name))
     return cells | {
-        "fit": _number(result.fit),
-        "rms_um": _number(1e6 * result.rms),
+        "fit": shown["fit"],
+        "rms_m": shown["rms"],
         "samples": len(recording),
         "duration_s": round((len(recording) - 1) * recording.sample_period, 9),
-        "warnings": warnings or None,
+        "warnings": "; ".join(map(_one_line, (*notes, *shown["warnings"]))) or None,
     }
 
 

@@ -14,7 +14,12 @@ from valve_friction_ros.identification.published.method import identify_publishe
 from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
 from valve_friction_ros.identification.refined.method import identify_refined
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.rendering import parameter_mapping, plain, two_digits
+from valve_friction_ros.identification.rendering import (
+    parameter_columns,
+    parameter_mapping,
+    plain,
+    two_digits,
+)
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
 from valve_friction_ros.identification.signature.force_balance import identify_signature
@@ -66,6 +71,7 @@ __all__ = [
     "identify_refined",
     "identify_signature",
     "method_named",
+    "parameter_columns",
     "parameter_mapping",
     "percentage",
     "plain",

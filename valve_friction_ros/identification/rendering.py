@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+from valve_friction_ros.identification.units import column_suffix
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "frame_of",
     "html_of",
+    "parameter_columns",
     "parameter_mapping",
     "plain",
     "table_of",
@@ -54,6 +56,31 @@ def parameter_mapping(parameter: Parameter) -> dict[str, Any]:
         "reason": parameter.reason,
         "published": plain(parameter.published),
         "unit": parameter.unit,
+    }
+
+
+def parameter_columns(name: str, shown: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a parameter as columns of a table of rows, with the unit in their names.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    shown : mapping of str to object, or None
+        Its `parameter_mapping`; None leaves the cells empty.
+
+    Returns
+    -------
+    dict of str to float, str or None
+        Value, standard error, half width and verdict.
+    """
+    cells = {} if shown is None else shown
+    unit = column_suffix(name)
+    return {
+        f"{name}{unit}": cells.get("value"),
+        f"{name}_standard_error{unit}": cells.get("standard_error"),
+        f"{name}_half_width{unit}": cells.get("half_width"),
+        f"{name}_verdict": cells.get("verdict"),
     }
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-__all__ = ["CLOCK_OFFSET", "PARAMETER_UNITS", "UNITS"]
+__all__ = ["CLOCK_OFFSET", "PARAMETER_UNITS", "UNITS", "column_suffix"]
 
 CLOCK_OFFSET = "clock_offset"
 """Parameter name. Its value, s, is positive where the stem's stamps are late."""
@@ -30,3 +30,17 @@ PARAMETER_UNITS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Unit of every parameter that a result can hold; those after `UNITS` only if demanded."""
+
+_SUFFIXES = {
+    "kg": "_kg",
+    "N": "_n",
+    "N·s/m": "_n_s_per_m",
+    "N/m": "_n_per_m",
+    "m/s": "_m_per_s",
+    "s": "_s",
+}
+
+
+def column_suffix(parameter: str) -> str:
+    """Return the unit of a parameter as it ends the name of a column; empty for a pure number."""
+    return _SUFFIXES.get(PARAMETER_UNITS.get(parameter, ""), "")

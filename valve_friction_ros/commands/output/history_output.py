@@ -15,7 +15,7 @@ from rich.table import Table
 from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
 from valve_friction_ros.identification import (
-    PARAMETER_UNITS,
+    parameter_columns,
     parameter_mapping,
     plain,
     two_digits,
@@ -25,15 +25,6 @@ from valve_friction_ros.records.whole_file import write_whole
 __all__ = ["as_json", "print_table", "write_csv"]
 
 _LEVELS = ("OK", "WARN", "ERROR")
-_COLUMN_UNITS = {
-    "N·s/m": "_n_s_per_m",
-    "N/m": "_n_per_m",
-    "m/s": "_m_per_s",
-    "kg": "_kg",
-    "N": "_n",
-    "s": "_s",
-    "1": "",
-}
 
 
 def time_text(time: float, timespec: str = "milliseconds") -> str:
@@ -117,11 +108,7 @@ def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
 def _parameter_cells(entry: HistoryEntry) -> dict[str, object]:
     cells: dict[str, object] = {}
     for name, one in entry.parameters.items():
-        unit = _COLUMN_UNITS.get(PARAMETER_UNITS.get(name, "1"), "")
-        cells[f"{name}{unit}"] = one.value
-        cells[f"{name}_standard_error{unit}"] = one.standard_error
-        cells[f"{name}_half_width{unit}"] = one.half_width
-        cells[f"{name}_verdict"] = one.verdict.value
+        cells |= parameter_columns(name, parameter_mapping(one))
     return cells
 
 
