@@ -150,7 +150,7 @@ def test_methods_return_the_same_type(loose_record, benches):
     assert published.method == "published"
     friction = published.parameters["coulomb_friction"]
     assert friction.value == friction.published
-    assert friction.reason == "the published method states no interval"
+    assert friction.reason == "the published method gives no interval"
     assert math.isnan(published.rms)
 
 

@@ -1,4 +1,4 @@
-"""What a notebook needs beside the rooms' own functions; users find it in the package itself."""
+"""Functions of the front door that combine several rooms; the package itself offers them."""
 
 from collections.abc import Mapping
 from os import PathLike
@@ -21,7 +21,7 @@ __all__ = ["compare", "read_recording"]
 
 _COLUMNS = ("time_s", "pressure_pa", "position_m")
 _ANY_SENSOR = Valve(diaphragm_area=1.0)
-"""Stands in where no valve is given: its sensors have no range, its stem no stops."""
+"""The default valve: its sensors have no range, its stem has no stops."""
 
 
 def read_recording(
@@ -38,10 +38,10 @@ def read_recording(
         CSV file (may be gzipped) or bag (MCAP or SQLite3, folder or file); or a pandas frame or
         a mapping with the columns ``time_s``, ``pressure_pa`` and ``position_m``.
     valve : Valve, optional
-        Range of the pressure sensor, and the travel that a position in percent is a share of. A
-        file that holds ``force_n`` needs it to turn the force into a pressure.
+        Range of the pressure sensor, and the travel for positions in percent. A file with
+        ``force_n`` needs it to convert the force into a pressure.
     name : str, optional
-        Which valve of a bag, by its namespace; may be left out for a bag of one valve.
+        Valve of a bag, by its namespace; needed for a bag of several valves.
     options : ReadingOptions, optional
         Columns, units and layout of a CSV file, topics of a bag, the part to read.
 
@@ -55,7 +55,7 @@ def read_recording(
     ValueError
         If the source cannot be read, a column is missing, or the bag holds no such valve.
     RefusalError
-        If the samples make no record, as with a gap.
+        If the samples do not make a record, for example because of a gap.
 
     Examples
     --------
@@ -79,14 +79,14 @@ def read_recording(
     for each in recorded:
         if each.name.strip("/") == name.strip("/"):
             return each.recording()
-    raise ValueError(f"{source}: there is no valve {name!r} among {', '.join(names)}")
+    raise ValueError(f"{source}: no valve is named {name!r}; choose from {', '.join(names)}")
 
 
 def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
-    """Return a column as numbers; raises ValueError, which names it."""
+    """Return a column as numbers; raise ValueError with its name if that fails."""
     if name not in columns:
         known = ", ".join(map(str, columns))
-        raise ValueError(f"there is no column {name!r} among {known}: rename the column")
+        raise ValueError(f"there is no column {name!r} among {known}: rename a column")
     values = np.asarray(columns[name], dtype=np.float64)
     finite = np.isfinite(values)
     if not finite.all():
@@ -122,12 +122,12 @@ def compare(
     Returns
     -------
     Diagnosis
-        Level, NE 107 status signal, a sentence for people, and the ratio with its interval.
+        Level, NE 107 status signal, a sentence, and the ratio with its interval.
 
     Raises
     ------
     RefusalError
-        If `baseline` is a result whose Coulomb friction is no baseline.
+        If `baseline` is a result whose Coulomb friction is not identifiable or not above zero.
 
     Examples
     --------

@@ -145,7 +145,7 @@ class TestJson:
                 low, high = entry["interval"]
                 assert low < entry["value"] < high
         mass = answer["parameters"]["mass"]
-        assert mass["reason"].endswith("; 1.6 kg assumed")
+        assert mass["reason"].endswith("; 1.6 kg is assumed")
         assert mass["published"] == 1.6  # assumed there as well
 
     def test_without_a_published_estimate(self, result):

@@ -113,7 +113,7 @@ class TestRecordsThatCannotTell:
             (
                 lambda r: {"position_m": 1e3 * r.position},
                 "the stem position runs from 3.691 to 23.89 m, the travel from 0 to 0.02857 m: "
-                "check for swapped signals, the unit (m)",
+                "check that the signals are not swapped, and check unit (m)",
             ),
             (
                 lambda r: {"position_m": 0.01 + 0.01 * r.position},
@@ -121,15 +121,15 @@ class TestRecordsThatCannotTell:
             ),
             (
                 lambda r: {"position_m": glide(r, 0.4)},
-                "the stem lies at its lower stop for ",
+                "the stem is at its lower stop for ",
             ),
             (
                 lambda r: {"position_m": BENCH_VALVE.travel - glide(r, 0.4)},
-                "the stem lies at its upper stop for ",
+                "the stem is at its upper stop for ",
             ),
             (
                 lambda r: {"position_m": 0.028 - r.position},
-                "the stem moves against the pressure: count the position in the direction",
+                "the stem moves against the pressure: invert the position",
             ),
             (
                 lambda r: {"pressure_pa": np.roll(r.pressure, len(r) // 4)},

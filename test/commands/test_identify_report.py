@@ -98,7 +98,7 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     software = page.table("setting")["software"][0].split(", ")
     assert f"valve_friction_ros {valve_friction_ros.__version__}" in software
     assert {"numpy", "scipy", "Python"} < {each.split()[0] for each in software}
-    assert page.table("record")["samples"] == ("1000, one every 10 ms",)
+    assert page.table("record")["samples"] == ("1000, sampled every 10 ms",)
 
 
 def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
@@ -115,7 +115,7 @@ def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
     )
     low, high = diagnosis["ratio_interval"]
     assert page.lead.startswith(
-        f"The friction has grown, {ratio:.2f} times that of the healthy valve (95 % sure: "
+        f"The friction has grown, {ratio:.2f} times that of the healthy valve (95 % interval: "
         f"{low:.2f} to {high:.2f})"
     )
     assert page.lead.endswith(": plan work on the packing for the next stop.")
@@ -127,7 +127,7 @@ def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
 def test_without_a_baseline(reported, quick_csv):
     page, answer = reported(quick_csv)
     assert "diagnosis" not in answer
-    assert "cannot be said without a baseline" in page.lead
+    assert "set a baseline, the friction of the healthy valve" in page.lead
     assert "excess friction" not in page.table("friction")
 
 

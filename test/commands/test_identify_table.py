@@ -65,8 +65,8 @@ class TestTable:
         misfit = result.misfit
         share = f"{100 * misfit.rms / BENCH_VALVE.travel:.2g} % of travel"
         assert f"fit {100 * misfit.fit:.2f} %: the refined model's stem is" in words
-        assert f"{misfit.rms * 1e6:.3g} µm rms from the measured one, {share}; " in words
-        assert f"; {misfit.systematic * 1e6:.3g} µm of it are not noise" in words
+        assert f"{misfit.rms * 1e6:.3g} µm rms from the measured stem, {share}; " in words
+        assert f"; {misfit.systematic * 1e6:.3g} µm of it is not noise" in words
         sweep = answer["evidence"]
         assert f"threshold δv {sweep['threshold']:.4g} m/s, {sweep['samples']} samples" in words
         assert f"window 31 samples; refined from {answer['derivative_window']}" in words

@@ -182,7 +182,7 @@ class TestRefusals:
     def test_no_model_without_these(self, refused, estimate, other_csv, valve_options, name):
         path = estimate(**{name: None})
         message = refused(other_csv, *valve_options, "--estimate", path)
-        assert f"{path}: the estimate has no {name}" in message
+        assert f"{path}: {name} was not identified, and a model needs it" in message
 
     @pytest.mark.parametrize(
         ("content", "cause"),

@@ -56,7 +56,7 @@ def with_values(result):
 def unknown():
     """Function of a name: a parameter that is not identifiable."""
 
-    def build(name="coulomb_friction", reason="the record does not tell it"):
+    def build(name="coulomb_friction", reason="the record does not determine it"):
         nan = float("nan")
         return Parameter(name, nan, nan, nan, Verdict.NOT_IDENTIFIABLE, reason)
 

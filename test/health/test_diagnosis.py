@@ -172,11 +172,11 @@ class TestUnknownFriction:
         assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
         assert found.ratio is None
         assert found.message == (
-            "coulomb friction is not identifiable: the record does not tell it"
+            "coulomb friction is not identifiable: the record does not determine it"
         )
 
     @pytest.mark.parametrize(("bound", "collapsed"), [(1.5, True), (57.0, True), (57.1, False)])
-    def test_too_small_to_be_told_has_collapsed(self, with_values, unknown, bound, collapsed):
+    def test_too_small_to_be_identified_has_collapsed(self, with_values, unknown, bound, collapsed):
         """Half of the least that the baseline can be, 128 − 14 N, is 57 N."""
         vanished = dataclasses.replace(unknown(), magnitude_bound=bound)
         result = with_values(coulomb_friction=vanished)
@@ -189,7 +189,7 @@ class TestUnknownFriction:
             )
             assert found.message == (
                 "friction collapsed, the packing may leak: coulomb friction is too small to be "
-                f"told, {bound:.2g} N at the most; its baseline is 128 N"
+                f"identified, at most {bound:.2g} N; its baseline is 128 N"
             )
         else:
             assert found.level == Level.OK
@@ -202,7 +202,8 @@ class TestUnknownFriction:
         assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
         assert found.ratio is None
         assert found.message == (
-            "coulomb friction is -20 ± 3 N, which cannot be: check the direction of both signals"
+            "coulomb friction is -20 ± 3 N, and friction is above zero: check the direction of "
+            "both signals"
         )
 
 

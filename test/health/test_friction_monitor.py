@@ -171,8 +171,8 @@ class TestBaseline:
         with pytest.raises(RefusalError) as refusal:
             monitor.set_baseline()
         assert str(refusal.value) == (
-            "coulomb friction is not identifiable, so it is no baseline: "
-            "the record does not tell it"
+            "coulomb friction is not identifiable, so it cannot be the baseline: "
+            "the record does not determine it"
         )
         assert monitor.baseline == before
         assert monitor.diagnosis().level == Level.OK

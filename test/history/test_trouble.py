@@ -163,8 +163,8 @@ def test_a_folder_in_place_of_the_file(tmp_path):
 def test_newer_schema(history):
     change(history, f"PRAGMA user_version = {schema.SCHEMA_VERSION + 1}")
     expected = (
-        f"written by a newer version of this package (schema {schema.SCHEMA_VERSION + 1}, this one "
-        f"knows {schema.SCHEMA_VERSION}): update the package, or name another history_file"
+        f"written by a newer version of this package (schema {schema.SCHEMA_VERSION + 1}, this "
+        f"version knows {schema.SCHEMA_VERSION}): update the package, or name another history_file"
     )
     for action in (HistoryFile.prepare, HistoryFile.entries):
         assert told(history, action) == expected
@@ -179,7 +179,7 @@ def test_another_programs_database(tmp_path, statement):
     history = HistoryFile(tmp_path / "theirs.sqlite")
     change(history, statement)
     before = history.path.read_bytes()
-    assert told(history) == "another program's database: name another history_file"
+    assert told(history) == "the database of another program: name another history_file"
     assert history.path.read_bytes() == before
 
 
@@ -187,7 +187,8 @@ def test_no_database(tmp_path):
     history = HistoryFile(tmp_path / "history.sqlite")
     history.path.write_bytes(b"nothing of the kind" * 100)
     expected = (
-        "file is not a database: name the right file, or move this one away, and a new one is begun"
+        "file is not a database: name the right file, or move this file away: the node then "
+        "begins a new file"
     )
     assert told(history) == expected
     assert told(history, HistoryFile.entries) == expected
@@ -206,7 +207,9 @@ def test_damaged_pages(history):
 def test_an_empty_file_is_a_new_history(tmp_path):
     history = HistoryFile(tmp_path / "history.sqlite")
     history.path.touch()
-    assert told(history, HistoryFile.entries) == "there is nothing in it"
+    assert (
+        told(history, HistoryFile.entries) == "the file is empty: no identification has been stored"
+    )
     history.add(success())
     assert is_whole(history)
 
@@ -215,7 +218,7 @@ def test_held_by_another(history, monkeypatch):
     monkeypatch.setattr(schema, "_PATIENCE", 0.05)
     holder = sqlite3.connect(history.path, isolation_level=None)
     holder.execute("BEGIN IMMEDIATE")
-    assert told(history) == "database is locked: find the process that holds it"
+    assert told(history) == "database is locked: find the process that holds it, and end it"
     assert len(history.entries()) == 1  # reading is not held up
     holder.execute("ROLLBACK")
     holder.close()

@@ -95,7 +95,7 @@ def test_baseline_is_a_parameter(live):
     values = values_of(status)
     assert float(values["coulomb_friction_ratio"]) == pytest.approx(2.02, rel=1e-3)
     assert float(values["mass published [kg]"]) == 1.0
-    assert "published estimate: the record does not tell the mass" in values["warnings"]
+    assert "published estimate: the record does not determine the mass" in values["warnings"]
 
     assert live.client.set_together(NODE, {"baseline_coulomb_friction": 600.0}).successful
     values = live.client.status_values(lambda status: status.level == OK, "OK")

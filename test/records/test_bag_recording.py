@@ -252,7 +252,10 @@ class TestBadSamples:
     def test_one_topic_is_silent(self, tmp_path):
         messages = list(with_pressure())
         bag = write_bag(tmp_path / "bag", [messages[1], *messages[::2]])
-        assert problem(bag) == ", /fv_101: only one sample of /fv_101/stem_state"
+        assert problem(bag) == (
+            ", /fv_101: only one sample of /fv_101/stem_state: "
+            "check that it is sampled continuously"
+        )
 
 
 def without_summary(path):
@@ -465,7 +468,10 @@ class TestNoBags:
             database.execute("DELETE FROM messages")
         database.close()
         assert problem(file).startswith(", /fv_101: no samples of /fv_101/actuator_pressure")
-        assert problem(bag) == ", /fv_101: only one sample of /fv_101/actuator_pressure"
+        assert problem(bag) == (
+            ", /fv_101: only one sample of /fv_101/actuator_pressure: "
+            "check that it is sampled continuously"
+        )
 
     def test_ros_1(self, tmp_path):
         path = tmp_path / "record.bag"

@@ -167,7 +167,7 @@ class TestUnitsAndLayout:
         form = CsvFormat(layout=CsvLayout(";", ","))
         path = write([HEADER.replace(",", ";"), "0,0;0,001;1e5", "0,1;0,00.2;1e5"])
         assert refused(path, form=form) == (
-            "row 3, column 'position_m': '0,00.2' is not a number: mend it or delete the row"
+            "row 3, column 'position_m': '0,00.2' is not a number: correct it or delete the row"
         )
 
     def test_units(self, write):
@@ -261,7 +261,7 @@ class TestStretch:
 
     def test_nothing_in_it(self, write):
         message = refused(write([HEADER, *GOOD]), stretch=Stretch(begin=1.0))
-        assert message == "there are no rows in the stretch that is asked for"
+        assert message == "the chosen stretch holds no rows: choose another begin or end"
 
     @pytest.mark.parametrize("bad", [{"begin": 2, "end": 2}, {"begin": math.nan}, {"last": 0}])
     def test_impossible(self, bad):
@@ -296,7 +296,7 @@ class TestColumns:
 
     def test_twice(self, write):
         path = write(["time_s,position_m,pressure_pa,position_m", *(row + ",0" for row in GOOD)])
-        assert refused(path) == "column 'position_m' is there twice: rename one of them"
+        assert refused(path) == "two columns are named 'position_m': rename one of them"
 
 
 class TestEntries:
@@ -316,7 +316,7 @@ class TestEntries:
     def test_no_number(self, write, entry, quoted):
         path = write(with_row(12, f"0.01,{entry},1e5"))
         assert refused(path) == (
-            f"row 12, column 'position_m': {quoted} is not a number: mend it or delete the row"
+            f"row 12, column 'position_m': {quoted} is not a number: correct it or delete the row"
         )
 
     def test_missing_in_a_row(self, write):
@@ -356,8 +356,8 @@ class TestEntries:
         else:
             assert refused(path) == (
                 f"row 12, column 'pressure_pa': {pressure:g} Pa is outside the sensor's range 0 "
-                "to 250000 Pa: use a stretch of the record without it, name its unit, or mend the "
-                "range"
+                "to 250000 Pa: use a stretch of the record without it, name its unit, or correct "
+                "the range"
             )
 
 
@@ -398,7 +398,9 @@ class TestTimes:
         )
 
     def test_one_sample(self, write):
-        assert refused(write([HEADER, GOOD[0]])) == "only one sample of pressure_pa"
+        assert refused(write([HEADER, GOOD[0]])) == (
+            "only one sample of pressure_pa: check that it is sampled continuously"
+        )
 
 
 class TestUnreadableFiles:

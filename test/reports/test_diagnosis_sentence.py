@@ -17,7 +17,7 @@ NAN = float("nan")
 def ratio_told(value, share):
     """The ratio with the interval of a relative half width of `share`, as the sentence has it."""
     low, high = value * math.exp(-share), value * math.exp(share)
-    return f"{value:.2f} times that of the healthy valve (95 % sure: {low:.2f} to {high:.2f})"
+    return f"{value:.2f} times that of the healthy valve (95 % interval: {low:.2f} to {high:.2f})"
 
 
 @pytest.mark.parametrize(
@@ -49,21 +49,21 @@ def ratio_told(value, share):
             2.04,
             f"The friction is normal, {ratio_told(1.02, 0.02)}",
             "3.6 %",
-            "nothing needs to be done",
+            "no action is needed",
         ),
         (
             150.0,
             75.0,
             f"The friction has perhaps grown, {ratio_told(1.5, 0.5)}",
             "5.2 %",
-            "identify it again from a longer record with more strokes before anything is done",
+            "before any work, identify it again from a longer record with more strokes",
         ),
         (
             45.0,
             22.5,
             f"The friction has perhaps collapsed, {ratio_told(0.45, 0.5)}",
             "1.6 %",
-            "identify it again from a longer record with more strokes before anything is done",
+            "before any work, identify it again from a longer record with more strokes",
         ),
     ],
 )
@@ -83,14 +83,14 @@ def test_limits_are_those_of_the_record(with_friction):
 def test_without_a_baseline(with_friction):
     assert diagnosis_sentence(with_friction(152.7, 1.2)) == (
         "The friction is 152.7 ± 1.2 N, and the stem ignores reversals smaller than 5.3 % of its "
-        "travel: whether it has grown cannot be said without a baseline, the friction of the "
-        "healthy valve."
+        "travel: to find out whether it has grown, set a baseline, the friction of the healthy "
+        "valve."
     )
 
 
 def test_a_weak_or_a_given_number_is_called_so(with_friction):
     weak = with_friction(400.0, 30.0, Verdict.WEAK, "two strokes only", baseline=BASELINE)
-    assert ", a weak estimate (two strokes only), and the stem" in diagnosis_sentence(weak)
+    assert ", with the verdict weak (two strokes only), and the stem" in diagnosis_sentence(weak)
     given = with_friction(150.0, 0.0, Verdict.FIXED, "given")
     assert diagnosis_sentence(given).startswith(
         "The friction is 150 N, which was given and not identified, and the stem"
@@ -100,22 +100,22 @@ def test_a_weak_or_a_given_number_is_called_so(with_friction):
 def test_what_is_not_identifiable_has_no_number(with_friction):
     record = with_friction(NAN, NAN, Verdict.NOT_IDENTIFIABLE, "too few strokes", baseline=BASELINE)
     assert diagnosis_sentence(record) == (
-        "This record does not tell the friction (too few strokes): move the valve through several "
-        "fast strokes both ways and identify it again."
+        "This record does not determine the friction (too few strokes): move the valve through "
+        "several fast strokes in both directions and identify it again."
     )
 
 
 def test_an_impossible_friction_names_the_signals(with_friction):
     assert diagnosis_sentence(with_friction(-20.0, baseline=BASELINE)) == (
-        "The friction comes out as -20 N, which cannot be: check the direction of both signals and "
-        "identify it again."
+        "The identified friction is -20 N, and friction is above zero: check the direction of both "
+        "signals and identify it again."
     )
 
 
 def test_a_model_that_does_not_describe_the_valve_comes_first(with_friction, identified):
     misfit = dataclasses.replace(identified.result.misfit, systematic=40e-6, tolerated=10e-6)
     doubt = (
-        "To be taken with caution, since the model does not describe this valve (40 µm of the "
+        "Use this with caution, because the model does not describe this valve (40 µm of the "
         "stem's motion remain unexplained): the friction "
     )
     normal = with_friction(100.0, baseline=BASELINE, misfit=misfit)

@@ -103,7 +103,7 @@ class TestBadSamples:
         fill(buffer, 100, first=502)
         assert len(buffer) == 1200
         assert refused(buffer) == (
-            f"bad samples in the window: {cause} (2 samples); mend the source, then clear the "
+            f"bad samples in the window: {cause} (2 samples); correct the source, then clear the "
             "buffer or wait until they have left it"
         )
 

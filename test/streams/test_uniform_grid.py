@@ -99,7 +99,7 @@ class TestOverlap:
             uniform_recording(signal(every(1, 101), pressure), stem)
         assert str(refusal.value) == (
             "actuator_pressure and stem_state do not overlap in time (stem_state begins "
-            f"{later / 1e3:.3g} s later): their clocks differ, or one of them has stopped"
+            f"{later / 1e3:.3g} s later): check that their clocks agree and that both are recorded"
         )
 
 
@@ -173,8 +173,8 @@ class TestGaps:
         with pytest.raises(GapError) as refusal:
             uniform_recording(*((cut, whole) if gappy == "actuator_pressure" else (whole, cut)))
         assert str(refusal.value) == (
-            f"gap of 0.01 s in {gappy}, 0.007 s after its first sample: use a record without it, "
-            "or clear the buffer and gather anew"
+            f"gap of 0.01 s in {gappy}, 0.007 s after its first sample: use a record without a "
+            "gap, or clear the buffer and record again"
         )
         assert refusal.value.sample == 8
         assert refusal.value.seconds == 0.010000001
@@ -197,8 +197,8 @@ class TestTooLittle:
     @pytest.mark.parametrize(("missing", "name"), [(0, "actuator_pressure"), (1, "stem_state")])
     def test_nothing_and_one(self, missing, name):
         for count, message in (
-            (0, f"no samples of {name}: is it published, and on this topic?"),
-            (1, f"only one sample of {name}"),
+            (0, f"no samples of {name}: check that it is published, and on this topic"),
+            (1, f"only one sample of {name}: check that it is sampled continuously"),
         ):
             signals = [signal(every(1, 30), pressure), signal(every(1, 30), position)]
             signals[missing] = Samples(*(column[:count] for column in signals[missing]))

@@ -28,9 +28,7 @@ def require_picture_file(path: Path) -> None:
             f"{path}: the ending is not a picture format; choose from .{', .'.join(endings)}"
         )
     if not path.parent.is_dir():
-        raise ValueError(
-            f"{path}: the folder {path.parent} does not exist: create it, or name another folder"
-        )
+        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or name another")
 
 
 def save_picture(figure: Figure, path: Path) -> None:

@@ -41,13 +41,13 @@ class Baseline:
     half_width: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a baseline that nothing can be compared with."""
+        """Refuse a baseline that is not above zero."""
         require_positive("baseline_coulomb_friction", self.coulomb_friction)
         require_non_negative("half_width", self.half_width)
 
     @classmethod
     def of(cls, result: Result) -> "Baseline":
-        """Take the Coulomb friction of a result as baseline.
+        """Return the Coulomb friction of a result as baseline.
 
         Raises
         ------
@@ -57,17 +57,21 @@ class Baseline:
         friction = result.parameters["coulomb_friction"]
         if math.isnan(friction.value):
             raise RefusalError(
-                f"coulomb friction is not identifiable, so it is no baseline: {friction.reason}"
+                "coulomb friction is not identifiable, so it cannot be the baseline: "
+                f"{friction.reason}"
             )
         if friction.value <= 0:
-            raise RefusalError(f"a coulomb friction of {friction.value:.4g} N is no baseline")
+            raise RefusalError(
+                f"a coulomb friction of {friction.value:.4g} N cannot be a baseline: check the "
+                "direction of both signals, then identify again"
+            )
         return cls(friction.value, friction.half_width)
 
     def compared_with(self, friction: Parameter) -> Ratio:
         """Ratio of an identified friction to the baseline; nan where it is not identifiable.
 
         The relative half widths of two independent estimates add in squares, and the interval
-        is symmetric in the logarithm, so that a ratio and its inverse say the same.
+        is symmetric in the logarithm, so that a ratio and its inverse have the same interval.
         """
         ratio = friction.value / self.coulomb_friction
         if not ratio > 0:

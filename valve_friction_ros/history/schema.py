@@ -238,7 +238,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     except OSError as error:
         raise HistoryError(f"{path}: {error.strerror}: check the folder") from None
     if not is_there:
-        raise HistoryError(f"{path}: the file does not exist: check its name")
+        raise HistoryError(f"{path}: there is no such file: check its name")
     with _connection(path, _reading_mode(path)) as connection:
         if _is_new(path, connection):
             raise HistoryError(f"{path}: the file is empty: no identification has been stored")

@@ -221,7 +221,7 @@ def read_table(
     except (ValueError, IndexError):
         raise ValueError(f"{path}: {_first_bad_entry(path, wanted, layout)}") from None
     if table.size == 0:
-        raise ValueError(f"{path}: the file has no rows under its header")
+        raise ValueError(f"{path}: there are no rows under the header")
     columns = {name: table[:, index] for index, name in enumerate(wanted)}
     return CsvTable(path, layout, columns, np.arange(table.shape[0]))
 

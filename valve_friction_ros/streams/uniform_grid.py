@@ -53,7 +53,7 @@ def _checked(name: str, samples: Samples) -> int:
     if samples.stamps.size == 0:
         raise RefusalError(f"no samples of {name}: check that it is published, and on this topic")
     if samples.stamps.size == 1:
-        raise RefusalError(f"only one sample of {name}: check that it is published continuously")
+        raise RefusalError(f"only one sample of {name}: check that it is sampled continuously")
     pauses = np.diff(samples.stamps)
     period = int(np.median(pauses))
     longest = int(np.argmax(pauses))
@@ -103,7 +103,7 @@ def uniform_recording(
         apart = (position.stamps[0] - pressure.stamps[0]) / 1e9
         raise RefusalError(
             f"{names[0]} and {names[1]} do not overlap in time ({names[1]} begins {apart:.3g} s "
-            "later): check that their clocks agree and that both are published"
+            "later): check that their clocks agree and that both are recorded"
         )
     origin = inside[0]
     grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)

@@ -77,7 +77,7 @@ class TestNoiseFree:
         assert estimate.fixed == ("mass",)
         assert estimate.settings.fixed == {"mass": 1.6}
         (warning,) = estimate.warnings
-        assert warning.startswith("the record does not tell the mass")
+        assert warning.startswith("the record does not determine the mass")
         assert warning.endswith("1.6 kg is assumed")
         assert_identified(
             estimate,
@@ -241,7 +241,7 @@ class TestRefusals:
         position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3).position
         message = self.refused(Recording(1e-3, pressure, position))
         assert message.startswith(f"the stem moved {way} only")
-        assert "friction cannot be told from the spring" in message
+        assert "friction and spring cannot be separated" in message
 
     @pytest.mark.parametrize(("levels", "way"), [((6e4, 1.6e5), "up"), ((1.6e5, 6e4), "down")])
     def test_one_direction_under_noise(self, levels, way):

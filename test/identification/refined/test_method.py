@@ -104,7 +104,7 @@ class TestMass:
         found = identify_refined(case.record(0), case.plant.valve, SETTINGS)
         mass = found.parameters["mass"]
         assert mass.verdict is Verdict.NOT_IDENTIFIABLE
-        assert mass.reason.endswith("1.6 kg assumed")
+        assert mass.reason.endswith("1.6 kg is assumed")
         assert found.model.mass == 1.6
 
     def test_fixed_is_fixed(self, noisy):

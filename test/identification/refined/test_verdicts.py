@@ -1,4 +1,4 @@
-"""Judgements of a refined model: each reason to doubt it, one at a time."""
+"""Verdicts of a refined model: each reason to doubt it, one at a time."""
 
 import numpy as np
 import pytest
@@ -44,12 +44,12 @@ def square(refined):
     return refined(SquareWave(), 41.6)
 
 
-def with_verdict(refinement, misfit=GOOD, **settings):
+def verdicts(refinement, misfit=GOOD, **settings):
     return refinement_verdicts(refinement, misfit, IdentificationSettings(**settings))
 
 
 def test_no_doubt(square):
-    found = with_verdict(square)
+    found = verdicts(square)
     assert square.top_speed > FALL_SPEED
     for name in (*FRICTION, *SPRING):
         assert found[name].verdict is Verdict.IDENTIFIED
@@ -59,20 +59,20 @@ def test_no_doubt(square):
 
 
 def test_static_friction_without_a_slip_jump(square):
-    one = with_verdict(square)["static_friction"]
+    one = verdicts(square)["static_friction"]
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
     assert np.isnan(one.value)
-    assert one.reason == "no slip jump seen: F_s cannot be told from F_c"
+    assert one.reason == "no slip jump in the record: F_s cannot be separated from F_c"
 
 
 def test_mass_that_is_not_seen(square):
-    one = with_verdict(square)["mass"]
+    one = verdicts(square)["mass"]
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
-    assert one.reason == "inertia is too small a part of the force to be seen; 1.75 kg assumed"
+    assert one.reason == "inertia is too small a part of the force to measure; 1.75 kg is assumed"
 
 
 def test_misfit_doubts_the_friction_and_widens_every_interval(square):
-    found = with_verdict(square, BAD)
+    found = verdicts(square, BAD)
     bound = worst_case(square.equation.curvature, square.simulated.size, BAD.excess)
     for name in FRICTION:
         assert found[name].verdict is not Verdict.IDENTIFIED
@@ -87,30 +87,30 @@ def test_misfit_doubts_the_friction_and_widens_every_interval(square):
 def test_slow_record_cannot_tell_how_far_the_friction_falls(refined):
     slow = refined(TriangleWave(), 120.0)
     assert slow.top_speed < FALL_SPEED
-    found = with_verdict(slow)
+    found = verdicts(slow)
     for name in FRICTION:
         assert found[name].verdict is Verdict.WEAK
         assert found[name].reason == (
-            f"holds up to {slow.top_speed * 1e3:.2g} mm/s, the fastest here: "
-            "friction may fall further up to 6.5 mm/s"
+            f"valid up to {slow.top_speed * 1e3:.2g} mm/s, the top speed of the record: "
+            "friction may fall further up to 6.5 mm/s; record faster strokes"
         )
     assert {found[name].verdict for name in SPRING} == {Verdict.IDENTIFIED}
 
 
 def test_few_strokes_are_weak_whatever_else(refined):
     short = refined(SquareWave(), 15.0)  # up and down
-    found = with_verdict(short, BAD)
+    found = verdicts(short, BAD)
     for name in (*FRICTION, *SPRING):
         assert found[name].verdict is not Verdict.IDENTIFIED
         assert found[name].reason == (
-            f"2 strokes only: record at least {FEWEST_STROKES}, up and down"
+            f"only 2 strokes: record at least {FEWEST_STROKES}, up and down"
         )
 
 
 def test_fixed_parameters(refined):
     names = tuple(name for name in FREE if name != "viscous_friction")
     fixed = {"viscous_friction": 4.48e4, "mass": 1.75, "static_friction": 606.0}
-    found = with_verdict(refined(SquareWave(), 41.6, names, static_friction=606.0), fixed=fixed)
+    found = verdicts(refined(SquareWave(), 41.6, names, static_friction=606.0), fixed=fixed)
     for name, value in fixed.items():
         assert (found[name].verdict, found[name].value) == (Verdict.FIXED, value)
         assert found[name].half_width == 0.0
@@ -121,7 +121,7 @@ def test_preload_from_the_bias_has_the_spring_s_interval(refined):
     bias = 1.13e-3
     names = tuple(name for name in FREE if name != "spring_preload")
     refinement = refined(SquareWave(), 41.6, names, 3e-4, position_bias=bias)
-    found = with_verdict(refinement, position_bias=bias)
+    found = verdicts(refinement, position_bias=bias)
     spring, preload = found["spring_constant"], found["spring_preload"]
     assert preload.value == pytest.approx(bias * spring.value, rel=1e-12)
     assert preload.standard_error == pytest.approx(bias * spring.standard_error, rel=1e-12)
@@ -136,7 +136,7 @@ def test_static_friction_adds_slip_and_coulomb_friction(bench_trajectory, benche
     recording = Recording(1e-3, pressure, motion.position + noise)
     problem = perfect_problem(valve, recording)
     refinement = refine(problem, true_coordinates(parameters, motion.position[0]), (*FREE, SLIP))
-    found = with_verdict(refinement)
+    found = verdicts(refinement)
     from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
 
     covariance = block_covariance(refinement.equation, stroke_length(refinement.simulated)).matrix

@@ -27,7 +27,7 @@ from valve_friction_ros.model import (
 PACKINGS = ["low", "high", "graphite"]
 NOISES = [None, SensorNoise(28.6e-6, 165.0, seed=3)]
 FIVE_STROKES = 150.0
-JUDGED = (
+WITH_INTERVAL = (
     "viscous_friction",
     "coulomb_friction",
     "static_friction",
@@ -103,17 +103,17 @@ def test_every_interval_holds_the_truth(bench, bench_record, noise):
     name, plant = bench
     record = bench_record(name, TriangleWave(), FIVE_STROKES, noise)
     found = identify_signature(record, plant.valve, IdentificationSettings(assumed_mass=1.6))
-    for parameter in JUDGED:
+    for parameter in WITH_INTERVAL:
         low, high = found.parameters[parameter].interval
         assert low < getattr(plant.parameters, parameter) < high, parameter
     assert found.parameters["spring_constant"].verdict is Verdict.IDENTIFIED
     assert found.parameters["static_friction"].verdict is Verdict.IDENTIFIED
     friction = found.parameters["coulomb_friction"]
     assert friction.verdict is Verdict.WEAK  # 1.2 mm/s says nothing about faster
-    assert friction.reason.startswith("holds at 1.2 mm/s")
+    assert friction.reason.startswith("valid at 1.2 mm/s")
     assert friction.half_width < 0.05 * friction.value
     mass = found.parameters["mass"]
-    assert (mass.verdict, mass.reason[-14:]) == (Verdict.NOT_IDENTIFIABLE, "1.6 kg assumed")
+    assert (mass.verdict, mass.reason[-17:]) == (Verdict.NOT_IDENTIFIABLE, "1.6 kg is assumed")
     assert found.model.mass == 1.6
     noise_level = noise.position if noise else 0.0
     assert found.rms == pytest.approx(noise_level, abs=15e-6)
@@ -183,7 +183,10 @@ class TestRefusals:
 
     @pytest.mark.parametrize(
         ("period", "duration", "cause"),
-        [(200.0, 99.0, "here are 1 up and 0 down"), (60.0, 59.0, "here are 1 up and 1 down")],
+        [
+            (200.0, 99.0, "the record has 1 up and 0 down"),
+            (60.0, 59.0, "the record has 1 up and 1 down"),
+        ],
         ids=["one way", "one period"],
     )
     def test_too_few_strokes(self, bench_record, period, duration, cause, noise):
@@ -219,7 +222,10 @@ class TestContradictions:
     @pytest.mark.parametrize(
         ("fixed", "cause"),
         [
-            ({"spring_constant": 1.0}, "give a friction of -.* N, which cannot be"),
+            (
+                {"spring_constant": 1.0},
+                "a static friction of -.* N, and friction is above zero",
+            ),
             ({"spring_preload": 9000.0}, "does not reproduce the record"),
         ],
     )
@@ -232,7 +238,7 @@ class TestContradictions:
         found = identify_signature(record, BENCH_VALVE, settings)
         viscous = found.parameters["viscous_friction"]
         assert viscous.verdict is Verdict.NOT_IDENTIFIABLE
-        assert viscous.reason.startswith("it came out negative (-")
+        assert viscous.reason.startswith("its estimate is negative (-")
         assert found.model.viscous_friction > 0
         assert any("viscous_friction is not identified" in note for note in found.warnings)
 

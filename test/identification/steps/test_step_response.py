@@ -132,7 +132,7 @@ class TestSteps:
 
     def test_none(self):
         assert find_steps(np.full(100, 3.0)) == []
-        with pytest.raises(RefusalError, match="there is no step in the input"):
+        with pytest.raises(RefusalError, match="the input has no step"):
             step_test(np.full(100, 3.0), np.arange(100.0), PERIOD)
 
 

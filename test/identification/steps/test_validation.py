@@ -131,7 +131,7 @@ class TestIdentifiedModel:
 
     @pytest.mark.parametrize("name", ["coulomb_friction", "spring_constant", "spring_preload"])
     def test_without_these_there_is_none(self, name):
-        with pytest.raises(RefusalError, match=f"the estimate has no {name}"):
+        with pytest.raises(RefusalError, match=f"{name} was not identified, and a model needs it"):
             identified_model(without(name))
 
     def test_what_stands_in_is_told(self):

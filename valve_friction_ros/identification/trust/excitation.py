@@ -52,7 +52,8 @@ Chosen: a sensor's zero may be off by a few percent; swapped signals or wrong un
 _LEAST_FOLLOWED = 0.1
 """Share of the pressure's variance that the moving stem explains.
 
-0.18 and more in simulated records; FOLLOWED_REASON"""
+0.18 and more in simulated records; below 0.005 for the signals of two valves. Chosen between
+them."""
 
 _SURELY_FOLLOWED = 0.5
 """The same share above which a negative slope means an inverted position. Chosen: near 1 for an
