@@ -75,3 +75,15 @@ def test_a_number_without_a_verdict_is_never_shown(value, width, doubt):
         low, high = found.interval
         assert found.value == value
         assert low > 0 or high < 0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("mass", "kg"), ("clock_offset", "s"), ("coulomb_asymmetry", "1")]
+)
+def test_units_for_people(name, unit):
+    assert fixed(name, 1.0).unit == unit
+    assert fixed("unheard_of", 1.0).unit == ""
+
+
+def test_a_wide_interval_says_so():
+    assert judged("mass", 1.0, 1.0, 1.0).reason == "its interval is wider than its value"
