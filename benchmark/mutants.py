@@ -29,6 +29,19 @@ COPIED = ("valve_friction_ros", "test", "benchmark", "config")
 # A mutant may take this many times as long as the tests that reach it, and so many seconds more.
 TIME_FACTOR, TIME_MORE = 4.0, 5.0
 
+# The same example is run in one process, then in another, and none is made smaller.
+CONFTEST = """
+from hypothesis import HealthCheck, Phase
+settings.register_profile(
+    "mutants",
+    parent=settings.get_profile("project"),
+    suppress_health_check=[HealthCheck.differing_executors],
+    phases=[Phase.explicit, Phase.generate],
+    database=None,
+)
+settings.load_profile("mutants")
+"""
+
 PROPERTY = re.compile(r"^    @(property|cached_property)\n    def (\w+)\(", re.MULTILINE)
 KILLED = {1, 3, -24, 24, 152, 36, 255, -9, -11}
 """Exit codes: tests failed, mutant timed out, or crashed."""
@@ -74,6 +87,8 @@ def prepare(name: str, slow: bool) -> Path:
         shutil.copytree(PROJECT / part, place / part)
     for path in (place / room.code).glob("*.py"):
         path.write_text(unwrapped(path.read_text()))
+    with (place / "test/conftest.py").open("a") as conftest:
+        conftest.write(CONFTEST)
     marks = [] if slow else ["-m", "not slow"]
     settings = {
         "source_paths": [room.code],
