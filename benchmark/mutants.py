@@ -12,7 +12,6 @@ numbers of a module outside its functions, for which the tests derive their own.
 import argparse
 import json
 import os
-import random
 import re
 import shutil
 import subprocess
@@ -21,6 +20,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
+from mutmut.configuration import reset_config
+from mutmut.mutation.diff_apply import get_diff_for_mutant
+from mutmut.mutation.file_mutation import mutate_file_contents
+from mutmut.utils.format_utils import get_mutant_name
 
 PROJECT = Path(__file__).resolve().parents[1]
 WORKSPACE = PROJECT / "build" / "mutants"
@@ -62,6 +67,12 @@ ROOMS = {
     "published": Room(f"{_IDENTIFICATION}/published", (f"{_TESTS}/published",)),
     "health": Room("valve_friction_ros/health", ("test/health",)),
 }
+
+
+def say(text: str) -> None:
+    """Write a line, at once."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 def unwrapped(source: str) -> str:
@@ -108,9 +119,6 @@ def prepare(name: str, slow: bool) -> Path:
 
 def mutant_names(room: Room) -> list[str]:
     """Name all mutants of a room; the working directory is its copy."""
-    from mutmut.mutation.file_mutation import mutate_file_contents
-    from mutmut.utils.format_utils import get_mutant_name
-
     names = []
     for path in sorted(Path(room.code).glob("*.py")):
         found = mutate_file_contents(str(path), path.read_text(), None, None).mutant_names
@@ -126,39 +134,44 @@ def outcomes(room: Room, chosen: set[str]) -> Iterator[tuple[Path, Mapping[str, 
         yield path, {name: code for name, code in codes.items() if name in chosen}
 
 
-def report(room: Room, chosen: set[str]) -> Counter[str]:
-    """Print how many mutants of each file were killed, and what the others change."""
-    from mutmut.mutation.diff_apply import get_diff_for_mutant
+def survivors_of(name: str) -> Path:
+    """File that keeps what survived in a room when it was last run."""
+    return WORKSPACE / f"{name}-survivors.txt"
 
+
+def report(name: str, chosen: set[str]) -> Counter[str]:
+    """Print how many mutants of each file were killed, and what the others change."""
     total: Counter[str] = Counter()
     survivors: list[tuple[str, Path]] = []
-    print(f"\n{'killed':>8} {'of':>5}   file")
-    for path, codes in outcomes(room, chosen):
+    say(f"\n{'killed':>8} {'of':>5}   file")
+    for path, codes in outcomes(ROOMS[name], chosen):
         if codes:
-            alive = [name for name, code in codes.items() if code not in KILLED]
-            survivors += [(name, path) for name in alive]
-            print(f"{len(codes) - len(alive):>8} {len(codes):>5}   {path}")
+            alive = [mutant for mutant, code in codes.items() if code not in KILLED]
+            survivors += [(mutant, path) for mutant in alive]
+            say(f"{len(codes) - len(alive):>8} {len(codes):>5}   {path}")
             total += Counter(killed=len(codes) - len(alive), tried=len(codes))
-    for name, path in survivors:
+    survivors_of(name).write_text("".join(f"{mutant}\n" for mutant, _ in survivors))
+    for mutant, path in survivors:
         changed = [
             line
-            for line in get_diff_for_mutant(name, path=path).splitlines()
+            for line in get_diff_for_mutant(mutant, path=path).splitlines()
             if line[:1] in "+-" and not line.startswith(("+++", "---"))
         ]
-        print("\n" + "\n".join([f"survived: {name}", *changed]))
+        say("\n" + "\n".join([f"survived: {mutant}", *changed]))
     return total
 
 
 def run(name: str, arguments: argparse.Namespace) -> Counter[str]:
     """Try the mutants of a room, or a sample of them."""
-    from mutmut.configuration import reset_config
-
     os.chdir(prepare(name, arguments.slow))
     reset_config()
     names = [one for one in mutant_names(ROOMS[name]) if arguments.only in one]
+    if arguments.again:
+        names = [one for one in names if one in survivors_of(name).read_text().split()]
     if arguments.sample is not None and arguments.sample < len(names):
-        names = random.Random(arguments.seed).sample(names, arguments.sample)
-    print(f"\n{name}: {len(names)} mutants", flush=True)
+        draw = np.random.default_rng(arguments.seed).choice
+        names = [str(one) for one in draw(names, arguments.sample, replace=False)]
+    say(f"\n{name}: {len(names)} mutants")
     program = str(Path(sys.executable).parent / "mutmut")
     command = [program, "run", "--max-children", str(arguments.jobs), *names]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
@@ -167,7 +180,7 @@ def run(name: str, arguments: argparse.Namespace) -> Counter[str]:
         done = subprocess.run(command, stdout=output, stderr=output, env=environment, check=False)
     if done.returncode != 0:
         sys.exit(f"mutmut failed, the reason is in {log}")
-    return report(ROOMS[name], set(names))
+    return report(name, set(names))
 
 
 def main() -> None:
@@ -177,13 +190,14 @@ def main() -> None:
     parser.add_argument("--only", default="", help="mutants whose names contain this, as a file's")
     parser.add_argument("--sample", type=int, help="number of mutants a room, drawn at random")
     parser.add_argument("--seed", type=int, default=0, help="of the draw")
+    parser.add_argument("--again", action="store_true", help="what survived the last run only")
     parser.add_argument("--jobs", type=int, default=1, help="processes at once")
     parser.add_argument("--slow", action="store_true", help="with the tests marked as slow")
     arguments = parser.parse_args()
     for name in arguments.room or ROOMS:
         total = run(name, arguments)
         share = total["killed"] / max(total["tried"], 1)
-        print(f"\n{name}: {total['killed']} of {total['tried']} killed, {100 * share:.0f} %")
+        say(f"\n{name}: {total['killed']} of {total['tried']} killed, {100 * share:.0f} %")
 
 
 if __name__ == "__main__":

@@ -84,6 +84,10 @@ def test_a_stem_at_rest_did_not_move():
         ([5, 2, 4, 0], 2.0, (0, 5)),
         ([0, 1, 0, 1, 0], 0.5, (2, 2)),
         ([2, 3, 0, 0, 4, 4, 1], 1.0, (5, 6)),
+        ([0, 3, 1, 5, 2, 6], 0.5, (11, 5)),
+        ([0, 3, 2.8, 2.4, 5], 0.5, (5.6, 0.6)),  # a slow turn is one as well
+        ([0, 0.3, 0.1], 0.5, (0.3, 0)),
+        ([0, -0.3, -0.1], 0.5, (0, 0.3)),
         ([1, 1, 1], 0.0, (0, 0)),
     ],
 )
@@ -105,9 +109,16 @@ def test_a_fiftieth_of_the_way_goes_back(window, sign):
     )
 
 
-def test_one_way_in_numbers():
-    assert refusal(require_two_directions, record(np.linspace(0, 0.5, 100)), 1) == (
-        "the stem moved up only (500 mm up, 0 mm down): friction cannot be told from the spring; "
+@pytest.mark.parametrize(
+    ("ends", "way"),
+    [
+        ((0, 0.9988), "up only (999 mm up, 0 mm down)"),
+        ((1, 0.0012), "down only (0 mm up, 999 mm down)"),
+    ],
+)
+def test_one_way_in_numbers(ends, way):
+    assert refusal(require_two_directions, record(np.linspace(*ends, 100)), 1) == (
+        f"the stem moved {way}: friction cannot be told from the spring; "
         "record at least one stroke each way"
     )
 
@@ -118,14 +129,15 @@ def test_turns_within_the_noise_are_none():
     text = refusal(require_two_directions, record(noise + np.linspace(0, 0.05, 5000)), 25)
     assert "0 mm down" in text
     # Turns of 5 mm, far beyond 10 · 1 mm/√25, count however noisy the stem is.
-    turns = np.repeat([0.0, 5e-3] * 20, 125)
+    turns = np.repeat([0.0, 5e-3] * 20, 125) + np.linspace(0, 0.2, 5000)
     require_two_directions(record(noise + turns), 25)
 
 
 @pytest.mark.parametrize(
     ("lowest", "highest", "passes"),
     [
-        (-0.00099, 0.02099, True),
+        (-0.001, 0.021, True),
+        (0.0, 0.0002, True),
         (-0.00101, 0.0105, False),
         (0.01, 0.02101, False),
         (0.01, 0.01021, True),
@@ -146,10 +158,11 @@ def test_what_is_said_of_the_travel():
         "the stem position runs from 0.001 to 0.05 m, the travel from 0 to 0.02 m: "
         "check for swapped signals, the unit (m), the zero and the travel"
     )
-    assert refusal(require_travel, record([0.01, 0.0101]), VALVE) == (
-        "too little travel: the stem moved 0.1 mm, 0.5 % of its travel; "
+    assert refusal(require_travel, record([0.01, 0.0100999]), VALVE) == (
+        "too little travel: the stem moved 0.0999 mm, 0.5 % of its travel; "
         "excite the valve over several percent of it"
     )
+    assert "moved 0.19 mm, 0.95 % of" in refusal(require_travel, record([0, 1.9e-4]), VALVE)
 
 
 @pytest.mark.parametrize(("stop", "level"), [("lower", 0.0), ("upper", 0.02)])
@@ -163,6 +176,8 @@ def test_half_of_the_record_may_lie_at_a_stop(stop, level):
         "about friction: excite the valve around mid-travel"
     )
     require_stem_between_stops(record(most), OPEN_ENDED)
+    if stop == "lower":
+        require_stem_between_stops(record([2e-5] * 61 + [away] * 39), VALVE)
     off = 21e-6 if level == 0 else level - 21e-6
     require_stem_between_stops(record([off] * 61 + [away] * 39), VALVE)
 
@@ -212,6 +227,22 @@ def test_rests_and_other_sample_periods_do_not_matter():
     assert _followed(rest) == pytest.approx(_followed(clean), rel=1e-9)
 
 
+def test_what_two_blocks_make_up_for_is_left_out():
+    """A pressure that is high in one block and low in the next is the same on their average."""
+    clean = strokes(friction=0.0)
+    zigzag = clean.pressure + 1e4 * (-1.0) ** np.arange(301)
+    found = _followed(record(clean.position, zigzag))
+    assert found == (pytest.approx(2e6, rel=1e-9), pytest.approx(1.0, abs=1e-12))
+
+
+def test_the_unit_of_the_pressure_does_not_matter():
+    scattered = strokes(scatter=1e4)
+    small = record(scattered.position, 1e-9 * scattered.pressure)
+    slope, share = _followed(scattered)
+    assert _followed(small) == pytest.approx((1e-9 * slope, share), rel=1e-9)
+    require_related_signals(small)
+
+
 def test_pressure_that_does_not_change():
     position = strokes().position
     assert refusal(require_related_signals, record(position, np.full(301, 1e5))) == (
@@ -252,14 +283,14 @@ def test_a_stem_against_the_pressure():
     require_related_signals(scattered)
 
 
-@pytest.mark.parametrize(("samples", "passes"), [(11, True), (9, False)])
-def test_a_stroke_has_ten_samples(samples, passes):
+@pytest.mark.parametrize(("samples", "share"), [(11, None), (9, 11), (3, 33)])
+def test_a_stroke_has_ten_samples(samples, share):
     position = np.concatenate([np.linspace(0, 0.01, samples + 1), np.linspace(0.01, 0, 101)[1:]])
     stem = record(position, 1e6 * position + 1e4, period=2.0)
-    if passes:
+    if share is None:
         require_related_signals(stem)
     else:
         assert refusal(require_related_signals, stem) == (
-            "sampling is too slow for the motion: the stem moves 11 % of its range between two "
-            "samples, 2 s apart; sample faster, or look for a glitch of the stem sensor"
+            f"sampling is too slow for the motion: the stem moves {share} % of its range between "
+            "two samples, 2 s apart; sample faster, or look for a glitch of the stem sensor"
         )
