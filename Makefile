@@ -5,6 +5,7 @@ VENV ?= .venv
 PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
 BENCH_ARGS ?=
+MUTANTS_ARGS ?=
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -65,6 +66,11 @@ accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--
 .PHONY: bench
 bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.speed $(BENCH_ARGS)
+
+.PHONY: mutants
+mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some
+	@"$(VENV)/bin/python" -m pip install -q --no-deps --disable-pip-version-check -r requirements/mutants.txt
+	@"$(VENV)/bin/python" -m benchmark.mutants $(MUTANTS_ARGS)
 
 .PHONY: clean
 clean:  ## remove what make and colcon made

@@ -124,6 +124,12 @@ class TestMemory:
         assert (monitor.result, monitor.stamp) == (result, START)
         assert monitor.refusal == "the stem did not move"
         assert monitor.diagnosis().level == Level.ERROR
+        verdict = diagnose(result, BENCH_VALVE, monitor.baseline)
+        assert monitor.diagnosis() == dataclasses.replace(
+            verdict,
+            message="the latest identification was refused: the stem did not move; before: "
+            + verdict.message,
+        )
 
 
 class TestBaseline:
@@ -150,9 +156,20 @@ class TestBaseline:
 
     def test_needs_an_estimate(self):
         monitor = FrictionMonitor(SETTINGS)
-        with pytest.raises(RefusalError, match="identify first"):
+        text = "^there is no estimate to take as baseline: identify first$"
+        with pytest.raises(RefusalError, match=text):
             monitor.set_baseline()
         assert monitor.baseline is None
+
+    def test_however_small(self, with_values, friction):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.accept(with_values(coulomb_friction=friction(0.5, 0.1)), START)
+        assert monitor.set_baseline() == Baseline(0.5, 0.1)
+
+    def test_a_given_one_is_taken(self):
+        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+        monitor.take_baseline(Baseline(120.0, 3.0))
+        assert monitor.baseline == Baseline(120.0, 3.0)
 
     @pytest.mark.parametrize("coulomb", [0.0, -3.0])
     def test_needs_a_friction(self, with_values, coulomb):

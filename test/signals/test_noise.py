@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from valve_friction_ros.signals.noise import (
     position_noise,
@@ -24,6 +25,20 @@ def white(seed=0):
 def test_white_noise_at_any_scale(deviation):
     """A mean of n dependent magnitudes errs by some 2/√n; five of these."""
     assert sensor_noise(deviation * white()) == pytest.approx(deviation, rel=10 / math.sqrt(SIZE))
+
+
+def test_normal_second_differences():
+    """Their quantiles in any order: √6 times the noise, and nine tenths of them are kept."""
+    middle = (np.arange(SIZE) + 0.5) / SIZE
+    quantiles = np.random.default_rng(2).permutation(norm.ppf(middle))
+    position = np.cumsum(np.cumsum(math.sqrt(6) * quantiles))
+    assert position_noise(position) == pytest.approx(1.0, rel=1e-4)
+
+
+def test_a_million_samples_of_white_noise():
+    """The same bound as above, 2/√n, five times."""
+    many = np.random.default_rng(3).standard_normal(1_000_000)
+    assert position_noise(many) == pytest.approx(1.0, rel=0.01)
 
 
 def test_scales_with_the_signal():

@@ -1,5 +1,8 @@
 """Verdicts of a refined model: each reason to doubt it, one at a time."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from problems import FREE, perfect_problem, true_coordinates
@@ -17,6 +20,8 @@ from valve_friction_ros.model import (
     Recording,
     SquareWave,
     TriangleWave,
+    converter_response,
+    simulate,
 )
 
 FRICTION = ("viscous_friction", "coulomb_friction")
@@ -145,3 +150,25 @@ def test_static_friction_adds_slip_and_coulomb_friction(bench_trajectory, benche
     one = found["static_friction"]
     assert one.standard_error == pytest.approx(np.sqrt(expected), rel=1e-9)
     assert one.value == pytest.approx(parameters.static_friction, rel=0.01)
+
+
+def test_an_assumed_mass_widens_what_it_moves():
+    """An error anywhere within the mass's own size: rectangular, so of deviation size/√3.
+
+    A 100 kg stem, refined once more with the mass one percent off to either side: the
+    coordinates move by a hundredth of what the whole mass does to them.
+    """
+    heavy = replace(HIGH_FRICTION, mass=100.0)
+    pressure = converter_response(SquareWave().sample(5e-3 * np.arange(8321)), 5e-3)
+    position = simulate(BENCH_VALVE, heavy, pressure, 5e-3).position
+    problem = perfect_problem(BENCH_VALVE, Recording(5e-3, pressure, position))
+    truth = true_coordinates(heavy, position[0])
+    light, more = (refine(problem, {**truth, "mass": mass}, FREE) for mass in (99.0, 101.0))
+    refinement = refine(problem, truth, FREE)
+    found, known = judged(refinement), judged(refinement, fixed={"mass": 100.0})
+    for name in (*FRICTION, *SPRING):
+        moved = 50 * abs(more.coordinates[name] - light.coordinates[name])
+        assert found[name].half_width == pytest.approx(1.959964 / math.sqrt(3) * moved, rel=0.02)
+        assert known[name].half_width < 0.7 * found[name].half_width
+    free = refine(problem, truth, (*FREE, "mass"))
+    assert judged(free)["coulomb_friction"].half_width < 0.7 * found["coulomb_friction"].half_width

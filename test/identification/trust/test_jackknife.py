@@ -31,3 +31,14 @@ def test_one_alone_has_no_scatter():
     found = jackknife([[1.0, 2.0], [3.0]], lambda groups: {"sum": sum(map(sum, groups))})
     assert found.values["sum"] == 6.0
     assert math.isnan(found.standard_errors["sum"])
+
+
+def test_each_group_keeps_its_place():
+    """One group of three varies at a time: 1·mean + 10·mean + 100·mean."""
+
+    def weighted(groups):
+        return {"sum": sum(10**place * float(np.mean(one)) for place, one in enumerate(groups))}
+
+    found = jackknife([*GROUPS, [5.0, 6.0]], weighted)
+    expected = math.sqrt(7 / 3 + 100 * 8 / 2 + 10_000 * 0.5 / 2)
+    assert found.standard_errors["sum"] == pytest.approx(expected)

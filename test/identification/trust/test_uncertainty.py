@@ -13,6 +13,7 @@ from valve_friction_ros.identification.trust.estimating_equation import Estimati
 from valve_friction_ros.identification.trust.uncertainty import (
     block_covariance,
     half_width,
+    plain_sandwich,
     stroke_length,
     worst_case,
 )
@@ -125,6 +126,24 @@ def test_equal_blocks_of_a_mean_have_one_freedom_less_than_there_are():
         )
 
 
+def test_a_record_of_few_samples_has_a_block_for_each():
+    signal = np.array([1.0, 3.0, 2.0, 7.0, 5.0])
+    covariance = block_covariance(mean_equation(signal), 30)
+    assert covariance.freedom(np.ones(1)) == pytest.approx(4.0, rel=1e-9)
+    assert covariance.matrix[0, 0] == pytest.approx(np.var(signal, ddof=1) / 5, rel=1e-9)
+
+
+def test_a_block_with_nearly_all_the_information_counts_as_if_with_95_percent():
+    """By hand for one coordinate: g_b = s_b / (A·√(1 − min(H_b, 0.95)))."""
+    slope = np.array([30.0, *[1.0] * 7])
+    residual = np.array([0.1, 3.0, -1.0, -2.0, 4.0, -3.0, 0.0, -2.0])
+    shares = np.minimum(slope**2 / (slope @ slope), 0.95)
+    assert shares[0] == 0.95
+    expected = slope * residual / (slope @ slope) / np.sqrt(1 - shares)
+    found = block_covariance(EstimatingEquation.of_least_squares(slope[:, None], residual), 1)
+    np.testing.assert_allclose(found.contributions[:, 0], expected, rtol=1e-9)
+
+
 def random_equation(samples, free, seed):
     generator = np.random.default_rng(seed)
     slope = generator.standard_normal((samples, free))
@@ -146,6 +165,7 @@ def test_unknown_where_the_equation_is_singular_or_the_record_too_short():
         covariance = block_covariance(equation, 5)
         assert np.isnan(covariance.matrix).all()
         assert np.isnan(covariance.half_width(np.ones(2)))
+        assert np.isnan(covariance.freedom(np.ones(2)))
 
 
 def test_crossed_looks():
@@ -163,6 +183,25 @@ def test_crossed_looks():
     np.testing.assert_allclose(equation.newton_step(), expected, rtol=1e-10)
 
 
+def faint_equation():
+    """A second coordinate whose information is rounding: 9e−16 of the first one's."""
+    slope = np.vstack([[1.0, 0.0], [0.0, 3e-8], np.zeros((6, 2))])
+    return EstimatingEquation.of_least_squares(slope, np.ones(8))
+
+
+def test_a_coordinate_that_only_rounding_tells_stays():
+    np.testing.assert_allclose(faint_equation().newton_step(), [-1.0, 0.0], atol=1e-12)
+    assert plain_sandwich(faint_equation(), 1)[1, 1] == 0.0
+
+
+def test_plain_sandwich_written_out():
+    equation = random_equation(90, 3, 10)
+    inverse = np.linalg.inv(equation.curvature)
+    sums = equation.scores.reshape(10, 9, 3).sum(axis=1)
+    expected = inverse @ sums.T @ sums @ inverse
+    np.testing.assert_allclose(plain_sandwich(equation, 9), expected, rtol=1e-9)
+
+
 def test_half_width_is_students():
     """Tabulated quantiles at 97.5 %."""
     for freedom, quantile in ((1, 12.7062), (5, 2.57058), (10, 2.22814), (10**7, 1.95996)):
@@ -174,6 +213,7 @@ def test_stroke_length_between_reversals():
     moves = np.concatenate([np.ones(30), np.zeros(30), np.ones(10), -np.ones(20), np.ones(29)])
     simulated = np.concatenate([[0.0], np.cumsum(moves)])
     assert stroke_length(simulated) == 120 // 3
+    assert stroke_length(simulated[:-1]) == 119 // 3
     assert stroke_length(np.zeros(50)) == 50
 
 

@@ -32,6 +32,7 @@ def test_by_the_share_of_the_value(sign, width, verdict):
 
 def test_weak_says_how_wide():
     assert with_verdict("mass", 100.0, 1.0, 12.0).reason == "its interval is ±12 % of its value"
+    assert with_verdict("mass", 100.0, 1.0, 99.0).reason == "its interval is ±99 % of its value"
 
 
 def test_a_zero_is_not_identifiable():
@@ -75,3 +76,26 @@ def test_a_number_without_a_verdict_is_never_shown(value, width, doubt):
         low, high = found.interval
         assert found.value == value
         assert low > 0 or high < 0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("mass", "kg"), ("clock_offset", "s"), ("coulomb_asymmetry", "1")]
+)
+def test_units_for_people(name, unit):
+    assert fixed(name, 1.0).unit == unit
+    assert fixed("unheard_of", 1.0).unit == ""
+
+
+def test_a_wide_interval_says_so():
+    assert with_verdict("mass", 1.0, 1.0, 1.0).reason == "its interval is wider than its value"
+
+
+@pytest.mark.parametrize("width", [2.0, 20.0])
+def test_what_is_judged_is_passed_on(width):
+    found = with_verdict("mass", 100.0, 1.0, width)
+    assert (found.name, found.value, found.standard_error) == ("mass", 100.0, 1.0)
+    assert found.interval == (100.0 - width, 100.0 + width)
+
+
+def test_what_is_withheld_keeps_its_name():
+    assert not_identifiable("mass", "why").name == with_verdict("mass", 1.0, 1.0, 2.0).name == "mass"
