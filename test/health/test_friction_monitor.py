@@ -156,7 +156,7 @@ class TestBaseline:
 
     def test_needs_an_estimate(self):
         monitor = FrictionMonitor(SETTINGS)
-        text = "^there is no estimate to take as baseline: identify first$"
+        text = "^the valve has no result to take as baseline: identify it first$"
         with pytest.raises(RefusalError, match=text):
             monitor.set_baseline()
         assert monitor.baseline is None
@@ -176,7 +176,7 @@ class TestBaseline:
         monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
         monitor.accept(with_values(coulomb_friction=coulomb), START)
         with pytest.raises(
-            RefusalError, match=f"^a coulomb friction of {coulomb:.4g} N is no base"
+            RefusalError, match=f"^a coulomb friction of {coulomb:.4g} N cannot be a baseline"
         ):
             monitor.set_baseline()
         assert monitor.baseline == Baseline(100.0)

@@ -165,10 +165,12 @@ def test_an_assumed_mass_widens_what_it_moves():
     truth = true_coordinates(heavy, position[0])
     light, more = (refine(problem, {**truth, "mass": mass}, FREE) for mass in (99.0, 101.0))
     refinement = refine(problem, truth, FREE)
-    found, known = judged(refinement), judged(refinement, fixed={"mass": 100.0})
+    found, known = verdicts(refinement), verdicts(refinement, fixed={"mass": 100.0})
     for name in (*FRICTION, *SPRING):
         moved = 50 * abs(more.coordinates[name] - light.coordinates[name])
         assert found[name].half_width == pytest.approx(1.959964 / math.sqrt(3) * moved, rel=0.02)
         assert known[name].half_width < 0.7 * found[name].half_width
     free = refine(problem, truth, (*FREE, "mass"))
-    assert judged(free)["coulomb_friction"].half_width < 0.7 * found["coulomb_friction"].half_width
+    assert (
+        verdicts(free)["coulomb_friction"].half_width < 0.7 * found["coulomb_friction"].half_width
+    )

@@ -42,7 +42,7 @@ def test_ten_windows_are_enough():
     require_enough_samples(record(np.zeros(30)), 3)
     assert refusal(require_enough_samples, record(np.zeros(29)), 3) == (
         f"the record is too short: 29 samples ({record(np.zeros(29)).duration:.3g} s), "
-        "at least 30 are needed"
+        "at least 30 are needed; record longer or sample faster"
     )
 
 
@@ -105,7 +105,7 @@ def test_a_fiftieth_of_the_way_goes_back(window, sign):
     way = "up" if sign > 0 else "down"
     assert text.startswith(f"the stem moved {way} only (")
     assert text.endswith(
-        " mm down): friction cannot be told from the spring; record at least one stroke each way"
+        " mm down): friction and spring cannot be separated; record at least one stroke each way"
     )
 
 
@@ -118,7 +118,7 @@ def test_a_fiftieth_of_the_way_goes_back(window, sign):
 )
 def test_one_way_in_numbers(ends, way):
     assert refusal(require_two_directions, record(np.linspace(*ends, 100)), 1) == (
-        f"the stem moved {way}: friction cannot be told from the spring; "
+        f"the stem moved {way}: friction and spring cannot be separated; "
         "record at least one stroke each way"
     )
 
@@ -156,7 +156,7 @@ def test_the_stem_stays_within_a_twentieth_and_moves_a_hundredth(lowest, highest
 def test_what_is_said_of_the_travel():
     assert refusal(require_travel, record([0.001, 0.05]), VALVE) == (
         "the stem position runs from 0.001 to 0.05 m, the travel from 0 to 0.02 m: "
-        "check for swapped signals, the unit (m), the zero and the travel"
+        "check that the signals are not swapped, and check unit (m), zero and travel"
     )
     assert refusal(require_travel, record([0.01, 0.0100999]), VALVE) == (
         "too little travel: the stem moved 0.0999 mm, 0.5 % of its travel; "
@@ -172,8 +172,8 @@ def test_half_of_the_record_may_lie_at_a_stop(stop, level):
     require_stem_between_stops(record([at] * 50 + [away] * 50), VALVE)
     most = [at] * 61 + [away] * 39
     assert refusal(require_stem_between_stops, record(most), VALVE) == (
-        f"the stem lies at its {stop} stop for 61 % of the record, where pressure says nothing "
-        "about friction: excite the valve around mid-travel"
+        f"the stem is at its {stop} stop for 61 % of the record, where pressure holds no "
+        "information on friction: excite the valve around mid-travel"
     )
     require_stem_between_stops(record(most), OPEN_ENDED)
     if stop == "lower":
@@ -246,16 +246,17 @@ def test_the_unit_of_the_pressure_does_not_matter():
 def test_pressure_that_does_not_change():
     position = strokes().position
     assert refusal(require_related_signals, record(position, np.full(301, 1e5))) == (
-        "the pressure did not change: excite the valve, or check its sensor"
+        "the pressure did not change: excite the valve, or check the pressure sensor"
     )
     assert _followed(record(position, np.full(301, 1e5)))[1] == 0.0
 
 
 def test_unrelated_signals():
     assert refusal(require_related_signals, strokes(scatter=1e6)) == (
-        "pressure and stem do not move together (place and way of the moving stem explain "
-        f"{100 * _followed(strokes(scatter=1e6))[1]:.0f} % of the pressure): check for the wrong "
-        "valve, a dead sensor, swapped signals or clocks far apart"
+        "pressure and stem do not move together (position and direction of the moving stem explain "
+        f"{100 * _followed(strokes(scatter=1e6))[1]:.0f} % of the pressure): check that both "
+        "signals belong to this valve, are not swapped, come from working sensors, and share one "
+        "clock"
     )
 
 
@@ -274,8 +275,8 @@ def test_a_tenth_of_the_pressure_must_be_explained(share, passes):
 
 def test_a_stem_against_the_pressure():
     assert refusal(require_related_signals, strokes(slope=-2e6)) == (
-        "the stem moves against the pressure: count the position in the direction in which "
-        "pressure pushes the stem"
+        "the stem moves against the pressure: invert the position, so that it grows in the "
+        "direction in which pressure pushes the stem"
     )
     # Where less than half is explained, the sign is chance.
     scattered = strokes(scatter=1.8e4, slope=-2e6)
@@ -292,5 +293,5 @@ def test_a_stroke_has_ten_samples(samples, share):
     else:
         assert refusal(require_related_signals, stem) == (
             f"sampling is too slow for the motion: the stem moves {share} % of its range between "
-            "two samples, 2 s apart; sample faster, or look for a glitch of the stem sensor"
+            "two samples, 2 s apart; sample faster, or check the stem sensor for a glitch"
         )

@@ -11,7 +11,7 @@ from valve_friction_ros.identification.trust.limits import (
 
 @pytest.mark.parametrize("strokes", [0, 2])
 def test_too_few_strokes_say_how_many_are_needed(strokes):
-    assert too_few_strokes(strokes) == f"{strokes} strokes only: record at least 3, up and down"
+    assert too_few_strokes(strokes) == f"only {strokes} strokes: record at least 3, up and down"
 
 
 def test_three_strokes_are_enough():

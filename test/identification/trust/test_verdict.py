@@ -91,11 +91,13 @@ def test_a_wide_interval_says_so():
 
 
 @pytest.mark.parametrize("width", [2.0, 20.0])
-def test_what_is_judged_is_passed_on(width):
+def test_a_verdict_passes_its_number_on(width):
     found = with_verdict("mass", 100.0, 1.0, width)
     assert (found.name, found.value, found.standard_error) == ("mass", 100.0, 1.0)
     assert found.interval == (100.0 - width, 100.0 + width)
 
 
 def test_what_is_withheld_keeps_its_name():
-    assert not_identifiable("mass", "why").name == with_verdict("mass", 1.0, 1.0, 2.0).name == "mass"
+    assert (
+        not_identifiable("mass", "why").name == with_verdict("mass", 1.0, 1.0, 2.0).name == "mass"
+    )
