@@ -214,3 +214,11 @@ def test_parameters_come_back_in_their_order(history):
     names = ["mass", "viscous_friction", "coulomb_friction", "stribeck_velocity", "novelty"]
     history.add(success(parameters={name: parameter(name, 1.0) for name in reversed(names)}))
     assert [*history.entries()[0].parameters] == names
+
+
+def test_rows_of_an_earlier_version_go_on_under_the_new_name(history):
+    """The method `refined` was called sweep."""
+    history.add(success(START, method="sweep"))
+    history.add(success(START + 1, method="refined"))
+    assert [point.time for point in history.points(VALVE.name, "refined")] == [START, START + 1]
+    assert {entry.method for entry in history.entries()} == {"refined"}

@@ -19,7 +19,7 @@ from valve_friction_ros.history.rows import (
     valve_id,
 )
 from valve_friction_ros.history.schema import HistoryError, reading, writing
-from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification import FORMER_METHODS, Verdict
 
 __all__ = ["HistoryError", "HistoryFile"]
 
@@ -80,16 +80,17 @@ class HistoryFile:
 
     def points(self, valve: str, method: str, since: int = 0) -> tuple[FrictionPoint, ...]:
         """Return a valve's identified and weak Coulomb frictions of one method, from `since` on."""
+        former = next((old for old, new in FORMER_METHODS.items() if new == method), method)
         with reading(self.path) as connection:
             rows = connection.execute(
                 "SELECT time_ns, value, half_width FROM identification "
                 "JOIN valve ON valve.id = valve_id "
                 "JOIN parameter ON identification_id = identification.id "
-                "WHERE valve.name = ? AND method = ? AND time_ns >= ? "
+                "WHERE valve.name = ? AND method IN (?, ?) AND time_ns >= ? "
                 "AND parameter.name = 'coulomb_friction' AND verdict IN (?, ?) "
                 "AND value IS NOT NULL AND half_width BETWEEN 0 AND 1e300 "
                 "ORDER BY time_ns, identification.id",
-                (valve, method, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
+                (valve, method, former, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
             ).fetchall()
         return tuple(FrictionPoint(*row) for row in rows)
 

@@ -14,7 +14,12 @@ from valve_friction_ros.history.entry import (
     KeptValve,
     Span,
 )
-from valve_friction_ros.identification import PARAMETER_UNITS, Parameter, Verdict
+from valve_friction_ros.identification import (
+    FORMER_METHODS,
+    PARAMETER_UNITS,
+    Parameter,
+    Verdict,
+)
 
 __all__ = ["entries_in", "insert_baseline", "insert_entry", "valve_id"]
 
@@ -130,7 +135,7 @@ def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
         time=row["time_ns"],
         valve=KeptValve(row["name"], row["tag"]),
         span=None if row["begin_ns"] is None else Span(row["begin_ns"], row["end_ns"]),
-        method=row["method"],
+        method=FORMER_METHODS.get(row["method"], row["method"]),
         diagnosis=Diagnosis(
             Level(row["level"]),
             StatusSignal(row["status_signal"]),

@@ -3,6 +3,7 @@
 from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
 from valve_friction_ros.identification.methods import (
     DEFAULT_METHOD,
+    FORMER_METHODS,
     METHODS,
     Method,
     identify,
@@ -43,6 +44,7 @@ from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS
 __all__ = [
     "DEFAULT_METHOD",
     "FIXABLE",
+    "FORMER_METHODS",
     "METHODS",
     "PARAMETER_UNITS",
     "UNITS",

@@ -12,7 +12,7 @@ from valve_friction_ros.identification.signature import force_balance as signatu
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "identify", "method_named"]
+__all__ = ["DEFAULT_METHOD", "FORMER_METHODS", "METHODS", "Method", "identify", "method_named"]
 
 
 class Method(Protocol):
@@ -35,7 +35,10 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 
 DEFAULT_METHOD = refined.METHOD
 
-_FORMER_NAMES = {"sweep": refined.METHOD, "force_balance": signature.METHOD}
+FORMER_METHODS: Mapping[str, str] = MappingProxyType(
+    {"sweep": refined.METHOD, "force_balance": signature.METHOD}
+)
+"""Names that files of earlier versions use, and what they are called now."""
 
 
 def method_named(name: str) -> Method:
@@ -47,7 +50,7 @@ def method_named(name: str) -> Method:
         If no method has this name; the message lists the names.
     """
     if name not in METHODS:
-        former = _FORMER_NAMES.get(name)
+        former = FORMER_METHODS.get(name)
         hint = f"it is now called {former!r}" if former else f"choose from {', '.join(METHODS)}"
         raise ValueError(f"there is no method {name!r}: {hint}")
     return METHODS[name]
