@@ -37,6 +37,7 @@ def test_each_group_keeps_its_place():
     """One group of three varies at a time: 1·mean + 10·mean + 100·mean."""
 
     def weighted(groups):
+        assert len(groups) == 3
         return {"sum": sum(10**place * float(np.mean(one)) for place, one in enumerate(groups))}
 
     found = jackknife([*GROUPS, [5.0, 6.0]], weighted)
