@@ -82,7 +82,7 @@ def test_sampling_too_slow():
 
 def test_pressure_of_a_dead_sensor(healthy):
     still = Recording(PERIOD, np.full(len(healthy), 1e5), healthy.position)
-    refused(still, "^the pressure did not change.*check its sensor", SensorNoise(10e-6))
+    refused(still, "^the pressure did not change.*check the pressure sensor", SensorNoise(10e-6))
     refused(still, r"^pressure and stem do not move together .*: check that both signals belong to")
 
 
