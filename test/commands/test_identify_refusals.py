@@ -137,7 +137,7 @@ class TestRecordsThatCannotTell:
             ),
             (
                 lambda r: {"pressure_pa": np.full(len(r), 1e5)},
-                "the pressure did not change: excite the valve, or check its sensor",
+                "the pressure did not change: excite the valve, or check the pressure sensor",
             ),
         ],
         ids=[

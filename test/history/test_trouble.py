@@ -113,7 +113,7 @@ def test_no_folder_can_be_made(tmp_path):
     history = HistoryFile(tmp_path / "file" / "history.sqlite")
     message = told(history)
     assert message == "its folder is a file: check the folder, or name another history_file"
-    assert "there is no such file" in told(history, HistoryFile.entries)
+    assert "there is no such file: check its name" in told(history, HistoryFile.entries)
 
 
 READ_ONLY = """

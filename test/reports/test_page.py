@@ -125,5 +125,5 @@ def test_long_pages_have_contents_that_lead_somewhere(count, links):
 def test_tables_with_holes_are_refused():
     with pytest.raises(ValueError, match="row 1 has 1 cells for 2"):
         Table(TABLE.columns, (("a", "1"), ("b",)))
-    with pytest.raises(ValueError, match="no row 2 to mark"):
+    with pytest.raises(ValueError, match="marked row 2 does not exist"):
         Table(TABLE.columns, TABLE.rows, marked=(2,))

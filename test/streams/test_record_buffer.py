@@ -104,7 +104,7 @@ class TestBadSamples:
         assert len(buffer) == 1200
         assert refused(buffer) == (
             f"bad samples in the window: {cause} (2 samples); correct the source, then clear the "
-            "buffer or wait until they have left it"
+            "buffer or wait until these samples have left it"
         )
 
     def test_leave_with_the_window(self, buffer, signal, value, cause):
