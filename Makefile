@@ -5,6 +5,7 @@ VENV ?= .venv
 PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
 BENCH_ARGS ?=
+REALITY_ARGS ?=
 MUTANTS_ARGS ?=
 
 SHELL := /bin/bash
@@ -62,6 +63,10 @@ venv-test:  ## the same, with what checks it
 .PHONY: accuracy
 accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--seeds 3" for less
 	@"$(VENV)/bin/python" -m benchmark.accuracy $(ACCURACY_ARGS)
+
+.PHONY: reality
+reality: venv  ## the estimate on valves and sensors with imperfections; REALITY_ARGS="--brief --seeds 1" for less
+	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.reality $(REALITY_ARGS)
 
 .PHONY: bench
 bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some

@@ -97,7 +97,8 @@ class TestPanels:
     def test_a_method_without_a_sweep_has_none_to_draw(self, result):
         alone = dataclasses.replace(result, estimate=None)
         with pytest.raises(ValueError, match="the method refined has no sweep to draw"):
-            identification_figure(alone)
+            Case.of("recording", alone)
+        assert {*panels(identification_figure(alone))} == {"pressure", "stem", "signature"}
 
     def test_the_refined_friction_with_its_band_and_verdict(self, with_parameters):
         found = with_parameters(coulomb_friction=(152.25, 3.5, Verdict.WEAK))

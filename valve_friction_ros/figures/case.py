@@ -1,5 +1,6 @@
 """The data of an identified record in a figure."""
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -80,6 +81,22 @@ class Case:
             estimate.sweep.estimates["coulomb_friction"],
             estimate.sweep.sigma,
             estimate.threshold,
+            result.parameters["coulomb_friction"],
+            drive,
+            None if result.stem is None else result.stem.simulated,
+        )
+
+    @classmethod
+    def without_sweep(cls, label: str, result: Result, drive: DriveScale = PRESSURE) -> "Case":
+        """Return the case of a result as a record with a simulated stem alone."""
+        nothing = np.empty(0)
+        return cls(
+            label,
+            result.recording,
+            nothing,
+            nothing,
+            nothing,
+            math.nan,
             result.parameters["coulomb_friction"],
             drive,
             None if result.stem is None else result.stem.simulated,

@@ -75,7 +75,20 @@ def identification_figure(result: Result, drive: DriveScale = PRESSURE) -> Figur
     title = _title(result, result.valve)
     if result.signature is not None:
         return signature_figure(result, title, drive)
+    if result.estimate is None:
+        return _figure_without_sweep(result, title, drive)
     return friction_figure([Case.of("recording", result, drive)], title)
+
+
+def _figure_without_sweep(result: Result, title: str, drive: DriveScale) -> Figure:
+    figure = titled_figure(title)
+    panels = figure.subplot_mosaic([["pressure", "signature"], ["stem", "signature"]])
+    panels["stem"].sharex(panels["pressure"])
+    case = Case.without_sweep("recording", result, drive)
+    draw_record(panels["pressure"], panels["stem"], [case])
+    draw_signature(panels["signature"], [case])
+    dress(panels.values())
+    return figure
 
 
 def _title(result: Result, valve: Valve) -> str:

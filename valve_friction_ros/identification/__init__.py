@@ -22,6 +22,7 @@ from valve_friction_ros.identification.rendering import (
     two_digits,
 )
 from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.robust.method import TIMING_UNCERTAINTY, identify_robust
 from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
 from valve_friction_ros.identification.signature.force_balance import identify_signature
 from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
@@ -47,6 +48,7 @@ __all__ = [
     "FORMER_METHODS",
     "METHODS",
     "PARAMETER_UNITS",
+    "TIMING_UNCERTAINTY",
     "UNITS",
     "Bracket",
     "BreakawayPoint",
@@ -71,6 +73,7 @@ __all__ = [
     "identify",
     "identify_published",
     "identify_refined",
+    "identify_robust",
     "identify_signature",
     "method_named",
     "parameter_columns",

@@ -7,6 +7,7 @@ from typing import Protocol
 from valve_friction_ros.identification.published import method as published
 from valve_friction_ros.identification.refined import method as refined
 from valve_friction_ros.identification.result import Result
+from valve_friction_ros.identification.robust import method as robust
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature import force_balance as signature
 from valve_friction_ros.model.recording import Recording
@@ -29,9 +30,11 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         refined.METHOD: refined.identify_refined,
         published.METHOD: published.identify_published,
         signature.METHOD: signature.identify_signature,
+        robust.METHOD: robust.identify_robust,
     }
 )
-"""``refined``: most accurate; ``published``: the paper's model 1; ``signature``: its model 2."""
+"""``refined``: most accurate; ``published``: the paper's model 1; ``signature``: its model 2;
+``robust``: experimental, for records of a plant with imperfections."""
 
 DEFAULT_METHOD = refined.METHOD
 
@@ -73,8 +76,9 @@ def identify(
     settings : IdentificationSettings, optional
         What is known beforehand, and the settings of the sweep.
     method : str
-        ``refined``, the most accurate, with intervals; ``published``, the paper's model 1; or
-        ``signature``, the paper's model 2, from a slow triangular wave.
+        ``refined``, the most accurate, with intervals; ``published``, the paper's model 1;
+        ``signature``, the paper's model 2, from a slow triangular wave; or ``robust``,
+        experimental, with the imperfections of a plant in the fit.
 
     Returns
     -------

@@ -89,7 +89,7 @@ class Result:
     misfit : Misfit or None
         A test of the model; None in a method without one.
     derivative_window : int
-        Derivative window that was used, samples.
+        Derivative window that was used, samples; 0 in a method without derivatives.
     warnings : tuple of str
         Limitations of the numbers, one sentence each.
     evidence : mapping of str to object

@@ -55,6 +55,11 @@ class IdentificationSettings:
         preload is F_0 = k·x̄; by default the preload is a regressor of its own.
     assumed_mass : float
         Mass, kg, above zero; used where the record does not determine the mass.
+    timing_uncertainty : float, optional
+        Standard deviation, s, of each time by which one signal may lag the other: clocks, damping
+        of transmitters, a volume before the diaphragm. Only the method ``robust`` uses it, by
+        default 0.03 s, a plant without special care; zero, as on the bench, means that the signals
+        certainly belong together.
 
     Raises
     ------
@@ -79,6 +84,7 @@ class IdentificationSettings:
     fixed: Mapping[str, float] = field(default_factory=dict)
     position_bias: float | None = None
     assumed_mass: float = 1.0
+    timing_uncertainty: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -95,6 +101,8 @@ class IdentificationSettings:
                 f"steps ({self.steps}) must be above zero and below resolution ({self.resolution})"
             )
         require_positive("assumed_mass", self.assumed_mass)
+        if self.timing_uncertainty is not None:
+            require_non_negative("timing_uncertainty", self.timing_uncertainty)
         object.__setattr__(self, "fixed", MappingProxyType(self._checked_fixed()))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)

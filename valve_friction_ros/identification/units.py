@@ -27,6 +27,7 @@ PARAMETER_UNITS: Mapping[str, str] = MappingProxyType(
         "coulomb_asymmetry": "1",
         "viscous_asymmetry": "1",
         CLOCK_OFFSET: "s",
+        "sliding_friction": "N",
     }
 )
 """Unit of every parameter that a result can hold; those after `UNITS` only if demanded."""

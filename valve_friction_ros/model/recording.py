@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_finite, require_positive
+from valve_friction_ros.model.stamped import StampedRecord
 
 __all__ = ["Recording"]
 
@@ -24,6 +25,8 @@ class Recording:
         Stem position, m. Kept as a read-only copy.
     start_time : float
         Time of the first sample, s, on the clock of the stamps.
+    stamped : StampedRecord, optional
+        The samples at their own stamps, where those are not the grid.
 
     Raises
     ------
@@ -45,6 +48,7 @@ class Recording:
     pressure: NDArray[np.float64] = field(repr=False)
     position: NDArray[np.float64] = field(repr=False)
     start_time: float = 0.0
+    stamped: StampedRecord | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not make a recording, and freeze them."""

@@ -14,7 +14,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-__all__ = ["find_corners", "independent_halves", "longest_faithful_window", "smooth_between"]
+__all__ = [
+    "find_corners",
+    "independent_halves",
+    "longest_faithful_window",
+    "smooth_between",
+    "smoothing_leverage",
+]
 
 _ORDER = 3
 """Order of the smoothing polynomials: the paper's n for derivatives."""
@@ -128,6 +134,26 @@ def _cubics(window: int) -> NDArray[np.float64]:
     """Orthonormal cubics over a window, shape (window, 4)."""
     place = np.linspace(-1.0, 1.0, window)
     return np.asarray(np.linalg.qr(np.vander(place, _ORDER + 1))[0], dtype=np.float64)
+
+
+def smoothing_leverage(size: int, corners: NDArray[np.intp], window: int) -> NDArray[np.float64]:
+    """Return the share of the noise's variance that `smooth_between` leaves at each sample.
+
+    It is 9/4 over the window inside a stretch, and rises to 16 over the window at its ends, where
+    the cubic is held from one side only.
+    """
+    shares = np.ones(size)
+    edges = (0, *corners.tolist(), size)
+    for begin, end in pairwise(edges):
+        fitting = _odd_at_most(end - begin, window)
+        if fitting <= _ORDER + 1:
+            continue
+        leverage = np.sum(_cubics(fitting) ** 2, axis=1)
+        half = fitting // 2
+        shares[begin:end] = leverage[half]
+        shares[begin : begin + half] = leverage[:half]
+        shares[end - half : end] = leverage[fitting - half :]
+    return shares
 
 
 def _local_cubics(stretch: NDArray[np.float64], window: int) -> NDArray[np.float64]:

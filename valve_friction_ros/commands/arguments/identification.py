@@ -7,6 +7,7 @@ from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     FIXABLE,
     METHODS,
+    TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
 
@@ -21,7 +22,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         choices=[*METHODS],
         default=DEFAULT_METHOD,
         help="refined, published: several fast strokes; signature: two periods or more "
-        "of a slow triangle (%(default)s)",
+        "of a slow triangle; robust: records of a plant, experimental (%(default)s)",
     )
     parser.add_argument(
         "--fix",
@@ -41,6 +42,13 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         help=f"derivative window d, samples; by default {defaults.published_window} for the "
         "published method, and chosen by the noise of the record for the others",
+    )
+    parser.add_argument(
+        "--timing-uncertainty",
+        type=float,
+        metavar="S",
+        help="standard deviation in s of each lag between the signals, for the method robust; "
+        f"by default {TIMING_UNCERTAINTY:g}",
     )
     parser.add_argument(
         "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
@@ -84,5 +92,6 @@ def identification_settings(
         order=options.order,
         fixed=_fixed(options.fix, known),
         position_bias=options.position_bias,
+        timing_uncertainty=options.timing_uncertainty,
         assumed_mass=known.get("mass", defaults.assumed_mass),
     )

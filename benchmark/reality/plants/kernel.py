@@ -1,0 +1,218 @@
+"""The motion of a valve under a drive, compiled once for each law of friction."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmark.reality.plants import laws
+from benchmark.reality.plants.constants import ELEMENTS, Constants
+from benchmark.reality.plants.laws import INNER, SLIDING, V, X
+from benchmark.reality.plants.parameters import Law
+
+__all__ = ["GRID", "SUMS", "Loop", "runner_of"]
+
+GRID = 1e-4
+"""Time between two points of the simulated signals, s."""
+
+SUMS = 6
+"""Sums over the record: ∫|dx|, ∫|F·dx|, ∫F_c|dx|, ∫dt of motion, ∫F_c·dt of it, and the largest
+friction without its viscous part."""
+
+_LOWEST, _HIGHEST = -0.15, 1.15
+"""Limits of what a controller commands."""
+
+
+class Loop(NamedTuple):
+    """How the command (0 to 1) is made, and the converter that turns it into pressure.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether a controller makes the command; else the signal is the command itself.
+    flow : bool
+        Whether the controller sees the flow; else the position of the stem.
+    gain, integral_time : float
+        Of the PI controller; 1 and s.
+    every : int
+        Points of the grid between two actions of the controller.
+    process_lag : float
+        First-order lag, s, from opening to measured flow.
+    bottom, span : float
+        Pressure at command 0, and its change to command 1, Pa.
+    converter_lag : float
+        First-order lag of the converter, s.
+    """
+
+    closed: bool
+    flow: bool
+    gain: float
+    integral_time: float
+    every: int
+    process_lag: float
+    bottom: float
+    span: float
+    converter_lag: float
+
+
+@numba.njit(inline="always")
+def _trend(place: float, change: float, bend: float) -> float:
+    """Return 1 plus a change that runs from −½ to ½ of `change` while `place` runs from 0 to 1."""
+    middle = place - 0.5
+    return change * (middle + bend * (2.0 * middle * middle - 1.0 / 6.0))
+
+
+@numba.njit
+def _pull(c: Constants, position: float, pressure: float) -> float:
+    """Return the force of actuator, spring and medium on the stem, N."""
+    place = position / c.travel
+    area = c.area * (1.0 + c.area_change * (place - 0.5))
+    curved = 0.5 * c.spring_curve * (place - 1.0)
+    load = c.preload + c.spring * position * (1.0 + curved)
+    flow = 0.0
+    if c.flow_force != 0.0:
+        flow = c.flow_force * max(place, 0.0) ** c.flow_exponent
+    return area * (pressure - c.pressure_reference) - load - flow
+
+
+def _advancer(advance: Callable[..., float]) -> Callable[..., float]:
+    """Compile the motion from one point of the grid to the next with one law of friction."""
+
+    @numba.njit(nogil=True)
+    def travelled(
+        c: Constants,
+        state: NDArray[np.float64],
+        pressures: NDArray[np.float64],
+        target: float,
+        shares: tuple[float, float],
+        in_time: float,
+        step: float,
+        sums: NDArray[np.float64],
+    ) -> float:
+        """Advance by one point, add to the sums, and return the friction at its end."""
+        distance, work, by_distance, moving, by_time = 0.0, 0.0, 0.0, 0.0, 0.0
+        pressure, inside = pressures[0], pressures[1]
+        friction, largest = 0.0, 0.0
+        for _ in range(round(GRID / step)):
+            pressure += shares[0] * (target - pressure)
+            inside += shares[1] * (pressure - inside)
+            scale = in_time
+            if c.along_change != 0.0:
+                scale *= 1.0 + _trend(state[X] / c.travel, c.along_change, c.along_bend)
+            friction = advance(c, state, _pull(c, state[X], inside), scale, step)
+            after = state[X] + step * state[V]
+            if after < c.lowest or after > c.highest:
+                after = min(max(after, c.lowest), c.highest)
+                state[V] = 0.0
+                state[SLIDING] = 0.0
+            moved = abs(after - state[X])
+            state[X] = after
+            if moved > 0.0:
+                distance += moved
+                work += abs(friction) * moved
+                by_distance += scale * moved
+                moving += step
+                by_time += scale * step
+                largest = max(largest, abs(friction - c.viscous * state[V]))
+        pressures[0], pressures[1] = pressure, inside
+        sums[0] += distance
+        sums[1] += work
+        sums[2] += by_distance * c.coulomb
+        sums[3] += moving
+        sums[4] += by_time * c.coulomb
+        sums[5] = max(sums[5], largest)
+        return friction
+
+    compiled: Callable[..., float] = travelled
+    return compiled
+
+
+@numba.njit
+def _controlled(loop: Loop, error: float, integral: float) -> tuple[float, float]:
+    """Return what a PI controller commands, and its integral."""
+    rate = loop.gain * error / loop.integral_time
+    integral = min(max(integral + rate * loop.every * GRID, _LOWEST), _HIGHEST)
+    return min(max(loop.gain * error + integral, _LOWEST), _HIGHEST), integral
+
+
+@numba.njit
+def _seen(loop: Loop, measured: float, opening: float) -> float:
+    """Return what the controller measures: the opening, or the flow that follows it."""
+    if loop.flow:
+        return measured + GRID / loop.process_lag * (opening - measured)
+    return opening
+
+
+def _runner(advance: Callable[..., float]) -> Callable[..., Any]:
+    """Compile the motion of a whole record with one law of friction.
+
+    It is compiled anew in each process: numba does not notice that a cached kernel calls another
+    one that has changed, and a benchmark must not measure with yesterday's plant.
+    """
+    travelled = _advancer(advance)
+
+    @numba.njit(nogil=True)
+    def run(
+        c: Constants,
+        loop: Loop,
+        signal: NDArray[np.float64],
+        disturbance: NDArray[np.float64],
+        step: float,
+        first: int,
+        outputs: NDArray[np.float64],
+        sums: NDArray[np.float64],
+    ) -> None:
+        """Fill the rows of `outputs`: pressure, position and friction at each point.
+
+        `first` is the point of the grid at which the record begins; the sums and the trend in
+        time begin there.
+        """
+        state = np.zeros(INNER + ELEMENTS)
+        command = integral = signal[0]
+        pressures = np.full(2, loop.bottom + loop.span * command)
+        state[X] = _balance(c, pressures[0])
+        measured = state[X] / c.travel
+        shares = (step / loop.converter_lag, step / c.volume_lag if c.volume_lag > 0.0 else 1.0)
+        record = float(max(signal.size - first, 1))
+        for point in range(signal.size):
+            outputs[0, point], outputs[1, point] = pressures[0], state[X]
+            measured = _seen(loop, measured, state[X] / c.travel)
+            if not loop.closed:
+                command = signal[point]
+            elif point % loop.every == 0:
+                error = signal[point] - measured - disturbance[point // loop.every]
+                command, integral = _controlled(loop, error, integral)
+            target = loop.bottom + loop.span * command
+            place = max((point - first) / record, 0.0)
+            in_time = 1.0 + _trend(place, c.record_change, c.record_bend)
+            if point == first:
+                sums[:] = 0.0
+            outputs[2, point] = travelled(c, state, pressures, target, shares, in_time, step, sums)
+
+    compiled: Callable[..., Any] = run
+    return compiled
+
+
+@numba.njit
+def _balance(c: Constants, pressure: float) -> float:
+    """Return where spring and actuator balance, m, by bisection over the travel."""
+    low, high = c.lowest, c.highest
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if _pull(c, middle, pressure) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+_RUNNERS: dict[Law, Callable[..., Any]] = {}
+
+
+def runner_of(law: Law) -> Callable[..., Any]:
+    """Return the compiled motion of a law; made at the first call."""
+    if law not in _RUNNERS:
+        _RUNNERS[law] = _runner(getattr(laws, law.value))
+    return _RUNNERS[law]

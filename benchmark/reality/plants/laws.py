@@ -1,0 +1,131 @@
+"""One time step of each law of friction, compiled.
+
+A step takes the numbers of the plant, the state, the force that pulls at the stem (N), the scale
+of the friction at this place and time, and the step (s). It writes the new speed into the state
+and returns the friction force, N, positive where it acts against upward motion. The state holds
+position, speed, whether the stem has broken away (1 or 0), and inner displacements or forces.
+"""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmark.reality.plants.constants import ELEMENTS, Constants
+
+__all__ = ["INNER", "SLIDING", "V", "X", "karnopp", "latched", "lugre", "maxwell", "moreau"]
+
+X, V, SLIDING, INNER = 0, 1, 2, 3
+"""Places in the state: position, speed, broken away, and the first inner number."""
+
+_State = NDArray[np.float64]
+
+
+@numba.njit(inline="always")
+def _way(value: float) -> float:
+    return 1.0 if value > 0.0 else -1.0
+
+
+@numba.njit(inline="always")
+def _level(c: Constants, speed: float) -> float:
+    """Return the friction, N, without its viscous part, at a speed ≥ 0 (Stribeck's curve)."""
+    if speed == 0.0:
+        return c.static
+    if c.stribeck_velocity == 0.0 or c.static == c.coulomb:
+        return c.coulomb
+    ratio = speed / c.stribeck_velocity
+    if ratio > 6.0:
+        return c.coulomb
+    return c.coulomb + (c.static - c.coulomb) * math.exp(-ratio * ratio)
+
+
+@numba.njit
+def moreau(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
+    """Step the set-valued law implicitly (Moreau, 1988): no speed is called zero but zero."""
+    impulse = c.mass * state[V] + step * pull
+    way = _way(impulse)
+    level = scale * (1.0 + way * c.asymmetry) * _level(c, abs(state[V]))
+    if abs(impulse) <= step * level:
+        state[V] = 0.0
+        return impulse / step
+    state[V] = (impulse - way * step * level) / (c.mass + step * c.viscous)
+    return way * level + c.viscous * state[V]
+
+
+@numba.njit(inline="always")
+def _slide(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
+    """Step a sliding stem under Coulomb and viscous friction; it stops where it would reverse."""
+    way = _way(state[V]) if state[V] != 0.0 else _way(pull)
+    level = scale * (1.0 + way * c.asymmetry) * c.coulomb
+    before = c.mass * state[V] + step * pull
+    after = (before - way * step * level) / (c.mass + step * c.viscous)
+    if after * way < 0.0:
+        state[V] = 0.0
+        return before / step
+    state[V] = after
+    return way * level + c.viscous * after
+
+
+@numba.njit
+def karnopp(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
+    """Step equation (2): below the limit velocity only static friction acts."""
+    if abs(state[V]) < c.limit_velocity or state[V] == 0.0:
+        way = _way(pull)
+        limit = scale * (1.0 + way * c.asymmetry) * c.static
+        if abs(pull) <= limit:
+            state[V] = 0.0
+            return pull
+        state[V] += step * (pull - way * limit) / c.mass
+        return way * limit
+    return _slide(c, state, pull, scale, step)
+
+
+@numba.njit
+def latched(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
+    """Step the Karnopp law whose static friction acts at rest and on a stem that slows down."""
+    way = _way(pull)
+    limit = scale * (1.0 + way * c.asymmetry) * c.static
+    if state[V] == 0.0:
+        if abs(pull) <= limit:
+            return pull
+        state[SLIDING] = 0.0
+    speed = abs(state[V])
+    if speed >= c.limit_velocity:
+        state[SLIDING] = 1.0
+    elif state[SLIDING] == 1.0 and abs(pull) <= limit:
+        state[V], state[SLIDING] = 0.0, 0.0
+        return pull
+    return _slide(c, state, pull, scale, step)
+
+
+@numba.njit
+def lugre(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
+    """Step a bristle of one stiffness, implicit in speed and bend, explicit in their product."""
+    speed = state[V]
+    level = scale * (1.0 + _way(speed) * c.asymmetry) * _level(c, abs(speed))
+    decay = c.stiffness * abs(speed) / level
+    share = (c.stiffness - c.bristle_damping * decay) / (1.0 + step * decay)
+    damping = share * step + c.bristle_damping + c.viscous
+    held = share * state[INNER]
+    after = (c.mass * speed + step * (pull - held)) / (c.mass + step * damping)
+    state[INNER] = (state[INNER] + step * after) / (1.0 + step * decay)
+    state[V] = after
+    return held + damping * after
+
+
+@numba.njit
+def maxwell(c: Constants, state: _State, pull: float, scale: float, step: float) -> float:
+    """Step springs in parallel that hold an equal share of the friction each, then slip."""
+    held = 0.0
+    for element in range(ELEMENTS):
+        held += state[INNER + element]
+    after = (c.mass * state[V] + step * (pull - held)) / (c.mass + step * c.viscous)
+    way = _way(after)
+    share = scale * (1.0 + way * c.asymmetry) * _level(c, abs(after)) / ELEMENTS
+    for element in range(ELEMENTS):
+        stiffness = c.stiffness / (element + 1.0)
+        force = state[INNER + element] + stiffness * step * after
+        state[INNER + element] = min(max(force, -share), share)
+    state[V] = after
+    return held + c.viscous * after

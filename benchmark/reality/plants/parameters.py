@@ -1,0 +1,146 @@
+"""What a simulated valve is made of: body, friction, and how either deviates from the ideal."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from types import MappingProxyType
+
+__all__ = ["PACKINGS", "PRESSURE_RANGE", "Body", "Friction", "Law", "Plant", "Trend"]
+
+PRESSURE_RANGE = (41740.0, 206840.0)
+"""Pressure of the converter at 0 % and 100 % of its input, Pa."""
+
+
+class Law(Enum):
+    """How the friction force follows from the motion."""
+
+    MOREAU = "moreau"
+    """Set-valued at rest; falls from static to Coulomb friction with speed (Stribeck)."""
+
+    KARNOPP = "karnopp"
+    """Equation (2) to the letter: below the limit velocity static friction acts."""
+
+    LATCHED = "latched"
+    """Karnopp, but a stem that has broken away slides until its speed falls to the limit."""
+
+    LUGRE = "lugre"
+    """A bristle that bends before the stem slides (Canudas de Wit, 1995)."""
+
+    MAXWELL = "maxwell"
+    """Several springs in parallel that slip one after the other (Iwan; generalized Maxwell)."""
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A smooth relative change from the beginning to the end of something.
+
+    Attributes
+    ----------
+    change : float
+        Relative change from 0 to 1 of the run, about its middle.
+    bend : float
+        Curvature: the share of `change` that is reached by a parabola, between −1 and 1.
+    """
+
+    change: float = 0.0
+    bend: float = 0.0
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Friction of a packing.
+
+    Attributes
+    ----------
+    coulomb, static, viscous : float
+        F_c (N), F_s (N) and F_v (N·s/m).
+    stribeck_velocity : float
+        Speed, m/s, at which the fall from F_s to F_c is a factor of e down; 0: at once.
+    law : Law
+        How the force follows from the motion.
+    presliding : float
+        Displacement, m, over which the force is built up, of LuGre and Maxwell.
+    limit_velocity : float
+        DV of the two Karnopp laws, m/s.
+    asymmetry : float
+        Relative excess of F_c and F_s upward, and lack of it downward.
+    along_travel : Trend
+        Change of F_c and F_s from the seat to the end of the travel.
+    in_record : Trend
+        Change of F_c and F_s from the first to the last second of the record.
+    """
+
+    coulomb: float
+    static: float
+    viscous: float
+    stribeck_velocity: float = 0.0
+    law: Law = Law.MOREAU
+    presliding: float = 0.0
+    limit_velocity: float = 0.0
+    asymmetry: float = 0.0
+    along_travel: Trend = field(default_factory=Trend)
+    in_record: Trend = field(default_factory=Trend)
+
+    def scaled(self, factor: float) -> "Friction":
+        """Return a packing with all its friction `factor` times as large."""
+        return replace(
+            self,
+            coulomb=self.coulomb * factor,
+            static=self.static * factor,
+            viscous=self.viscous * factor,
+        )
+
+
+@dataclass(frozen=True)
+class Body:
+    """Everything of a valve but its friction.
+
+    Attributes
+    ----------
+    mass, spring, preload : float
+        m (kg), k (N/m) at the middle of the travel, and F_0 (N).
+    area, pressure_reference, travel : float
+        S_a (m²) at the middle of the travel, P_ref (Pa) and nominal travel (m).
+    spring_curve, area_change : float
+        Relative change of stiffness and of area from the seat to the end of the travel.
+    flow_force, flow_exponent : float
+        Force of the medium at full travel, N, downward; it rises with this power of the opening.
+    seat, top : float
+        Where the stops are, m from the nominal ones, inward positive.
+    volume_lag : float
+        First-order lag, s, from the pressure sensor to the diaphragm.
+    """
+
+    mass: float
+    spring: float
+    preload: float
+    area: float = 0.0445
+    pressure_reference: float = PRESSURE_RANGE[0]
+    travel: float = 0.028575
+    spring_curve: float = 0.0
+    area_change: float = 0.0
+    flow_force: float = 0.0
+    flow_exponent: float = 2.0
+    seat: float = 0.0
+    top: float = 0.0
+    volume_lag: float = 0.0
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A valve: body and friction."""
+
+    body: Body
+    friction: Friction
+
+
+PACKINGS: Mapping[str, Plant] = MappingProxyType(
+    {
+        "low": Plant(Body(1.542, 2.05e5, 231.65), Friction(152.7, 152.7, 4865.0)),
+        "high": Plant(Body(1.75, 2.05e5, 231.65), Friction(606.0, 606.0, 4.48e4)),
+        "graphite": Plant(
+            Body(1.6, 2.069e5, 2571.0, pressure_reference=0.0), Friction(665.4, 942.4, 7.05e4)
+        ),
+    }
+)
+"""The paper's bench valve, lightly and strongly tightened, and with a graphite packing."""

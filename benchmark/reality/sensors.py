@@ -1,0 +1,197 @@
+"""What the sensors and their messages make of the true signals."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from benchmark.reality.plants.kernel import GRID
+from benchmark.reality.plants.motion import Motion
+from benchmark.reality.stamps import Stamping, Times, sampling_times, stamped
+
+__all__ = ["Instruments", "Sensor", "Signal", "measured"]
+
+
+class Signal(NamedTuple):
+    """One topic, or one column with its times.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (n,)
+        Times as they were written, ns, not decreasing.
+    values : ndarray of float, shape (n,)
+        Pa or m.
+    """
+
+    stamps: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """How one quantity is measured.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation, SI unit.
+    colour : float
+        Time constant of the noise's memory, s; 0: white.
+    low, high : float
+        Range, SI unit, of the converter and of the dead band.
+    bits : int
+        Resolution of the converter; 0: exact.
+    lag : float
+        First-order lag, s.
+    drift : float
+        Change of the zero, SI unit/s.
+    hold : float
+        Time for which a value is repeated, s; 0: each is new.
+    dead_band : float
+        Share of the range by which the value must change for a message; 0: all are sent.
+    silence : float
+        Longest time without a message under a dead band, s.
+    """
+
+    noise: float
+    low: float
+    high: float
+    colour: float = 0.0
+    bits: int = 0
+    lag: float = 0.0
+    drift: float = 0.0
+    hold: float = 0.0
+    dead_band: float = 0.0
+    silence: float = 10.0
+
+
+def _pressure_sensor() -> Sensor:
+    return Sensor(noise=100.0, low=0.0, high=250e3)
+
+
+def _position_sensor() -> Sensor:
+    return Sensor(noise=10e-6, low=0.0, high=0.030)
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """Both sensors and their clocks.
+
+    Attributes
+    ----------
+    pressure, position : Sensor
+        The sensors.
+    pressure_stamping, position_stamping : Stamping
+        When they sample and what time they write.
+    together : bool
+        Whether both are sampled at the same instants and lost together, as rows of a table.
+    """
+
+    pressure: Sensor = field(default_factory=_pressure_sensor)
+    position: Sensor = field(default_factory=_position_sensor)
+    pressure_stamping: Stamping = field(default_factory=Stamping)
+    position_stamping: Stamping = field(default_factory=Stamping)
+    together: bool = True
+
+
+def measured(
+    motion: Motion, instruments: Instruments, duration: float, seed: int
+) -> tuple[Signal, Signal]:
+    """Measure a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        The true signals.
+    instruments : Instruments
+        What measures them.
+    duration : float
+        Length of the record, s.
+    seed : int
+        Of the noise, and of all that happens to the messages.
+
+    Returns
+    -------
+    tuple of Signal
+        Pressure and position.
+    """
+    streams = np.random.SeedSequence([seed, 2]).spawn(4)
+    first, second, third, fourth = (np.random.default_rng(stream) for stream in streams)
+    pressure_times = sampling_times(instruments.pressure_stamping, duration, first)
+    position_times = pressure_times
+    if not instruments.together:
+        position_times = sampling_times(instruments.position_stamping, duration, second)
+    pressure = _values(motion, motion.pressure, instruments.pressure, pressure_times, third)
+    position = _values(motion, motion.position, instruments.position, position_times, fourth)
+    return (
+        _signal(instruments.pressure_stamping, pressure_times, *pressure),
+        _signal(instruments.position_stamping, position_times, *position),
+    )
+
+
+def _signal(
+    stamping: Stamping, times: Times, values: NDArray[np.float64], sent: NDArray[np.bool_]
+) -> Signal:
+    arrived = sent & ~times.lost
+    return Signal(stamped(stamping, times.written[arrived]), values[arrived])
+
+
+def _lagged(values: NDArray[np.float64], lag: float) -> NDArray[np.float64]:
+    """Return the response of a first-order lag to a signal that runs linearly between points."""
+    decay = np.exp(-GRID / lag)
+    memory = (1.0 - decay) * lag / GRID
+    ahead, behind = 1.0 - memory, memory - decay
+    start = [values[0] * (1.0 - ahead)]
+    response: NDArray[np.float64] = lfilter([ahead, behind], [1.0, -decay], values, zi=start)[0]
+    return response
+
+
+def _noise(sensor: Sensor, times: Times, random: np.random.Generator) -> NDArray[np.float64]:
+    white = random.standard_normal(times.taken.size)
+    if sensor.colour == 0.0 or times.taken.size < 2:
+        return sensor.noise * white
+    decay = float(np.exp(-times.period / sensor.colour))
+    white[1:] *= math.sqrt(1.0 - decay**2)
+    coloured = np.asarray(lfilter([1.0], [1.0, -decay], white), dtype=np.float64)
+    return sensor.noise * coloured
+
+
+def _values(
+    motion: Motion,
+    exact: NDArray[np.float64],
+    sensor: Sensor,
+    times: Times,
+    random: np.random.Generator,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the value of each sample, and whether it is sent."""
+    seen = _lagged(exact, sensor.lag) if sensor.lag > 0.0 else exact
+    values: NDArray[np.float64] = np.interp(times.taken, motion.time, seen)
+    values = values + sensor.drift * times.taken + _noise(sensor, times, random)
+    if sensor.bits:
+        unit = (sensor.high - sensor.low) / 2**sensor.bits
+        values = sensor.low + unit * np.round((values - sensor.low) / unit)
+    if sensor.hold > 0.0:
+        phase = sensor.hold * random.random()
+        renewed = phase + sensor.hold * np.floor((times.taken - phase) / sensor.hold)
+        values = values[np.searchsorted(times.taken, renewed - 1e-9)]
+    sent: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
+    if sensor.dead_band > 0.0:
+        band = sensor.dead_band * (sensor.high - sensor.low)
+        sent = _sent_by_exception(values, times.taken, band, sensor.silence)
+    return values, sent
+
+
+def _sent_by_exception(
+    values: NDArray[np.float64], times: NDArray[np.float64], band: float, silence: float
+) -> NDArray[np.bool_]:
+    """Tell which values differ from the last one sent, or come after a long silence."""
+    sent: NDArray[np.bool_] = np.zeros(values.size, dtype=np.bool_)
+    value, moment = np.inf, -np.inf
+    for sample, (now, time) in enumerate(zip(values.tolist(), times.tolist(), strict=True)):
+        if abs(now - value) > band or time - moment >= silence:
+            sent[sample] = True
+            value, moment = now, time
+    return sent

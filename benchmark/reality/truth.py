@@ -1,0 +1,196 @@
+"""What is true of a record: numbers that an identification is compared with."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmark.reality.plants.motion import Motion
+from benchmark.reality.plants.parameters import Body, Friction, Law, Plant, Trend
+from benchmark.reality.sensors import Instruments
+
+__all__ = ["NAMES", "TrueValue", "Truth", "truth_of"]
+
+NAMES = (
+    "mass",
+    "viscous_friction",
+    "coulomb_friction",
+    "static_friction",
+    "spring_constant",
+    "spring_preload",
+    "limit_velocity",
+    "sliding_friction",
+    "stribeck_velocity",
+    "coulomb_asymmetry",
+    "viscous_asymmetry",
+    "clock_offset",
+)
+"""Numbers of a truth."""
+
+
+@dataclass(frozen=True)
+class TrueValue:
+    """A number, and how far its definition leaves it open.
+
+    Attributes
+    ----------
+    value : float
+        The number, SI unit.
+    spread : float
+        Largest distance of another sensible definition: a friction that changes along the
+        travel has one mean by distance and another by time.
+    """
+
+    value: float
+    spread: float = 0.0
+
+    def error(self, estimate: float) -> float:
+        """Return how far an estimate is from all definitions, SI unit, ≥ 0."""
+        return max(abs(estimate - self.value) - self.spread, 0.0)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The truth about a record, SI units; see `NAMES`.
+
+    Attributes
+    ----------
+    mass, viscous_friction, coulomb_friction, static_friction : TrueValue
+        Of the plant.
+    spring_constant, spring_preload : TrueValue
+        Slope and intercept of all that acts along the travel, as the nominal area sees it.
+    limit_velocity : TrueValue
+        DV of a Karnopp plant; 0 for the others.
+    sliding_friction : TrueValue
+        ∫|F·dx| / ∫|dx| of the record.
+    stribeck_velocity : TrueValue
+        Speed over which F_s falls to F_c, by exp(−(v/v_s)²); nan where they are equal.
+    coulomb_asymmetry, viscous_asymmetry : TrueValue
+        Share by which the friction is larger upward, and smaller downward.
+    clock_offset : TrueValue
+        Time by which the stem is seen late, s, slow sensors and a volume before it included.
+    distance : float
+        ∫|dx|, m.
+    """
+
+    mass: TrueValue
+    viscous_friction: TrueValue
+    coulomb_friction: TrueValue
+    static_friction: TrueValue
+    spring_constant: TrueValue
+    spring_preload: TrueValue
+    limit_velocity: TrueValue
+    sliding_friction: TrueValue
+    stribeck_velocity: TrueValue
+    coulomb_asymmetry: TrueValue
+    viscous_asymmetry: TrueValue
+    clock_offset: TrueValue
+    distance: float
+
+
+def _among(value: float, others: Iterable[float]) -> TrueValue:
+    return TrueValue(value, max((abs(other - value) for other in others), default=0.0))
+
+
+def _factor(trend: Trend, place: float) -> float:
+    middle = place - 0.5
+    return 1.0 + trend.change * (middle + trend.bend * (2.0 * middle**2 - 1.0 / 6.0))
+
+
+def _load(body: Body, position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return spring and medium, N, as the nominal area sees them."""
+    place = position / body.travel
+    spring = body.spring * position * (1.0 + 0.5 * body.spring_curve * (place - 1.0))
+    flow = body.flow_force * np.maximum(place, 0.0) ** body.flow_exponent
+    area = 1.0 + body.area_change * (place - 0.5)
+    load: NDArray[np.float64] = (body.preload + spring + flow) / area
+    return load
+
+
+def _springs(
+    body: Body, position: NDArray[np.float64], drifts: Iterable[float]
+) -> tuple[TrueValue, TrueValue]:
+    """Return k and F_0: over the places that were visited, by time, by the ends, and nominal."""
+    low, high = float(position.min()), float(position.max())
+    places = np.linspace(low, high, 200, dtype=np.float64)
+    fits = [np.polyfit(where, _load(body, where), 1) for where in (places, position[::100])]
+    ends = np.array([low, high])
+    fits.append(np.polyfit(ends, _load(body, ends), 1))
+    slopes: list[float] = [float(fit[0]) for fit in fits]
+    intercepts = [float(fit[1]) for fit in fits]
+    middle, *shifts = drifts
+    preload = intercepts[0] + middle
+    seen = [one + shift for one in (*intercepts[1:], body.preload) for shift in (middle, *shifts)]
+    seen += [intercepts[0] + shift for shift in shifts]
+    return _among(slopes[0], (*slopes[1:], body.spring)), _among(preload, seen)
+
+
+def _frictions(plant: Plant, motion: Motion, middle: float) -> tuple[TrueValue, TrueValue]:
+    """Return F_c and F_s: by distance, by time, in the middle, and as the nominal area sees it."""
+    body, friction = plant.body, plant.friction
+    place = middle / body.travel
+    area = 1.0 + body.area_change * (place - 0.5)
+    by_place = friction.coulomb * _factor(friction.along_travel, place)
+    levels = (motion.coulomb_by_distance, motion.coulomb_by_time, by_place)
+    coulomb = _among(levels[0], (*levels[1:], levels[0] / area))
+    ratio = friction.static / friction.coulomb
+    peaks = [ratio * level for level in levels[1:]] + [ratio * levels[0] / area]
+    if friction.law in (Law.LUGRE, Law.MAXWELL):
+        peaks.append(motion.largest)
+    return coulomb, _among(ratio * levels[0], peaks)
+
+
+def _sliding(motion: Motion, recorded: NDArray[np.bool_]) -> TrueValue:
+    """Return the work of friction a distance; bending that springs back is open to definition."""
+    position, force = motion.position[recorded], motion.friction[recorded]
+    lost = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(position)))
+    if motion.distance == 0.0:
+        return TrueValue(float("nan"))
+    return _among(motion.work / motion.distance, (abs(lost) / motion.distance,))
+
+
+def _offset(plant: Plant, instruments: Instruments) -> TrueValue:
+    """Return the clock offset: with all that looks like one, and alone."""
+    stem, pressure = instruments.position, instruments.pressure
+    clocks = instruments.position_stamping.offset - instruments.pressure_stamping.offset
+    lags = stem.lag - pressure.lag + plant.body.volume_lag
+    held = 0.5 * (stem.hold - pressure.hold)
+    return _among(clocks + lags + held, (clocks, clocks + lags, clocks + held))
+
+
+def _limit_velocity(friction: Friction) -> float:
+    karnopp = friction.law in (Law.KARNOPP, Law.LATCHED)
+    return friction.limit_velocity if karnopp else 0.0
+
+
+def truth_of(plant: Plant, motion: Motion, instruments: Instruments, duration: float) -> Truth:
+    """Return the truth about a record of `duration` seconds.
+
+    Where a number changes in the record, or has no single definition there, its value is the
+    mean over the distance, and `spread` holds what other definitions make of it.
+    """
+    recorded = motion.time >= -1e-9
+    position = motion.position[recorded]
+    middle = 0.5 * float(position.min() + position.max())
+    body, friction = plant.body, plant.friction
+    falls = friction.static > friction.coulomb
+    end = body.area * instruments.pressure.drift * duration
+    spring, preload = _springs(body, position, (0.5 * end, 0.0, end))
+    coulomb, static = _frictions(plant, motion, middle)
+    area = 1.0 + body.area_change * (middle / body.travel - 0.5)
+    return Truth(
+        mass=TrueValue(body.mass),
+        viscous_friction=_among(friction.viscous, (friction.viscous / area,)),
+        coulomb_friction=coulomb,
+        static_friction=static,
+        spring_constant=spring,
+        spring_preload=preload,
+        limit_velocity=TrueValue(_limit_velocity(friction)),
+        sliding_friction=_sliding(motion, recorded),
+        stribeck_velocity=TrueValue(friction.stribeck_velocity if falls else float("nan")),
+        coulomb_asymmetry=TrueValue(friction.asymmetry),
+        viscous_asymmetry=TrueValue(0.0),
+        clock_offset=_offset(plant, instruments),
+        distance=motion.distance,
+    )

@@ -1,0 +1,323 @@
+"""A stamped record as the fit takes it: a force to simulate with, a stem to compare with."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.smoothing import (
+    find_corners,
+    longest_faithful_window,
+    smooth_between,
+    smoothing_leverage,
+)
+from valve_friction_ros.signals.stamped_noise import stamped_noise
+
+__all__ = ["FittedRecord", "SlowView", "fitted_record", "set_anew_at_rests"]
+
+_LONGEST_PERIOD = 5e-3
+"""Longest step of the simulation, s: within it a corner of the pressure may lie."""
+
+_SAMPLES_A_WINDOW = 32
+_CORNER_TIME = 0.04
+_CORNER_SAMPLES = 8
+_LONGEST_SMOOTHING = 0.5
+_SLOW = 0.1
+"""Time, s, over which the measured stem is averaged, twice, to evaluate slow terms along it."""
+
+_GAP_PERIODS = 10
+_GAP_TIME = 0.05
+"""Longer pauses than so many periods, and than this, s, are gaps: what is between them is lost."""
+
+_LINE_TIME = 0.05
+_LINE_SAMPLES = 4
+_SURELY = 5.0
+"""Standard errors by which a stem must move at the start, to be set moving."""
+
+_MEMORY = 2.5
+"""Lengths of the smoothing window over those through which its error stays the same."""
+
+_FEWEST = 100
+_STILL = 0.01
+"""Share of the top speed below which the averaged stem rests."""
+
+_REST_MEAN = 0.1
+_REST_MARGIN = 0.15
+"""Time, s, over which the place of a rest is averaged, and before the averaged stem leaves it."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlowView:
+    """Slow terms along the measured stem and along time, at each step of the simulation.
+
+    Attributes
+    ----------
+    place : ndarray of float
+        Position, −1 at the lowest and 1 at the highest place that was measured.
+    age : ndarray of float
+        Time, −1 at the beginning and 1 at the end.
+    speed : ndarray of float
+        Speed, m/s.
+    force : ndarray of float
+        Actuator force, N, averaged like the stem.
+    lowest, highest : float
+        Ends of the measured positions, m.
+    """
+
+    place: NDArray[np.float64]
+    age: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    force: NDArray[np.float64]
+    lowest: float
+    highest: float
+
+    @property
+    def range(self) -> float:
+        """Distance between the ends, m."""
+        return self.highest - self.lowest
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRecord:
+    """What the fit needs of a record.
+
+    Attributes
+    ----------
+    period : float
+        Step of the simulation, s.
+    force : ndarray of float, shape (g,)
+        Smoothed actuator force at each step, N.
+    rate : ndarray of float, shape (g,)
+        Its derivative, N/s.
+    anew, leaving : ndarray of float, shape (g,)
+        Where the stem is set anew after a gap, m, nan elsewhere; and its velocity there and at the
+        start, m/s.
+    reading : sparse matrix, shape (c, g)
+        Makes the means of cells of one step, as the stem's stamps lie in them, of positions at
+        each step.
+    position : ndarray of float, shape (c,)
+        The means that were measured, m.
+    time : ndarray of float, shape (c,)
+        The mean time of each cell, s.
+    samples : ndarray of float, shape (c,)
+        Samples in each cell.
+    noise : float
+        Deviation of the noise of one sample of the stem, m.
+    force_variance : ndarray of float, shape (c,)
+        Variance of the smoothed force, N².
+    memory : float
+        Cells through which the error of the smoothed force stays the same.
+    slow : SlowView
+        Slow terms.
+    travel : float
+        Of the valve, m.
+    lost : float
+        Time in gaps, s.
+    start : float
+        Position at the first step, m.
+    """
+
+    period: float
+    force: NDArray[np.float64] = field(repr=False)
+    rate: NDArray[np.float64] = field(repr=False)
+    anew: NDArray[np.float64] = field(repr=False)
+    leaving: NDArray[np.float64] = field(repr=False)
+    reading: sparse.csr_matrix = field(repr=False)
+    position: NDArray[np.float64] = field(repr=False)
+    time: NDArray[np.float64] = field(repr=False)
+    samples: NDArray[np.float64] = field(repr=False)
+    noise: float
+    force_variance: NDArray[np.float64] = field(repr=False)
+    memory: float
+    slow: SlowView = field(repr=False)
+    travel: float
+    lost: float
+    start: float
+
+    @property
+    def duration(self) -> float:
+        """Time from the first step to the last, s."""
+        return (self.force.size - 1) * self.period
+
+
+def _smoothed(
+    pressure: NDArray[np.float64], noise: float, period: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
+    """Smooth the pressure between its corners; return it, its leverages and the window."""
+    corners = find_corners(pressure, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
+    longest = max(round(_LONGEST_SMOOTHING / period), 1)
+    window = longest_faithful_window(pressure, corners, noise, longest)
+    if window == 1:
+        return pressure, np.ones_like(pressure), window
+    smooth = smooth_between(pressure, corners, window)
+    return smooth, smoothing_leverage(pressure.size, corners, window), window
+
+
+def _averaged_twice(signal: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    """Average over `length` samples, twice; the ends are held."""
+    kernel = np.full(length, 1.0 / length)
+    for _ in range(2):
+        padded = np.pad(signal, length, mode="edge")
+        signal = np.convolve(padded, kernel, "same")[length:-length]
+    return signal
+
+
+def _gaps(signal: StampedSignal, grid: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which steps lie in a gap of the signal."""
+    pauses = np.diff(signal.time)
+    longest = max(_GAP_PERIODS * signal.period, _GAP_TIME)
+    lost = np.zeros(grid.size, dtype=np.bool_)
+    for index in np.flatnonzero(pauses > longest).tolist():
+        lost |= (grid > signal.time[index]) & (grid < signal.time[index + 1])
+    return lost
+
+
+def _line(stem: StampedSignal, noise: float, begin: float) -> tuple[float, float]:
+    """Return place and velocity of the stem at `begin`; the velocity is 0 where it may be noise."""
+    first = int(np.searchsorted(stem.time, begin))
+    last = max(int(np.searchsorted(stem.time, begin + _LINE_TIME)), first + _LINE_SAMPLES)
+    since, place = stem.time[first:last] - begin, stem.value[first:last]
+    if since.size < 3:
+        return float(place[0] if place.size else stem.value[-1]), 0.0
+    spread = float(np.sqrt(np.sum((since - since.mean()) ** 2)))
+    velocity, intercept = np.polyfit(since, place, 1).tolist()
+    if abs(velocity) * spread < _SURELY * noise:
+        return float(np.median(place)), 0.0
+    return intercept, velocity
+
+
+def _set_anew(
+    lost: NDArray[np.bool_], grid: NDArray[np.float64], stem: StampedSignal, noise: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return place and velocity of the stem at the first step and after each gap.
+
+    The place is nan elsewhere, and at the first step, where the fit finds it.
+    """
+    anew, leaving = np.full(grid.size, np.nan), np.zeros(grid.size)
+    leaving[0] = _line(stem, noise, float(stem.time[0]))[1]
+    for step in (np.flatnonzero(lost[:-1] & ~lost[1:]) + 1).tolist():
+        if grid[step] < stem.time[-1]:
+            anew[step], leaving[step] = _line(stem, noise, float(grid[step]))
+    return anew, leaving
+
+
+def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
+    """Smooth the pressure on a uniform grid, and leave the stem at its own stamps.
+
+    The pressure is smooth but for its corners, so it may be interpolated; the positions may not.
+    The simulated stem is read where the stem was stamped, so jitter, drops and rates cost no more
+    than the samples that they take. The positions of one step are averaged, which loses nothing.
+
+    Raises
+    ------
+    RefusalError
+        If the signals have too little time in common.
+    """
+    begin = max(record.pressure.time[0], record.position.time[0])
+    end = min(record.pressure.time[-1], record.position.time[-1])
+    inside = (record.position.time >= begin) & (record.position.time <= end)
+    if np.count_nonzero(inside) < _FEWEST:
+        raise RefusalError(
+            f"the two signals share {np.count_nonzero(inside)} positions: their clocks differ, or "
+            f"the record is too short; at least {_FEWEST} are needed"
+        )
+    stem = StampedSignal(record.position.time[inside] - begin, record.position.value[inside])
+    drive = StampedSignal(record.pressure.time - begin, record.pressure.value)
+    finest = min(stem.period, drive.period)
+    grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
+    raw = np.interp(grid, drive.time, drive.value)
+    pressure_noise = stamped_noise(drive)
+    pressure, leverage, window = _smoothed(raw, pressure_noise, finest)
+    if finest > _LONGEST_PERIOD:
+        period = finest / math.ceil(finest / _LONGEST_PERIOD - 1e-9)
+        fine = np.arange(0.0, grid[-1], period, dtype=np.float64)
+        pressure, leverage = np.interp(fine, grid, pressure), np.interp(fine, grid, leverage)
+        grid = fine
+    else:
+        stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / finest)), 1)
+        period = stride * finest
+        grid, pressure, leverage = grid[::stride], pressure[::stride], leverage[::stride]
+    lost = _gaps(drive, grid) | _gaps(stem, grid)
+    place = stem.time / period
+    step = np.minimum(place.astype(np.intp), grid.size - 2)
+    share = place - step
+    used = (share <= 1.0) & ~(lost[step] | lost[step + 1])
+    step, share = step[used], share[used]
+    first, cell, count = np.unique(step, return_inverse=True, return_counts=True)
+    weight: NDArray[np.float64] = 1.0 / count[cell]
+    reading = sparse.csr_matrix(
+        (
+            np.concatenate([(1.0 - share) * weight, share * weight]),
+            (np.concatenate([cell, cell]), np.concatenate([step, step + 1])),
+        ),
+        shape=(first.size, grid.size),
+    )
+    position = np.bincount(cell, weight * stem.value[used])
+    time = np.bincount(cell, weight * stem.time[used])
+    force = valve.actuator_force(pressure)
+    stem_noise = max(stamped_noise(stem), 1e-9 * float(np.ptp(position)))
+    return FittedRecord(
+        period,
+        force,
+        np.gradient(force, period),
+        *_set_anew(lost, grid, stem, stem_noise),
+        reading,
+        np.asarray(position, dtype=np.float64),
+        np.asarray(time, dtype=np.float64),
+        count.astype(np.float64),
+        stem_noise,
+        np.interp(time, grid, leverage) * (valve.diaphragm_area * pressure_noise) ** 2,
+        max(window * finest / (_MEMORY * period), 1.0),
+        _slow_view(grid, np.interp(grid, time, position), force, period),
+        valve.travel,
+        float(np.count_nonzero(lost)) * period,
+        _line(stem, stem_noise, float(stem.time[0]))[0],
+    )
+
+
+def _slow_view(
+    grid: NDArray[np.float64],
+    position: NDArray[np.float64],
+    force: NDArray[np.float64],
+    period: float,
+) -> SlowView:
+    length = max(round(_SLOW / period), 1)
+    stem = _averaged_twice(position, length)
+    velocity = np.gradient(stem, period)
+    lowest, highest = float(stem.min()), float(stem.max())
+    return SlowView(
+        (2.0 * stem - lowest - highest) / max(highest - lowest, np.finfo(float).tiny),
+        2.0 * grid / grid[-1] - 1.0,
+        np.abs(velocity),
+        velocity,
+        _averaged_twice(force, length),
+        lowest,
+        highest,
+    )
+
+
+def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
+    """Return the record with the stem set to its measured place at the end of each rest.
+
+    A resting stem has forgotten all but its place, so each move stands for itself: a single jump
+    that is simulated at the wrong time then spoils no other. What a place is off by noise is the
+    price; the end of a fit does without.
+    """
+    speed = record.slow.speed
+    still = speed < _STILL * np.quantile(speed, 0.98)
+    edges = np.flatnonzero(np.diff(still)) + 1
+    bounds = np.concatenate([[0], edges, [still.size]])
+    positions = np.interp(np.arange(still.size) * record.period, record.time, record.position)
+    anew = record.anew.copy()
+    mean, margin = (max(round(time / record.period), 1) for time in (_REST_MEAN, _REST_MARGIN))
+    for begin, end in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        last = end - margin
+        if still[begin] and last - mean > begin and last > 0:
+            anew[last] = float(np.mean(positions[last - mean : last]))
+    return replace(record, anew=anew)

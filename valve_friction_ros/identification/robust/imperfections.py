@@ -1,0 +1,94 @@
+"""Imperfections of a plant that take part in the fit, and what is known of them beforehand.
+
+Each is a coordinate with a Gaussian prior about zero. Where the record does not determine it, the
+prior remains, and shows in every interval that depends on it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+__all__ = ["BOUNDS", "IMPERFECTIONS", "TIMING", "Imperfection", "deviations"]
+
+TIMING = ("delay", "stem_lag", "force_lag")
+"""A late clock of the stem, s; a slow sensor of the stem, s; a volume before the diaphragm, or
+with the other sign a slow sensor of the pressure, s."""
+
+
+@dataclass(frozen=True)
+class Imperfection:
+    """What is known of an imperfection before the record is seen.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the prior, in the unit of the coordinate.
+    step : float
+        Change by which the motion is differentiated.
+    words : str
+        What to call it in a sentence.
+    """
+
+    deviation: float
+    step: float
+    words: str
+
+
+IMPERFECTIONS: Mapping[str, Imperfection] = MappingProxyType(
+    {
+        "delay": Imperfection(1.0, 2e-3, "clock offset (stem late or early)"),
+        "stem_lag": Imperfection(1.0, 2e-3, "lag of a slow stem sensor"),
+        "force_lag": Imperfection(1.0, 2e-3, "lag of the pressure: slow sensor or volume"),
+        "along_travel": Imperfection(0.1, 0.02, "friction that changes along the travel"),
+        "in_record": Imperfection(0.1, 0.02, "friction that changes during the record"),
+        "at_low_speed": Imperfection(0.1, 0.03, "friction that falls with speed (Stribeck)"),
+        "curvature": Imperfection(0.02, 4e-3, "curved spring, area or flow force along travel"),
+        "cubic": Imperfection(0.01, 4e-3, "stiffness of the spring varies along travel"),
+        "drift": Imperfection(2e-3, 1e-3, "zero of the pressure drifts with time"),
+        "presliding": Imperfection(2e-5, 5e-6, "presliding (elastic creep before it slides)"),
+        "limit_velocity": Imperfection(3e-4, 1e-4, "dead zone of speed (limit velocity DV)"),
+        "viscous_asymmetry": Imperfection(0.1, 0.02, "asymmetric friction, upward and downward"),
+        "mass": Imperfection(2.0, 0.5, "mass"),
+        "slip_force": Imperfection(0.5, 0.08, "static friction (slip jump)"),
+        "stribeck_velocity": Imperfection(4e-3, 5e-5, "friction that falls with speed"),
+    }
+)
+"""By the name of the coordinate. Shares are of F_c (friction, slip force), of k times the measured
+range (spring) and of the force's range in a minute (drift); times s, lengths m, speeds m/s. The
+deviations of the timing are shares of `timing_uncertainty`, that of the mass is one of the mass
+that is assumed."""
+
+BOUNDS: Mapping[str, float] = MappingProxyType(
+    {
+        "coulomb_friction": 0.0,
+        "viscous_friction": 0.0,
+        "spring_constant": 1.0,
+        "slip_force": 0.0,
+        "mass": 0.02,
+        "stem_lag": 0.0,
+        "presliding": 0.0,
+        "limit_velocity": 0.0,
+        "stribeck_velocity": 1e-4,
+    }
+)
+"""Least values of the coordinates that have one."""
+
+
+def deviations(
+    timing_uncertainty: float, assumed_mass: float, dry_friction: float, minutes: float
+) -> dict[str, float]:
+    """Return the standard deviation of each prior in the coordinate's own unit.
+
+    Each source of a lag has `timing_uncertainty` for itself: a single slow sensor may be all there
+    is. Without one they are left out.
+    """
+    own = {name: one.deviation for name, one in IMPERFECTIONS.items()}
+    own["mass"] *= assumed_mass
+    own["slip_force"] *= dry_friction
+    own["drift"] *= max(minutes, 0.1)
+    for name in TIMING:
+        if timing_uncertainty > 0:
+            own[name] *= timing_uncertainty
+        else:
+            del own[name]
+    return own

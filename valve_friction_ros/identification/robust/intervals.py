@@ -1,0 +1,152 @@
+"""Intervals of the reported numbers, and where they come from."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.robust.broad_model import MAIN
+from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
+from valve_friction_ros.identification.robust.numbers import (
+    REPORTED,
+    ReportedNumber,
+    loop_friction,
+    reported_numbers,
+)
+from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, Stage
+from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
+
+__all__ = ["NOISE_LIKE", "Budget", "Estimated", "estimated"]
+
+_QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
+NOISE_LIKE = 4.0
+"""Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
+
+_LOST = 0.5
+"""Share by which the sliding friction of what was lost in gaps may differ from the mean."""
+
+_LOOP = 0.02
+"""Share by which the work of friction by the averaged signals may be off."""
+
+_FINEST = {"sliding_friction": 3e-3, "spring_constant": 2e-4}
+_FINEST_OTHER = 5e-4
+"""No interval is narrower than this share of its value, however quiet the record is. The speed of
+the stem, and so the mean friction, is known no better than the step of the simulation allows."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Standard uncertainties by their sources, in the number's unit (after the GUM).
+
+    Attributes
+    ----------
+    record : float
+        Noise and misfit of the record, and its imperfections.
+    timing : float
+        Lag between the signals.
+    sources : mapping of str to float
+        Of each imperfection whose prior counts, timing among them.
+    """
+
+    record: float
+    timing: float
+    sources: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A number with its interval.
+
+    Attributes
+    ----------
+    value, half_width : float
+        SI unit.
+    budget : Budget
+        Where its width comes from.
+    """
+
+    value: float
+    half_width: float
+    budget: Budget
+
+
+def _vector(fit: PosteriorFit, number: ReportedNumber) -> NDArray[np.float64]:
+    return np.array([number.gradient.get(name, 0.0) for name in fit.names])
+
+
+def _budget(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> Budget:
+    """Split the posterior variance gᵀCg = gᵀC(H + Λ)Cg by the priors: Λ is diagonal."""
+    spread = stage.covariance @ _vector(fit, number)
+    total = float(_vector(fit, number) @ spread)
+    shares = fit.precision * spread**2
+    sources = {
+        name: math.sqrt(share)
+        for name, share in zip(fit.names, shares.tolist(), strict=True)
+        if share > 0
+    }
+    timing = sum(sources.get(name, 0.0) ** 2 for name in TIMING)
+    rest = max(total - timing, 0.0) + number.definition**2
+    return Budget(math.sqrt(rest), math.sqrt(timing), sources)
+
+
+def _half_width(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> float:
+    """Half width at one place; what the fit has not done yet is added in full."""
+    gradient = _vector(fit, number)
+    variance = float(gradient @ stage.covariance @ gradient) + number.definition**2
+    left = abs(float(gradient @ _possible(fit)))
+    return _QUANTILE * math.sqrt(max(variance, 0.0)) + left
+
+
+def _possible(fit: PosteriorFit) -> NDArray[np.float64]:
+    """Return the step that remains, where it would change no force by more than a third."""
+    bounds = np.array([0.3 * abs(fit.at[n]) if n in MAIN else math.inf for n in fit.names])
+    return np.clip(fit.remaining, -bounds, bounds)
+
+
+def _chance(fit: PosteriorFit) -> float:
+    """Fall of the sum of squares that the imperfections bring though there are none, at most.
+
+    It is χ² distributed with as many degrees of freedom: two standard deviations above its mean.
+    """
+    count = sum(name in IMPERFECTIONS for name in fit.names)
+    return count + 2.0 * math.sqrt(2.0 * count)
+
+
+def estimated(fit: PosteriorFit) -> dict[str, Estimated]:
+    """Return the reported numbers with their intervals.
+
+    Of the places that the fit came by, those count whose probability chance may have lowered. The
+    one with the least imperfections among them gives the values; the intervals reach to what the
+    others say, the less probable ones less far: along a bent valley the linear model at one place
+    sees too little. Where the residual is more than noise, the interval of the sliding friction
+    also holds what the measured signals alone say (`loop_friction`).
+    """
+    costs = [one.misfit / fit.inflation + one.penalty for one in fit.stages]
+    least, chance = min(costs), _chance(fit)
+    places = [
+        (stage, cost - least)
+        for stage, cost in zip(fit.stages, costs, strict=True)
+        if cost - least < chance
+    ]
+    places.sort(key=lambda place: place[0].penalty)
+    readings = [reported_numbers(fit.model, stage.at) for stage, _ in places]
+    result = {}
+    for name in REPORTED:
+        first = readings[0][name]
+        width = _half_width(fit, places[0][0], first)
+        for (stage, behind), numbers in zip(places[1:], readings[1:], strict=True):
+            near = math.sqrt(max(1.0 - behind / chance, 0.0))
+            apart = abs(numbers[name].value - first.value)
+            width = max(width, near * (apart + 0.5 * _half_width(fit, stage, numbers[name])))
+        if name == "sliding_friction":
+            lost = fit.model.record.lost / fit.model.record.duration
+            width = math.hypot(width, _LOST * lost * abs(first.value))
+        if name == "sliding_friction" and fit.inflation > NOISE_LIKE:
+            apart = abs(loop_friction(fit.model, places[0][0].at) - first.value)
+            width = math.hypot(width, apart + _LOOP * abs(first.value))
+        width = max(width, _FINEST.get(name, _FINEST_OTHER) * abs(first.value))
+        result[name] = Estimated(first.value, width, _budget(fit, places[0][0], first))
+    return result

@@ -1,0 +1,184 @@
+"""Method "robust": every imperfection of a plant takes part in the fit, with a stated prior."""
+
+import numpy as np
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.robust.fitted_record import fitted_record
+from valve_friction_ros.identification.robust.intervals import estimated
+from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.robust.remarks import sampling_remarks
+from valve_friction_ros.identification.robust.search import Prior, search
+from valve_friction_ros.identification.robust.sentences import found_imperfections
+from valve_friction_ros.identification.robust.verdicts import fit_misfit, fit_verdicts
+from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.identification.trust.excitation import (
+    require_enough_samples,
+    require_motion,
+    require_related_signals,
+    require_stem_between_stops,
+    require_travel,
+    require_two_directions,
+)
+from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import measured
+
+__all__ = ["METHOD", "TIMING_UNCERTAINTY", "identify_robust"]
+
+METHOD = "robust"
+"""Name of this method."""
+
+TIMING_UNCERTAINTY = 0.03
+"""Timing uncertainty without a setting, s.
+
+Chosen: stamps, transmitters and tubing of a plant without special care."""
+
+
+def identify_robust(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
+    """Identify a record of a plant: stamps as they are, imperfections in the fit.
+
+    The most probable model is found where each imperfection (lags, curved spring, friction that
+    changes, …) has a Gaussian prior about zero. An imperfection that the record does not determine
+    widens every interval that depends on it. Experimental: a lag on a square wave can still give
+    confidently wrong numbers.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position; `Recording.stamped` is used where it is given.
+    valve : Valve
+        Geometry.
+    settings : IdentificationSettings, optional
+        Fixed parameters, assumed mass and timing uncertainty (by default `TIMING_UNCERTAINTY`).
+        Derivative window, order, sweep and a fixed limit velocity do not matter here.
+
+    Returns
+    -------
+    Result
+        Parameters with intervals and verdicts, `sliding_friction` among them: the work of friction
+        over the distance. The evidence is the uncertainty budget of each: its standard uncertainty
+        by the record and by the timing. The derivative window is 0.
+
+    Raises
+    ------
+    RefusalError
+        If the record does not determine the friction; the message names cause and remedy.
+    """
+    settings = settings or IdentificationSettings()
+    _require_fit(settings)
+    _require_record(recording, valve, settings)
+    record = _stamped(recording)
+    fit = search(fitted_record(record, valve), _prior(settings))
+    numbers = estimated(fit)
+    misfit = fit_misfit(fit, numbers)
+    if misfit.is_gross:
+        raise RefusalError(
+            f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
+            f"{misfit.systematic * 1e3:.2g} mm of misfit): check that both signals belong to this "
+            "valve, and their units; if the packing was changed during the record, clear the "
+            "buffer and record again"
+        )
+    return Result(
+        method=METHOD,
+        recording=recording,
+        valve=valve,
+        settings=settings,
+        parameters=fit_verdicts(fit, numbers, settings, misfit),
+        fit=misfit.fit,
+        rms=misfit.rms,
+        misfit=misfit,
+        derivative_window=0,
+        warnings=(*_doubts(misfit), *found_imperfections(fit), *sampling_remarks(record)),
+        evidence={
+            "uncertainty_budget": {
+                name: {"record": one.budget.record, "timing": one.budget.timing}
+                for name, one in numbers.items()
+            }
+        },
+        findings=(
+            f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is "
+            f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not "
+            "noise",
+        ),
+        model=_model(fit),
+        stem=_stem(fit),
+    )
+
+
+def _require_fit(settings: IdentificationSettings) -> None:
+    """Refuse settings that this fit has no place for."""
+    if settings.fixed.get("spring_constant") == 0.0:
+        raise RefusalError("the robust fit needs a spring: use the method refined")
+    if settings.position_bias is not None:
+        raise RefusalError("the robust fit takes no position bias: use the method refined")
+    if "static_friction" in settings.fixed:
+        raise RefusalError("the robust fit takes no fixed F_s: use the method refined")
+
+
+def _require_record(recording: Recording, valve: Valve, settings: IdentificationSettings) -> None:
+    """Refuse a record without the motion that determines friction."""
+    record = measured(recording)
+    require_enough_samples(record, settings.published_window)
+    require_motion(record)
+    require_two_directions(record, settings.published_window)
+    require_travel(record, valve)
+    require_stem_between_stops(record, valve)
+    require_related_signals(record)
+
+
+def _stamped(recording: Recording) -> StampedRecord:
+    """Return the samples at their own stamps, or on the grid where there are no others."""
+    if recording.stamped is not None:
+        return recording.stamped
+    time = recording.time
+    return StampedRecord(
+        StampedSignal(time, recording.pressure), StampedSignal(time, recording.position)
+    )
+
+
+def _prior(settings: IdentificationSettings) -> Prior:
+    known = {name: value for name, value in settings.fixed.items() if name in REGRESSED}
+    timing = settings.timing_uncertainty
+    return Prior(
+        TIMING_UNCERTAINTY if timing is None else timing,
+        known.get("mass", settings.assumed_mass),
+        known,
+    )
+
+
+def _doubts(misfit: Misfit) -> tuple[str, ...]:
+    if misfit.describes:
+        return ()
+    return (
+        f"the Karnopp model does not describe this valve: {misfit.systematic * 1e6:.3g} µm "
+        "between the simulated and the measured stem are more than noise",
+    )
+
+
+def _stem(fit: PosteriorFit) -> StemComparison:
+    """Return the measured and the simulated stem at the steps of the simulation."""
+    record = fit.model.record
+    steps = np.arange(record.force.size) * record.period
+    position = np.interp(steps, record.time, record.position)
+    return StemComparison(record.period, position, fit.model.simulate(fit.at).position)
+
+
+def _model(fit: PosteriorFit) -> KarnoppParameters:
+    """Return the Karnopp model without its imperfections."""
+    at = fit.at
+    return KarnoppParameters(
+        mass=at["mass"],
+        viscous_friction=at["viscous_friction"],
+        coulomb_friction=at["coulomb_friction"],
+        static_friction=at["coulomb_friction"] + at["slip_force"],
+        spring_constant=at["spring_constant"],
+        spring_preload=at["spring_preload"],
+        limit_velocity=at["limit_velocity"],
+        stribeck_velocity=at["stribeck_velocity"],
+    )

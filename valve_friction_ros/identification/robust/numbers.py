@@ -1,0 +1,128 @@
+"""What a place of the fit says of the numbers that are reported, and how they depend on it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.robust.broad_model import BroadModel, Coordinates
+
+__all__ = ["REPORTED", "ReportedNumber", "loop_friction", "reported_numbers"]
+
+REPORTED = (
+    "mass",
+    "viscous_friction",
+    "coulomb_friction",
+    "static_friction",
+    "spring_constant",
+    "spring_preload",
+    "sliding_friction",
+)
+
+_RECTANGLE = 1.0 / math.sqrt(3.0)
+"""Standard deviation of a rectangular distribution over its half width."""
+
+_MOVING = 0.02
+"""Share of the top speed above which the averaged stem moves."""
+
+_ASYMMETRY = 0.05
+"""Standard deviation of the share by which F_c is larger upward: it is the same as a change of
+F_0, and no record can separate the two."""
+
+
+@dataclass(frozen=True)
+class ReportedNumber:
+    """A number at one place of the fit.
+
+    Attributes
+    ----------
+    value : float
+        SI unit.
+    gradient : mapping of str to float
+        Its derivatives by the coordinates.
+    definition : float
+        Standard deviation by what the number means where it is not one: a friction that changes
+        along the travel, the constant of a curved spring.
+    """
+
+    value: float
+    gradient: Mapping[str, float]
+    definition: float
+
+
+def _weighted(values: NDArray[np.float64], speed: NDArray[np.float64]) -> float:
+    """Mean over the distance that the stem slides."""
+    return float(np.sum(values * speed) / max(np.sum(speed), np.finfo(float).tiny))
+
+
+def _sliding(model: BroadModel, at: Coordinates) -> ReportedNumber:
+    """Return ∫|F_friction|·|dx| / ∫|dx| of the simulated stem."""
+    slow = model.record.slow
+    speed = np.abs(model.simulate(at).velocity)
+    mean = _weighted(speed, speed)
+    place, age = _weighted(slow.place, speed), _weighted(slow.age, speed)
+    low = _weighted(np.exp(slow.speed / -3e-3), speed)
+    dry, viscous = at["coulomb_friction"], at["viscous_friction"]
+    falling = 0.0
+    if at["stribeck_velocity"] > 0:
+        falling = _weighted(np.exp(-((speed / at["stribeck_velocity"]) ** 2)), speed)
+    plain = dry + viscous * mean
+    trend = at["along_travel"] * place + at["in_record"] * age
+    value = plain * (1 + trend) + at["at_low_speed"] * dry * low + at["slip_force"] * falling
+    gradient = {
+        "coulomb_friction": 1 + trend + at["at_low_speed"] * low,
+        "viscous_friction": mean * (1 + trend),
+        "along_travel": place * plain,
+        "in_record": age * plain,
+        "at_low_speed": dry * low,
+        "slip_force": falling,
+    }
+    return ReportedNumber(value, gradient, 0.0)
+
+
+def reported_numbers(model: BroadModel, at: Coordinates) -> dict[str, ReportedNumber]:
+    """Return all reported numbers at a place of the fit.
+
+    A friction that changes by ±a over the travel or over the record, or that is larger by a at low
+    speed, has no single value; the number is then taken to lie anywhere within ±a. So is a spring
+    whose constant changes by ±4c over the measured range.
+    """
+    slow = model.record.slow
+    dry, spring = at["coulomb_friction"], at["spring_constant"]
+    static = dry + at["slip_force"]
+    friction = _RECTANGLE * math.hypot(at["along_travel"], at["in_record"], at["at_low_speed"])
+    curve = abs(at["curvature"]) + abs(at["cubic"])
+    stiffness = _RECTANGLE * 4.0 * curve * spring
+    middle = 0.5 * (slow.lowest + slow.highest)
+    seat = -2.0 * middle / slow.range
+    bow = _RECTANGLE * curve * spring * slow.range * max(abs(seat**2 - 1 / 3), 2 / 3)
+    drift = _RECTANGLE * abs(at["drift"]) * float(np.ptp(model.record.force))
+    preload = math.hypot(bow, stiffness * abs(middle), drift, _ASYMMETRY * dry)
+    static_gradient = {"coulomb_friction": 1.0, "slip_force": 1.0}
+    return {
+        "mass": ReportedNumber(at["mass"], {"mass": 1.0}, 0.0),
+        "viscous_friction": ReportedNumber(
+            at["viscous_friction"], {"viscous_friction": 1.0}, friction * at["viscous_friction"]
+        ),
+        "coulomb_friction": ReportedNumber(dry, {"coulomb_friction": 1.0}, friction * dry),
+        "static_friction": ReportedNumber(static, static_gradient, friction * static),
+        "spring_constant": ReportedNumber(spring, {"spring_constant": 1.0}, stiffness),
+        "spring_preload": ReportedNumber(at["spring_preload"], {"spring_preload": 1.0}, preload),
+        "sliding_friction": _sliding(model, at),
+    }
+
+
+def loop_friction(model: BroadModel, at: Coordinates) -> float:
+    """Return the work of friction over the distance by the measured signals alone, N.
+
+    The work of the actuator less what the spring keeps: ∫(F − k·x − F_0)·dx / ∫|dx|. It takes the
+    spring from the fit, which counts only as far as the stem does not end where it began, and no
+    model of the friction.
+    """
+    slow = model.record.slow
+    position = slow.lowest + 0.5 * (slow.place + 1.0) * slow.range
+    moved = np.where(slow.speed > _MOVING * np.quantile(slow.speed, 0.98), slow.velocity, 0.0)
+    surplus = slow.force - at["spring_constant"] * position - at["spring_preload"]
+    return float(np.sum(surplus * moved) / np.sum(np.abs(moved)))

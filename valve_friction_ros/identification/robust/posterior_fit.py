@@ -1,0 +1,242 @@
+"""Most probable coordinates of a model with priors, and what is left uncertain."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.robust.bounded_step import bounded_minimum
+from valve_friction_ros.identification.robust.broad_model import BroadModel, Coordinates
+from valve_friction_ros.identification.robust.imperfections import BOUNDS
+from valve_friction_ros.identification.robust.weights import (
+    inflation,
+    reading_weights,
+    stroke_cells,
+)
+
+__all__ = ["PosteriorFit", "Stage", "fit"]
+
+_DAMPINGS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 0.03, 0.3, 3.0)
+_SHORTER = (1.0, 0.5, 0.2)
+_WORTH = 0.02
+"""Fall of the sum of squares, in variances, below which a step is not worth taking."""
+
+_LARGEST_CHANGE = 0.5
+_MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A place that the fit came by.
+
+    Attributes
+    ----------
+    at : mapping of str to float
+        All coordinates.
+    covariance : ndarray of float, shape (p, p)
+        Posterior covariance of the free ones, the model taken as linear there.
+    misfit : float
+        Sum of the squared residuals over their effective variances, not inflated.
+    penalty : float
+        Sum of the squared distances from the priors over their variances.
+    """
+
+    at: Coordinates
+    covariance: NDArray[np.float64] = field(repr=False)
+    misfit: float
+    penalty: float
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorFit:
+    """The end of a fit.
+
+    Attributes
+    ----------
+    model : BroadModel
+        The model.
+    names : tuple of str
+        The free coordinates.
+    stages : tuple of Stage
+        All that it came by, the last is the end.
+    inflation : float
+        Of the residual at the end.
+    precision : ndarray of float, shape (p,)
+        One over the variance of each prior, 0 without one.
+    remaining : ndarray of float, shape (p,)
+        Step that the linear model would still take.
+    residual : ndarray of float, shape (c,)
+        Measured less simulated readings, m.
+    """
+
+    model: BroadModel
+    names: tuple[str, ...]
+    stages: tuple[Stage, ...] = field(repr=False)
+    inflation: float
+    precision: NDArray[np.float64] = field(repr=False)
+    remaining: NDArray[np.float64] = field(repr=False)
+    residual: NDArray[np.float64] = field(repr=False)
+
+    @property
+    def at(self) -> Coordinates:
+        """Coordinates at the end."""
+        return self.stages[-1].at
+
+    @property
+    def objective(self) -> float:
+        """Squares of residuals and of distances from the priors together."""
+        return self.stages[-1].misfit + self.stages[-1].penalty
+
+
+class _Problem:
+    """The linear problem at one place, in coordinates scaled to unit curvature."""
+
+    def __init__(
+        self,
+        model: BroadModel,
+        at: Coordinates,
+        names: tuple[str, ...],
+        deviations: Mapping[str, float],
+        centre: Coordinates,
+        readings: NDArray[np.float64],
+    ) -> None:
+        record = model.record
+        self.model, self.at, self.names, self.centre = model, at, names, centre
+        self.residual = record.position - readings
+        self.weights = reading_weights(record, max(at["spring_constant"], 1.0))
+        scaled = self.residual * self.weights
+        self.inflation = inflation(scaled, stroke_cells(record))
+        self.precision = np.array(
+            [1.0 / deviations[name] ** 2 if name in deviations else 0.0 for name in names]
+        )
+        self.distance = np.array([at[name] - centre.get(name, 0.0) for name in names])
+        slopes = model.sensitivity(at, names, readings) * self.weights[:, None]
+        curvature = slopes.T @ slopes / self.inflation + np.diag(self.precision)
+        diagonal = np.diag(curvature)
+        self.scale = np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), 1.0)
+        self.curvature = curvature / np.outer(self.scale, self.scale)
+        self.slope = (
+            slopes.T @ scaled / self.inflation - self.precision * self.distance
+        ) / self.scale
+        values = np.array([at[name] for name in names])
+        lowest = np.array([BOUNDS.get(name, -np.inf) for name in names])
+        self.lowest = np.minimum((lowest - values) * self.scale, 0.0)
+
+    def stage(self) -> Stage:
+        inverse = np.linalg.pinv(self.curvature, rcond=1e-13, hermitian=True)
+        return Stage(
+            self.at,
+            inverse / np.outer(self.scale, self.scale),
+            float(np.sum((self.residual * self.weights) ** 2)),
+            float(self.precision @ self.distance**2),
+        )
+
+    def step(self, damping: float) -> NDArray[np.float64]:
+        damped = self.curvature + damping * np.eye(self.scale.size)
+        return np.asarray(bounded_minimum(damped, self.slope, self.lowest) / self.scale)
+
+    def gain(self, step: NDArray[np.float64]) -> float:
+        scaled = step * self.scale
+        return float(2.0 * self.slope @ scaled - scaled @ self.curvature @ scaled)
+
+    def objective(self, at: Coordinates, readings: NDArray[np.float64]) -> float:
+        misfit = np.sum(((self.model.record.position - readings) * self.weights) ** 2)
+        distance = np.array([at[name] - self.centre.get(name, 0.0) for name in self.names])
+        return float(misfit / self.inflation + self.precision @ distance**2)
+
+    def moved(self, step: NDArray[np.float64]) -> dict[str, float]:
+        return {
+            **self.at,
+            **{
+                name: max(self.at[name] + change, BOUNDS.get(name, -np.inf))
+                for name, change in zip(self.names, step.tolist(), strict=True)
+            },
+        }
+
+    def largest_share(self, step: NDArray[np.float64]) -> float:
+        """Share of a step that changes no force by more than half of its size."""
+        share = 1.0
+        for name, change in zip(self.names, step.tolist(), strict=True):
+            if name in _MOVED and change != 0:
+                size = 100.0 * self.model.step(self.at, name)
+                if name == "slip_force":
+                    size = max(self.at["coulomb_friction"], 1e-6)
+                share = min(share, _LARGEST_CHANGE * size / abs(change))
+        return share
+
+
+def _descended(problem: _Problem) -> tuple[dict[str, float], NDArray[np.float64], float] | None:
+    """Take the first step that leads down; return the place, its readings and the fall."""
+    now = problem.objective(problem.at, problem.model.record.position - problem.residual)
+    for damping in _DAMPINGS:
+        step = problem.step(damping)
+        share = problem.largest_share(step)
+        for shorter in _SHORTER if damping == 0 else (1.0,):
+            there = problem.moved(share * shorter * step)
+            readings = problem.model.readings(there)
+            then = problem.objective(there, readings)
+            if then < now:
+                return there, readings, now - then
+    return None
+
+
+def fit(
+    model: BroadModel,
+    start: Coordinates,
+    names: tuple[str, ...],
+    deviations: Mapping[str, float],
+    centre: Coordinates,
+    steps: int,
+) -> PosteriorFit:
+    """Go down from `start` to the most probable coordinates, by Gauss–Newton's method.
+
+    With the readings y, those of the model h(θ), the weights W and the priors N(c, Λ⁻¹), the sum
+
+        |W·(y − h(θ))|²/κ + (θ − c)ᵀ·Λ·(θ − c)
+
+    is made small; κ is the `inflation` of the residual. The posterior covariance is
+
+        (HᵀW²H/κ + Λ)⁻¹ .
+
+    Parameters
+    ----------
+    model : BroadModel
+        The model.
+    start : mapping of str to float
+        All coordinates.
+    names : tuple of str
+        The free ones.
+    deviations : mapping of str to float
+        Standard deviations of the priors; without one a coordinate is free.
+    centre : mapping of str to float
+        Their means; 0 where none is given.
+    steps : int
+        Steps at most.
+    """
+    at, readings = dict(start), model.readings(start)
+    stages = []
+    for _ in range(steps):
+        problem = _Problem(model, at, names, deviations, centre, readings)
+        stages.append(problem.stage())
+        if problem.gain(problem.step(0.0)) < _WORTH:
+            break
+        found = _descended(problem)
+        if found is None:
+            break
+        at, readings, fall = found
+        if fall < _WORTH:
+            break
+    if at is not problem.at:
+        problem = _Problem(model, at, names, deviations, centre, readings)
+        stages.append(problem.stage())
+    remaining = problem.step(0.0)
+    return PosteriorFit(
+        model,
+        names,
+        tuple(stages),
+        problem.inflation,
+        problem.precision,
+        remaining,
+        problem.residual,
+    )

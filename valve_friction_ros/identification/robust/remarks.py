@@ -1,0 +1,78 @@
+"""What the stamps and values of a record show of how it was sampled."""
+
+import numpy as np
+
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.signals.noise import quantisation_step
+from valve_friction_ros.signals.stamped_noise import stamped_noise
+
+__all__ = ["sampling_remarks"]
+
+_JITTER = 0.01
+"""Scatter of the pauses, over the period, from which on stamps are irregular."""
+
+_DROPS = 0.005
+"""Share of samples that are missing from which on they are named."""
+
+_GAP = 10.0
+_RATES = 1.5
+_HELD = 1.5
+"""Mean number of equal samples in a row, while the signal moves, from which on it is held."""
+
+_COARSE = 1.0
+"""Step of a converter over the deviation of the noise, from which on the step counts."""
+
+_SLOW = 0.02
+"""Period, s, from which on a slow stem may not be followed through its corners."""
+
+
+def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
+    pauses = np.diff(signal.time) / signal.period
+    whole = np.rint(pauses)
+    scatter = float(np.std(pauses[whole <= 1.0]))
+    lost = float(np.sum(np.maximum(whole[whole <= _GAP] - 1.0, 0.0))) / signal.time.size
+    remarks = []
+    if scatter > _JITTER:
+        remarks.append(f"the stamps of {name} jitter by {100 * scatter:.2g} % of their interval")
+    if lost > _DROPS:
+        remarks.append(f"{100 * lost:.2g} % of the samples of {name} are missing")
+    gaps = pauses[whole > _GAP]
+    if gaps.size:
+        seconds = float(np.sum(gaps)) * signal.period
+        remarks.append(f"{gaps.size} gaps in {name}, {seconds:.2g} s together, are left out")
+    return remarks
+
+
+def _value_remarks(name: str, signal: StampedSignal) -> list[str]:
+    changes = np.flatnonzero(np.diff(signal.value))
+    remarks: list[str] = []
+    if changes.size < 2:
+        return remarks
+    runs = np.diff(changes)
+    held = float(np.median(runs))
+    step = quantisation_step(signal.value)
+    noise = stamped_noise(signal)
+    if held > _HELD:
+        remarks.append(
+            f"values of {name} are held for {1e3 * held * signal.period:.2g} ms: a slow source, or "
+            "the dead band of a historian"
+        )
+    if step > _COARSE * noise:
+        remarks.append(f"the resolution of {name} is coarse: steps of {step:.2g}, above its noise")
+    return remarks
+
+
+def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
+    """Return a sentence for each way in which the samples are not what a good sensor sends."""
+    remarks = []
+    for name, signal in (("the pressure", record.pressure), ("the stem", record.position)):
+        remarks += _stamp_remarks(name, signal) + _value_remarks(name, signal)
+    periods = record.pressure.period, record.position.period
+    if max(periods) > _RATES * min(periods):
+        remarks.append(
+            f"the signals have different rates: pressure {1 / periods[0]:.3g} Hz, stem "
+            f"{1 / periods[1]:.3g} Hz"
+        )
+    if max(periods) > _SLOW:
+        remarks.append(f"the sampling is slow: {1 / max(periods):.3g} Hz")
+    return tuple(remarks)

@@ -1,0 +1,266 @@
+"""From a record to the best fit: starts from a regression, and branches where it is stuck."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.robust.broad_model import (
+    ABSENT,
+    MAIN,
+    BroadModel,
+    Coordinates,
+)
+from valve_friction_ros.identification.robust.fitted_record import (
+    FittedRecord,
+    set_anew_at_rests,
+)
+from valve_friction_ros.identification.robust.imperfections import deviations
+from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, fit
+from valve_friction_ros.identification.robust.weights import reading_weights
+
+__all__ = ["Prior", "search"]
+
+_SLIDING = 0.15
+"""Share of the top speed above which a stem surely slides."""
+
+_DRY_SHARES = (0.3, 0.5, 0.7, 0.85, 0.95, 1.0)
+"""Shares of the sliding friction to start F_c from; the rest is viscous."""
+
+_SLIP_SHARES = (0.35, 0.55, 0.75, 0.9)
+_SLIPS = (0.15, 0.4, 0.8)
+_STRIBECK_SPEEDS = (0.4e-3, 1.2e-3, 4e-3)
+_LIMIT_VELOCITIES = (2e-4, 6e-4)
+_SUSPICIOUS = 2.0
+"""Inflation of a residual beyond which other starts are tried: half of it is not noise."""
+
+_START_NOISE = 3.0
+_START_TIME = 5e-3
+"""The first position is known to so many deviations of its noise, and to what the stem moves in
+such a time (s) and in that by which its sensor may be late."""
+
+_TRIED = 2
+_FEW_STEPS = 6
+_MORE_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known beforehand.
+
+    Attributes
+    ----------
+    timing_uncertainty : float
+        Standard deviation of the time by which one signal may lag the other, s.
+    mass : float
+        Mass to be expected, kg.
+    fixed : mapping of str to float
+        Coordinates that are known.
+    """
+
+    timing_uncertainty: float
+    mass: float
+    fixed: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Sliding:
+    """A regression over the steps at which the stem surely slides.
+
+    Attributes
+    ----------
+    friction : float
+        Sliding friction at the mean speed, N.
+    speed : float
+        That speed, m/s.
+    spring_constant, spring_preload : float
+        The spring.
+    """
+
+    friction: float
+    speed: float
+    spring_constant: float
+    spring_preload: float
+
+
+def _sliding(record: FittedRecord) -> _Sliding:
+    """Regress the averaged force on the side of motion, the velocity, the position and 1."""
+    slow = record.slow
+    fast = slow.speed > _SLIDING * np.quantile(slow.speed, 0.98)
+    position = slow.lowest + 0.5 * (slow.place + 1.0) * slow.range
+    columns = np.column_stack(
+        [np.sign(slow.velocity), slow.velocity, position, np.ones_like(position)]
+    )[fast]
+    scale = np.max(np.abs(columns), axis=0)
+    solution = np.linalg.lstsq(columns / scale, slow.force[fast], rcond=1e-6)[0] / scale
+    dry, viscous, spring, preload = solution.tolist()
+    speed = float(np.mean(slow.speed[fast]))
+    if not spring > 0:
+        raise RefusalError(
+            "the stem does not follow the force: check that both signals belong to this valve, "
+            "their directions and their units"
+        )
+    return _Sliding(max(dry + viscous * speed, 1.0), speed, spring, preload)
+
+
+def _overall_spring(record: FittedRecord) -> dict[str, float]:
+    """Return the spring by which force and position have the same spread.
+
+    A hysteresis loop widens the force and the position alike, whatever the friction does.
+    """
+    position = record.slow.lowest + 0.5 * (record.slow.place + 1.0) * record.slow.range
+    spring = float(np.std(record.slow.force) / np.std(position))
+    preload = float(np.mean(record.slow.force) - spring * np.mean(position))
+    return {"spring_constant": spring, "spring_preload": preload}
+
+
+def _split(sliding: _Sliding, share: float) -> dict[str, float]:
+    """Split the sliding friction into F_c and F_v."""
+    return {
+        "coulomb_friction": share * sliding.friction,
+        "viscous_friction": max(1.0 - share, 0.02) * sliding.friction / sliding.speed,
+    }
+
+
+def _nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinates]:
+    """Sort starts by the distance of their simulated stem from the measured one.
+
+    The mean magnitude counts: a single jump at the wrong time says little of a start.
+    """
+    record = model.record
+    weights = reading_weights(record, starts[0]["spring_constant"])
+
+    def distance(start: Coordinates) -> float:
+        return float(np.sum(np.abs((record.position - model.readings(start)) * weights)))
+
+    return sorted(starts, key=distance)
+
+
+class _Search:
+    """The fits of one record."""
+
+    def __init__(self, record: FittedRecord, prior: Prior) -> None:
+        self.model, self.prior = BroadModel(record), prior
+        self.stepwise = BroadModel(set_anew_at_rests(record))
+        self.sliding = _sliding(record)
+        self.known = dict(prior.fixed)
+        self.centre = {"mass": prior.mass}
+        self.spread = deviations(
+            prior.timing_uncertainty, prior.mass, self.sliding.friction, record.duration / 60
+        )
+        self.centre["start_position"] = record.start
+        late = _START_TIME + 2.0 * prior.timing_uncertainty
+        self.spread["start_position"] = _START_NOISE * record.noise + late * abs(
+            float(record.leaving[0])
+        )
+        self.main = tuple(name for name in MAIN if name not in self.known)
+        self.all = (
+            *self.main,
+            *(
+                name
+                for name in self.spread
+                if name not in ("stribeck_velocity", "start_position", *self.known)
+            ),
+        )
+        self.base = {
+            **ABSENT,
+            "mass": prior.mass,
+            "spring_constant": self.sliding.spring_constant,
+            "spring_preload": self.sliding.spring_preload,
+            "start_position": record.start,
+            **_split(self.sliding, 0.9),
+            **self.known,
+        }
+
+    def fit(self, start: Coordinates, names: tuple[str, ...], steps: int) -> PosteriorFit:
+        """Fit from a start."""
+        start = {**start, **self.known}
+        return fit(self.model, start, names, self.spread, self.centre, steps)
+
+    def from_moves(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
+        """Fit each move for itself, from the nearest starts; then the whole from the best."""
+        near = _nearest(self.stepwise, starts)[:_TRIED]
+        apart = [
+            fit(self.stepwise, one, names, self.spread, self.centre, _MORE_STEPS) for one in near
+        ]
+        best = min(apart, key=lambda one: one.objective)
+        return self.fit(best.at, names, _MORE_STEPS)
+
+    def plain(self) -> PosteriorFit:
+        """Fit the Karnopp model alone, with a slip jump where it helps."""
+        starts = [{**self.base, **_split(self.sliding, share)} for share in _DRY_SHARES]
+        plain = self.fit(_nearest(self.model, starts)[0], self.main, _FEW_STEPS)
+        if plain.inflation < _SUSPICIOUS or "slip_force" in self.known:
+            return plain
+        slips = []
+        overall = {**self.base, **_overall_spring(self.model.record)}
+        for at in (self.base, plain.at, overall):
+            total = max(at["coulomb_friction"], 0.1 * self.sliding.friction)
+            for share in _SLIP_SHARES:
+                for slip in _SLIPS:
+                    lost = (1 - share) * total / self.sliding.speed
+                    slips.append(
+                        {
+                            **at,
+                            "coulomb_friction": share * total,
+                            "viscous_friction": at["viscous_friction"] + lost,
+                            "slip_force": slip * share * total,
+                        }
+                    )
+        names = (*self.main, "slip_force")
+        whole = [self.fit(one, names, _MORE_STEPS) for one in _nearest(self.model, slips)[:_TRIED]]
+        trials = [plain, *whole, self.from_moves(slips, names)]
+        return min(trials, key=lambda one: one.objective)
+
+    def branches(self, full: PosteriorFit) -> list[PosteriorFit]:
+        """Fit friction that falls over a range of speeds, and a dead zone of the speed."""
+        spring = {name: full.at[name] for name in ("spring_constant", "spring_preload")}
+        springs = (spring, _overall_spring(self.model.record))
+        top = float(np.quantile(self.model.record.slow.speed, 0.98))
+        falling = [
+            {
+                **self.base,
+                **one,
+                **_split(self.sliding, share),
+                "slip_force": slip * share * self.sliding.friction,
+                "stribeck_velocity": speed,
+            }
+            for speed in _STRIBECK_SPEEDS
+            if speed < top
+            for share in (0.5, 0.75)
+            for slip in (0.3, 1.0)
+            for one in springs
+        ]
+        found = []
+        if falling and "slip_force" not in self.known:
+            names = (*self.main, "slip_force", "stribeck_velocity")
+            first = self.from_moves(falling, names)
+            found.append(self.fit(first.at, (*self.all, "stribeck_velocity"), _FEW_STEPS))
+        dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
+        found.append(self.fit(_nearest(self.model, dead)[0], self.all, _FEW_STEPS))
+        return found
+
+    def best(self) -> PosteriorFit:
+        """Return the most probable of all fits."""
+        plain = self.plain()
+        full = self.fit(plain.at, self.all, _FEW_STEPS)
+        if full.inflation < _SUSPICIOUS:
+            return full
+        return min([full, *self.branches(full)], key=lambda one: one.objective)
+
+
+def search(record: FittedRecord, prior: Prior) -> PosteriorFit:
+    """Find the most probable model of a record.
+
+    The sliding friction of a regression is split into F_c and F_v in several ways; the way whose
+    simulated stem is nearest starts a fit of the Karnopp model alone, and that a fit with all
+    imperfections. Where the residual is more than noise, a friction that falls with speed and a
+    dead zone are tried as well.
+
+    Raises
+    ------
+    RefusalError
+        If the stem does not follow the force.
+    """
+    return _Search(record, prior).best()

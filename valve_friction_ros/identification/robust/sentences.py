@@ -1,0 +1,73 @@
+"""Imperfections of the valve in words: those that are certain, and those left open."""
+
+import math
+
+from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
+from valve_friction_ros.identification.robust.intervals import Budget
+from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
+
+__all__ = ["found_imperfections", "main_doubt"]
+
+_SURE = 3.0
+_LEAST = {
+    "along_travel": 0.01,
+    "in_record": 0.01,
+    "at_low_speed": 0.03,
+    "curvature": 1e-3,
+    "cubic": 2e-3,
+    "drift": 5e-4,
+    "presliding": 2e-6,
+    "limit_velocity": 5e-5,
+    "viscous_asymmetry": 0.02,
+    "slip_force": 0.0,
+}
+"""Least size of an imperfection that is worth a sentence, in its own unit."""
+
+_SHARE = 0.2
+"""Share of the variance from which on a source is named."""
+
+
+def _deviation(fit: PosteriorFit, name: str) -> float:
+    index = fit.names.index(name)
+    return math.sqrt(max(float(fit.stages[-1].covariance[index, index]), 0.0))
+
+
+def _size(name: str, value: float) -> str:
+    if name in TIMING:
+        return f"{1e3 * abs(value):.2g} ms"
+    if name == "presliding":
+        return f"{1e6 * value:.2g} µm"
+    if name == "limit_velocity":
+        return f"{1e3 * value:.2g} mm/s"
+    if name == "slip_force":
+        return f"F_s above F_c by {value:.3g} N"
+    if name in ("along_travel", "in_record"):
+        way = "rises" if value > 0 else "falls"
+        return f"friction {way} by {200 * abs(value):.2g} %"
+    return f"{100 * value:.2g} %"
+
+
+def found_imperfections(fit: PosteriorFit) -> tuple[str, ...]:
+    """Return a sentence for each imperfection that surely is there, the surest first."""
+    found = []
+    for name in fit.names:
+        least = _LEAST.get(name, 1e-3 if name in TIMING else math.inf)
+        value, deviation = fit.at[name], _deviation(fit, name)
+        if abs(value) > least and abs(value) > _SURE * deviation:
+            sentence = f"{IMPERFECTIONS[name].words}: {_size(name, value)}"
+            found.append((deviation / abs(value), sentence))
+    return tuple(sentence for _, sentence in sorted(found))
+
+
+def main_doubt(budget: Budget, width: float) -> str:
+    """Name what makes an interval wide: the imperfections that the record leaves open."""
+    total = sum(source**2 for source in budget.sources.values()) + budget.record**2
+    named = [
+        IMPERFECTIONS[name].words
+        for name, source in sorted(budget.sources.items(), key=lambda item: -item[1])
+        if source**2 > _SHARE * total
+    ]
+    share = f"its interval is ±{100 * width:.2g} % of its value"
+    if not named:
+        return f"{share}, by noise and by what the model leaves of the motion"
+    return f"{share}: the record does not determine {' and '.join(named[:3])}"

@@ -1,0 +1,59 @@
+"""How much each reading counts: noise of both sensors, and misfit that lasts."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.robust.fitted_record import FittedRecord
+
+__all__ = ["inflation", "reading_weights", "stroke_cells"]
+
+_STILL = 0.01
+_MOVING = 0.1
+_FEWEST_BLOCKS = 8
+
+
+def reading_weights(record: FittedRecord, spring_constant: float) -> NDArray[np.float64]:
+    """Return one over the effective deviation of each cell, 1/m.
+
+    The noise of the stem is white: s_x²/n in a cell of n samples. That of the smoothed force, of
+    variance s_F², moves the stem by s_F/k, and all cells alike that it lasts over: those of the
+    smoothing window, or of a rest, which keeps what the stem had when it stopped. L such cells
+    count as one if each has the variance s_x²/n + L·s_F²/k².
+    """
+    slow = record.slow
+    steps = np.arange(slow.speed.size) * record.period
+    still = np.interp(record.time, steps, slow.speed) < _STILL * np.quantile(slow.speed, 0.98)
+    edges = np.flatnonzero(np.diff(still)) + 1
+    bounds = np.concatenate([[0], edges, [still.size]])
+    lengths = np.diff(bounds)
+    lasting = np.repeat(np.where(still[bounds[:-1]], lengths, 0), lengths)
+    memory = np.maximum(lasting, record.memory)
+    white = record.noise**2 / record.samples
+    weights: NDArray[np.float64] = 1.0 / np.sqrt(
+        white + memory * record.force_variance / spring_constant**2
+    )
+    return weights
+
+
+def stroke_cells(record: FittedRecord) -> int:
+    """Return the mean number of cells between two reversals of the measured stem."""
+    velocity = record.slow.velocity
+    moving = velocity[np.abs(velocity) > _MOVING * np.max(np.abs(velocity))]
+    reversals = int(np.count_nonzero(np.diff(np.sign(moving))))
+    return record.position.size // (reversals + 1)
+
+
+def inflation(scaled: NDArray[np.float64], stroke: int) -> float:
+    """Return the variance of the mean of scaled residuals over that of independent ones, ≥ 1.
+
+    Blocks of 1, 2, 4 … cells up to a stroke are averaged; the largest product of their length and
+    the mean square of their averages counts. It is 1 for noise as it was foreseen, and grows with
+    the size of a misfit as with the time that it lasts.
+    """
+    largest, length = max(float(np.mean(scaled**2)), 1.0), 2
+    while length <= stroke and scaled.size // length >= _FEWEST_BLOCKS:
+        blocks = scaled.size // length
+        means = scaled[: blocks * length].reshape(blocks, length).mean(axis=1)
+        largest = max(largest, length * float(np.mean(means**2)))
+        length *= 2
+    return largest

@@ -1,0 +1,215 @@
+"""The stem through all samples, where friction is graded and the stem is set anew after a gap."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.model.compiled import compiled, compiled_products
+from valve_friction_ros.model.sliding_map import (
+    ChordLadder,
+    SlidingMap,
+    chord_ladder,
+    has_short_cut,
+    slid,
+    sliding_map,
+)
+from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
+
+__all__ = ["run_graded_stem"]
+
+
+@compiled
+def _graded(way: Dynamics, grip: float) -> Dynamics:
+    """Return the dynamics with `grip` more Coulomb and static friction."""
+    return Dynamics(
+        way.mass,
+        way.viscous_friction,
+        max(way.coulomb_friction + grip, 0.0),
+        max(way.static_friction + grip, 0.0),
+        way.spring_constant,
+        way.limit_velocity,
+        way.travel,
+        way.stribeck_velocity,
+    )
+
+
+@compiled
+def _rest_on(
+    sample: int,
+    position: float,
+    forces: NDArray[np.float64],
+    grip: NDArray[np.float64],
+    anew: NDArray[np.float64],
+    upward: Dynamics,
+    downward: Dynamics,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> int:
+    """Fill in the samples through which the stem certainly rests; return the last one."""
+    held = upward.spring_constant * position
+    up, down = upward.static_friction, downward.static_friction
+    pull = forces[sample] - held
+    if not -down - grip[sample] <= pull <= up + grip[sample]:
+        return sample
+    while sample < forces.size - 1 and np.isnan(anew[sample + 1]):
+        pull = forces[sample + 1] - held
+        if not -down - grip[sample + 1] <= pull <= up + grip[sample + 1]:
+            break
+        sample += 1
+        positions[sample], velocities[sample] = position, 0.0
+    return sample
+
+
+@compiled_products
+def _slide_on(
+    sample: int,
+    side: float,
+    way: Dynamics,
+    slide: SlidingMap,
+    forces: NDArray[np.float64],
+    grip: NDArray[np.float64],
+    anew: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> int:
+    """Fill in the samples through which the stem certainly slides on, as `stem_run` does."""
+    lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
+    dry, spring, viscous = way.coulomb_friction, way.spring_constant, way.viscous_friction
+    position, velocity = positions[sample], velocities[sample]
+    excess = forces[sample] - side * (dry + grip[sample])
+    push = side * (excess - spring * position - viscous * velocity)
+    if side * velocity <= way.limit_velocity:
+        return sample
+    while sample < forces.size - 1 and np.isnan(anew[sample + 1]):
+        after = forces[sample + 1] - side * (dry + grip[sample + 1])
+        place, following = slid(slide, position, velocity, excess, after - excess)
+        final_push = side * (after - spring * place - viscous * following)
+        no_minimum = push >= 0 or final_push <= 0
+        slowest = side * velocity + slide.reach * push
+        if not (
+            side * following > way.limit_velocity
+            and (no_minimum or slowest > way.limit_velocity)
+            and lowest < place < highest
+        ):
+            return sample
+        sample += 1
+        positions[sample], velocities[sample] = place, following
+        position, velocity, excess, push = place, following, after, final_push
+    return sample
+
+
+@compiled_products
+def _slide_on_falling(
+    sample: int,
+    side: float,
+    way: Dynamics,
+    ladder: ChordLadder,
+    forces: NDArray[np.float64],
+    grip: NDArray[np.float64],
+    anew: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> int:
+    """Fill in samples as `_slide_on` where friction falls with the speed."""
+    lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
+    position, velocity = positions[sample], velocities[sample]
+    if side * velocity <= way.limit_velocity:
+        return sample
+    top = ladder.slides.shape[0] - 1
+    while sample < forces.size - 1 and np.isnan(anew[sample + 1]):
+        rung = min(int(side * velocity / ladder.spacing), top)
+        friction, viscous = ladder.chords[rung, 0], ladder.chords[rung, 1]
+        row = ladder.slides[rung]
+        slide = SlidingMap(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
+        excess = forces[sample] - side * (friction + grip[sample])
+        after = forces[sample + 1] - side * (friction + grip[sample + 1])
+        place, following = slid(slide, position, velocity, excess, after - excess)
+        push = side * (excess - way.spring_constant * position - viscous * velocity)
+        final_push = side * (after - way.spring_constant * place - viscous * following)
+        no_minimum = push >= 0 or final_push <= 0
+        place_on_rung = side * following / ladder.spacing - rung
+        if not (
+            side * following > way.limit_velocity
+            and no_minimum
+            and viscous >= 0.0
+            and place_on_rung >= -0.5
+            and (place_on_rung <= 1.5 or rung == top)
+            and lowest < place < highest
+        ):
+            return sample
+        sample += 1
+        positions[sample], velocities[sample] = place, following
+        position, velocity = place, following
+    return sample
+
+
+@compiled
+def _step(
+    sample: int,
+    forces: NDArray[np.float64],
+    grip: NDArray[np.float64],
+    period: float,
+    upward: Dynamics,
+    downward: Dynamics,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> None:
+    """Fill in the next sample, with whatever events it has."""
+    more = 0.5 * (grip[sample] + grip[sample + 1])
+    positions[sample + 1], velocities[sample + 1] = advance_stem(
+        positions[sample],
+        velocities[sample],
+        forces[sample],
+        (forces[sample + 1] - forces[sample]) / period,
+        period,
+        _graded(upward, more),
+        _graded(downward, more),
+    )
+
+
+@compiled
+def run_graded_stem(
+    forces: NDArray[np.float64],
+    grip: NDArray[np.float64],
+    anew: NDArray[np.float64],
+    leaving: NDArray[np.float64],
+    period: float,
+    upward: Dynamics,
+    downward: Dynamics,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> None:
+    """Step through `forces` (actuator less preload, N) from the state at sample 0.
+
+    `grip` (N) is added to the Coulomb and the static friction of each sample. Where `anew` is a
+    number, the stem is set to that place (m) and to the velocity `leaving` (m/s).
+    """
+    up, down = sliding_map(upward, period), sliding_map(downward, period)
+    steps_up, steps_down = chord_ladder(upward, period), chord_ladder(downward, period)
+    is_quick = has_short_cut(upward, period) and has_short_cut(downward, period)
+    falls = upward.stribeck_velocity > 0.0
+    sample = 0
+    while True:
+        velocity = velocities[sample]
+        side = 1.0 if velocity > 0 else -1.0
+        way = upward if velocity > 0 else downward
+        if velocity == 0.0:
+            at = positions[sample]
+            sample = _rest_on(
+                sample, at, forces, grip, anew, upward, downward, positions, velocities
+            )
+        elif is_quick and falls:
+            ladder = steps_up if velocity > 0 else steps_down
+            sample = _slide_on_falling(
+                sample, side, way, ladder, forces, grip, anew, positions, velocities
+            )
+        elif is_quick:
+            slide = up if velocity > 0 else down
+            sample = _slide_on(sample, side, way, slide, forces, grip, anew, positions, velocities)
+        if sample == forces.size - 1:
+            return
+        if np.isnan(anew[sample + 1]):
+            _step(sample, forces, grip, period, upward, downward, positions, velocities)
+        else:
+            positions[sample + 1] = anew[sample + 1]
+            velocities[sample + 1] = leaving[sample + 1]
+        sample += 1

@@ -1,0 +1,59 @@
+"""Two signals with the stamps of their samples, on no common grid."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["StampedRecord", "StampedSignal"]
+
+
+@dataclass(frozen=True, eq=False)
+class StampedSignal:
+    """Samples of one sensor with their stamps.
+
+    Attributes
+    ----------
+    time : ndarray of float, shape (n,)
+        Time of each sample, s, increasing; kept as a read-only copy.
+    value : ndarray of float, shape (n,)
+        Values at those times, SI unit; kept as a read-only copy.
+
+    Raises
+    ------
+    ValueError
+        If the arrays differ in shape, hold fewer than three samples or a number that is not
+        finite, or the times do not increase.
+    """
+
+    FEWEST: ClassVar[int] = 3
+
+    time: NDArray[np.float64] = field(repr=False)
+    value: NDArray[np.float64] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not make a signal, and freeze them."""
+        for name in ("time", "value"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            if values.ndim != 1 or values.size < self.FEWEST or not np.isfinite(values).all():
+                raise ValueError(f"{name} must be a row of {self.FEWEST} or more finite numbers")
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        if self.time.shape != self.value.shape:
+            raise ValueError(f"{self.time.size} times for {self.value.size} values")
+        if not (np.diff(self.time) > 0).all():
+            raise ValueError("times must increase")
+
+    @property
+    def period(self) -> float:
+        """Median time between two samples, s."""
+        return float(np.median(np.diff(self.time)))
+
+
+@dataclass(frozen=True, eq=False)
+class StampedRecord:
+    """Pressure (Pa) and stem position (m), their times counted from one origin."""
+
+    pressure: StampedSignal
+    position: StampedSignal
