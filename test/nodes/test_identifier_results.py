@@ -26,7 +26,6 @@ from std_msgs.msg import Float64, Header
 from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
-    differentiate,
     identify_refined,
     published_estimate,
 )
@@ -36,6 +35,7 @@ from valve_friction_ros.model import (
     Recording,
     SineWave,
 )
+from valve_friction_ros.signals import differentiate
 
 EMPS = Path(__file__).parents[3] / "shared/data/emps/emps_identification.csv"
 BIAS = 1.13e-3

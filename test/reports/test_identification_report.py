@@ -4,11 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from valve_friction_ros.figures.comparison import Comparison
 
 from valve_friction_ros.figures.report_figures import chosen_region
 from valve_friction_ros.health import Baseline
-from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification import StemComparison, Verdict
 from valve_friction_ros.reports import (
     Page,
     identification_report,
@@ -88,10 +87,10 @@ def test_the_region_holds_the_choice_and_ends_where_sigma_leaves_its_tenth(ident
 def test_autocorrelation_of_what_is_known():
     """Two plus and two minus ones after each other: 1, then 1/4 of what was, then −2/4 …."""
     measured = np.zeros(4)
-    comparison = Comparison(0.5, measured, np.array([1.0, 1.0, -1.0, -1.0]))
+    comparison = StemComparison(0.5, measured, np.array([1.0, 1.0, -1.0, -1.0]))
     assert comparison.time.tolist() == [0.0, 0.5, 1.0, 1.5]
     assert comparison.autocorrelation(4) == pytest.approx([1.0, 0.25, -0.5, -0.25])
-    assert Comparison(0.5, measured, measured).autocorrelation(2).tolist() == [0.0, 0.0]
+    assert StemComparison(0.5, measured, measured).autocorrelation(2).tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize(

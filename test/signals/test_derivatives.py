@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from valve_friction_ros.identification import differentiate
+from valve_friction_ros.signals import differentiate
 from valve_friction_ros.signals.noise import position_noise, velocity_noise
 
 EPS = np.finfo(float).eps

@@ -11,7 +11,6 @@ from benchmark.speed.records import VALVES, noisy_record
 from benchmark.speed.rows import Row, Settings, medians
 from valve_friction_ros.identification import (
     IdentificationSettings,
-    differentiate,
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published.regression import (
@@ -19,6 +18,7 @@ from valve_friction_ros.identification.published.regression import (
     force_balance_regression,
 )
 from valve_friction_ros.model import BENCH_VALVE, SensorNoise
+from valve_friction_ros.signals import differentiate
 
 __all__ = ["measure"]
 

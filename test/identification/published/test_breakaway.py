@@ -5,11 +5,11 @@ import pytest
 
 from valve_friction_ros.identification import (
     IdentificationSettings,
-    differentiate,
     published_estimate,
 )
 from valve_friction_ros.identification.published.breakaway import find_breakaways
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
+from valve_friction_ros.signals import differentiate
 
 SETTINGS = IdentificationSettings()
 

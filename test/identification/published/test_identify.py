@@ -10,7 +10,6 @@ from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     RefusalError,
-    differentiate,
     published_estimate,
 )
 from valve_friction_ros.model import (
@@ -26,6 +25,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
+from valve_friction_ros.signals import differentiate
 
 FOUR_COLUMNS = IdentificationSettings(position_bias=1.13e-3)
 NOISE = SensorNoise(position=10e-6, pressure=100.0, seed=0)

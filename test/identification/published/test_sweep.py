@@ -7,7 +7,6 @@ import pytest
 
 from valve_friction_ros.identification import (
     IdentificationSettings,
-    differentiate,
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published.regression import (
@@ -16,6 +15,7 @@ from valve_friction_ros.identification.published.regression import (
 )
 from valve_friction_ros.identification.settings import REGRESSED
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, SquareWave
+from valve_friction_ros.signals import differentiate
 
 BIAS = 1.13e-3
 ENOUGH = 200  # samples, above which the comparison is not about the noise of a near-singular fit

@@ -6,12 +6,12 @@ import pytest
 from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
-    differentiate,
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published.regression import force_balance_regression
 from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, SquareWave
+from valve_friction_ros.signals import differentiate
 
 WINDOW = 31
 
