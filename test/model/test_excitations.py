@@ -131,10 +131,10 @@ class TestSampledPressure:
     @pytest.mark.parametrize(
         ("times", "pressures", "message"),
         [
-            ([], [], r"^times must be a row of finite numbers, at least one"),
-            ([0.0, math.nan], [1.0, 2.0], r"^times must be a row of finite numbers"),
-            ([0.0, 1.0], [1.0, math.inf], r"^pressures must be a row of finite numbers"),
-            ([0.0, 1.0], [[1.0, 2.0]], r"^pressures must be a row of finite numbers"),
+            ([], [], r"^times must be a non-empty row of finite numbers"),
+            ([0.0, math.nan], [1.0, 2.0], r"^times must be a non-empty row of finite numbers"),
+            ([0.0, 1.0], [1.0, math.inf], r"^pressures must be a non-empty row of finite numbers"),
+            ([0.0, 1.0], [[1.0, 2.0]], r"^pressures must be a non-empty row of finite numbers"),
             ([0.0, 1.0], [1.0], r"^2 times for 1 pressures"),
             ([0.0, 0.0], [1.0, 2.0], r"^times must increase"),
             ([1.0, 0.0], [1.0, 2.0], r"^times must increase"),
