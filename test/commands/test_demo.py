@@ -254,7 +254,7 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("demo.xyz", "not a picture format; choose from ."),
+            ("demo.xyz", "the ending is not a picture format; choose from ."),
             ("no/demo.png", "there is no folder"),
         ],
     )

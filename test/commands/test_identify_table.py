@@ -114,7 +114,7 @@ class TestPlot:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("record.xyz", "not a picture format; choose from ."),
+            ("record.xyz", "the ending is not a picture format; choose from ."),
             ("no/record.png", "there is no folder"),
         ],
     )

@@ -264,7 +264,9 @@ class TestPictures:
 
     @pytest.mark.parametrize("name", ["figure", "figure.", "figure.csv", "png"])
     def test_no_format(self, tmp_path, name):
-        with pytest.raises(ValueError, match=r"not a picture format; choose from .*\.png"):
+        with pytest.raises(
+            ValueError, match=r"the ending is not a picture format; choose from .*\.png"
+        ):
             require_picture_file(tmp_path / name)
 
     def test_no_folder(self, tmp_path):

@@ -279,7 +279,8 @@ class TestStart:
 class TestRefusals:
     @pytest.mark.parametrize("pressure", [[], [[1e5]], [1e5, math.nan], [math.inf, 1e5]])
     def test_pressure(self, pressure):
-        with pytest.raises(ValueError, match=r"^pressure must be a non-empty row of finite samples"):
+        rule = r"^pressure must be a non-empty row of finite samples"
+        with pytest.raises(ValueError, match=rule):
             simulate(BENCH_VALVE, LOW_FRICTION, np.array(pressure), SAMPLE_PERIOD)
 
     @pytest.mark.parametrize("period", [0.0, -1e-3, math.nan, math.inf])

@@ -95,6 +95,10 @@ class Diagnosis:
     message: str
     ratio: Ratio | None
 
+    def __str__(self) -> str:
+        """Return level and message on one line."""
+        return f"{self.level.name}: {self.message}"
+
 
 def dead_band(result: Result, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.

@@ -65,7 +65,7 @@ class StemComparison(NamedTuple):
         return np.asarray(products / (power or 1.0), dtype=np.float64)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Identified parameters with their verdicts, and the evidence behind them.
 
@@ -178,6 +178,12 @@ class Result:
     def summary(self) -> str:
         """Return the result as a table of plain text, with reasons and warnings below it."""
         return rendering.text_of(self.to_dict(), self.findings)
+
+    def __repr__(self) -> str:
+        """Return method, Coulomb friction and fit on one line."""
+        friction = self.parameters.get("coulomb_friction")
+        known = "" if friction is None else f", {friction.value:.6g} N ({friction.verdict.value})"
+        return f"<Result of method {self.method}{known}, fit {100 * self.fit:.2f} %>"
 
     def __str__(self) -> str:
         """Return the table of the parameters."""

@@ -53,7 +53,7 @@ class BenchClient(Node):
         self._sweep: Float64MultiArray | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
-        # Made long before their use: a node answers a client that it has not met yet in vain.
+        # Made long before their use: an answer to a client that is not yet discovered is lost.
         self._triggers: dict[str, Client] = {
             service: self.create_client(Trigger, f"{self._identifier}/{service}")
             for service in ("identify", "set_baseline", "clear")

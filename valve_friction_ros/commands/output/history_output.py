@@ -1,4 +1,4 @@
-"""How a history is told: as a table, as an object of JSON, and as CSV."""
+"""How a history is shown: as a table, as an object of JSON, and as CSV."""
 
 import csv
 import io
@@ -15,6 +15,7 @@ from rich.table import Table
 from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
 from valve_friction_ros.identification import (
+    Parameter,
     parameter_columns,
     parameter_mapping,
     plain,
@@ -63,6 +64,13 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     return told
 
 
+def _stored(parameter: Parameter) -> dict[str, Any]:
+    """Return what a history keeps of a parameter: its published value is not stored."""
+    shown = parameter_mapping(parameter)
+    del shown["published"]
+    return shown
+
+
 def _entry_as_json(entry: HistoryEntry) -> Any:
     ratio, baseline = entry.diagnosis.ratio, entry.baseline
     return plain(
@@ -71,7 +79,7 @@ def _entry_as_json(entry: HistoryEntry) -> Any:
             "begin": None if entry.span is None else time_text(entry.span.begin),
             "end": None if entry.span is None else time_text(entry.span.end),
             "method": entry.method,
-            "parameters": {name: parameter_mapping(one) for name, one in entry.parameters.items()},
+            "parameters": {name: _stored(one) for name, one in entry.parameters.items()},
             "fit": entry.fit.share,
             "rms": entry.fit.rms,
             "systematic_misfit": entry.fit.systematic,
@@ -173,7 +181,7 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             "verdict",
             "ratio",
             "level",
-            "told",
+            "diagnosis",
             box=None,
             header_style="bold",
             title=f"{tag}{history.valve.name}",

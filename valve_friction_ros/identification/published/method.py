@@ -1,6 +1,7 @@
 """Method "published": the paper's model 1 as it is, without intervals."""
 
 import math
+from collections.abc import Container
 
 from valve_friction_ros.identification.published.estimate import Estimate, possible_model
 from valve_friction_ros.identification.published.evidence import (
@@ -55,7 +56,7 @@ def identify_published(
     record = measured(recording)
     found = published_fit(record, valve, settings)
     estimate = found.estimate
-    parameters = {name: _stated(name, estimate) for name in estimate.values}
+    parameters = {name: _stated(name, estimate, settings.fixed) for name in estimate.values}
     return Result(
         method=METHOD,
         recording=recording,
@@ -74,8 +75,10 @@ def identify_published(
     )
 
 
-def _stated(name: str, estimate: Estimate) -> Parameter:
+def _stated(name: str, estimate: Estimate, given: Container[str]) -> Parameter:
     value = estimate.values[name]
+    if name in given:
+        return fixed(name, value)
     if name in estimate.fixed:
-        return fixed(name, value, "given or assumed")
+        return fixed(name, value, "assumed: the record does not determine it")
     return Parameter(name, value, math.nan, math.nan, Verdict.WEAK, _NO_INTERVAL)

@@ -13,9 +13,8 @@ from valve_friction_ros.identification.published.evidence import (
     sweep_finding,
     with_published,
 )
-from valve_friction_ros.identification.published.identify import published_fit
+from valve_friction_ros.identification.published.identify import PublishedFit, published_fit
 from valve_friction_ros.identification.published.regression_uncertainty import (
-    RegressionUncertainty,
     regression_uncertainty,
 )
 from valve_friction_ros.identification.published.verdicts import regression_verdicts
@@ -101,11 +100,10 @@ def identify_refined(
         mass = settings.fixed.get("mass", settings.assumed_mass)
         start_settings = replace(start_settings, fixed={**settings.fixed, "mass": mass})
     start = published_fit(record, valve, start_settings)
-    regression = regression_uncertainty(record, start)
     outcome = (
         _refined(record, valve, settings, start.estimate)
         if has_spring
-        else _regressed(start.estimate, regression, start_settings)
+        else _regressed(record, start, start_settings)
     )
     estimate = published or start.estimate
     beside = () if published is None else published.warnings
@@ -116,14 +114,14 @@ def identify_refined(
         valve=valve,
         settings=settings,
         parameters=with_published(outcome.parameters, published),
-        fit=regression.fit if outcome.misfit is None else outcome.misfit.fit,
+        fit=outcome.fit,
         rms=math.nan if outcome.misfit is None else outcome.misfit.rms,
         misfit=outcome.misfit,
         derivative_window=window,
         warnings=tuple(dict.fromkeys([*warnings, *outcome.warnings, *notes])),
         evidence=sweep_evidence(estimate),
         findings=(
-            _finding(outcome.misfit, regression.fit, valve),
+            _finding(outcome, valve),
             f"{sweep_finding(estimate)}; refined from {window}",
         ),
         model=outcome.model,
@@ -136,6 +134,7 @@ class _Outcome(NamedTuple):
     """Outcome of a refinement or, without a spring, of a regression."""
 
     parameters: Mapping[str, Parameter]
+    fit: float
     misfit: Misfit | None
     warnings: Sequence[str]
     model: KarnoppParameters | None
@@ -178,6 +177,7 @@ def _refined(
     conditioned = problem.record
     return _Outcome(
         refinement_verdicts(refinement, misfit, settings),
+        misfit.fit,
         misfit,
         warnings,
         problem.model(refinement.coordinates),
@@ -186,11 +186,13 @@ def _refined(
 
 
 def _regressed(
-    estimate: Estimate, regression: RegressionUncertainty, settings: IdentificationSettings
+    record: MeasuredRecord, start: PublishedFit, settings: IdentificationSettings
 ) -> _Outcome:
-    """Return the regression: without a spring a simulated stem drifts away from the record."""
+    """Return the outcome of the regression: without a spring no simulated stem comes back."""
+    estimate, regression = start.estimate, regression_uncertainty(record, start)
     parameters = regression_verdicts(estimate, regression, settings)
-    return _Outcome(parameters, None, estimate.warnings, possible_model(estimate), None)
+    model = possible_model(estimate)
+    return _Outcome(parameters, regression.fit, None, estimate.warnings, model, None)
 
 
 def _published(
@@ -203,12 +205,13 @@ def _published(
         return None, [f"the published method refused the record: {refusal}"]
 
 
-def _finding(misfit: Misfit | None, force_fit: float, valve: Valve) -> str:
+def _finding(outcome: _Outcome, valve: Valve) -> str:
+    misfit = outcome.misfit
     if misfit is None:
-        return f"the regression reproduces {100 * force_fit:.2f} % of the force"
+        return f"the regression reproduces {100 * outcome.fit:.2f} % of the force"
     return (
         f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
-        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not noise"
+        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it are not noise"
     )
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
 from valve_friction_ros.identification.robust.imperfections import BOUNDS, IMPERFECTIONS
@@ -74,7 +74,7 @@ def _lagged(signal: NDArray[np.float64], lag: float, period: float) -> NDArray[n
     decay = math.exp(-period / lag)
     newest = 1.0 - lag * (1.0 - decay) / period
     first = signal[0] - lag * (signal[1] - signal[0]) / period
-    held: NDArray[np.float64] = lfilter(
+    held: NDArray[np.float64] = scipy.signal.lfilter(
         [newest, 1.0 - decay - newest], [1.0, -decay], signal, zi=[first - newest * signal[0]]
     )[0]
     return held

@@ -135,6 +135,20 @@ class StepTest:
     smallest_movement: float
     smoothed: NDArray[np.float64] = field(repr=False, compare=False)
 
+    def __str__(self) -> str:
+        """Return dead band and resolution, and the response to each step, a line each."""
+        brackets = (
+            f"{name} between {bracket.ignored:.4g} and {bracket.answered:.4g}"
+            for name, bracket in (("dead band", self.dead_band), ("resolution", self.resolution))
+        )
+        rows = (
+            f"step of {step.input_change:.4g}: gain {step.gain:.4g}, dead time "
+            f"{step.dead_time:.3g} s, T63 {step.t63:.3g} s, T86 {step.t86:.3g} s, overshoot "
+            f"{step.overshoot:.3g}"
+            for step in self.steps
+        )
+        return "\n".join([*brackets, *rows])
+
 
 def step_test(
     input_signal: ArrayLike,

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.identified_model import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.trust.excitation import require_motion
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
@@ -37,10 +39,21 @@ class Validation:
         The measured record.
     simulated : ndarray of float, shape (n,)
         Simulated stem position at the same times, m.
+    notes : tuple of str
+        What replaces the numbers that the model lacks, one sentence each.
     """
 
     recording: Recording
     simulated: NDArray[np.float64] = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Return fit and errors on one line, and each note on a line of its own."""
+        figures = (
+            f"fit {100 * self.fit:.2f} %, rms {self.rms * 1e6:.3g} µm, "
+            f"largest error {self.maximum_error * 1e6:.3g} µm"
+        )
+        return "\n".join([figures, *(f"note: {note}" for note in self.notes)])
 
     @property
     def residual(self) -> NDArray[np.float64]:
@@ -90,7 +103,9 @@ def measured_start(recording: Recording, valve: Valve) -> StemState:
     return StemState(inside, slope / recording.sample_period if inside == start else 0.0)
 
 
-def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) -> Validation:
+def validate(
+    recording: Recording, valve: Valve, parameters: KarnoppParameters | Result
+) -> Validation:
     """Simulate a recording with a model, to compare the simulated with the measured stem.
 
     The stem starts at the measured position and velocity (`measured_start`); nothing is fitted to
@@ -105,8 +120,8 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
         Pressure and stem position; another record than the one identified, to validate.
     valve : Valve
         Geometry.
-    parameters : KarnoppParameters
-        The model.
+    parameters : KarnoppParameters or Result
+        The model; of a result, its identified values (`identified_model`).
 
     Returns
     -------
@@ -131,7 +146,12 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
     >>> validation = vf.validate(vf.Recording(0.01, pressure, stem.position), valve, packing)
     >>> bool(validation.fit > 0.999)
     True
+    >>> print(validation)
+    fit 100.00 %, rms 0 µm, largest error 0 µm
     """
+    notes: tuple[str, ...] = ()
+    if isinstance(parameters, Result):
+        parameters, notes = identified_model(parameters.values)
     if parameters.spring_constant == 0:
         raise RefusalError(
             "a model without a spring cannot be validated: its simulated stem drifts away; use a "
@@ -146,4 +166,4 @@ def validate(recording: Recording, valve: Valve, parameters: KarnoppParameters) 
         recording.sample_period,
         measured_start(record, valve),
     )
-    return Validation(recording, trajectory.position)
+    return Validation(recording, trajectory.position, notes)

@@ -97,7 +97,7 @@ class ValveFeed:
     def notes(self) -> list[str]:
         """Tell what of the messages was left out."""
         notes = [
-            f"{count} messages of {topic} are no such messages, and were left out"
+            f"{count} messages of {topic} cannot be decoded as its type, and were left out"
             for topic, count in self._undecodable.items()
         ]
         cause = self._buffer.snapshot().cleared_because
@@ -111,7 +111,7 @@ class ValveFeed:
         Raises
         ------
         RefusalError
-            If the samples make no record; told for a file, which cannot be waited for.
+            If the samples make no record; the remedies are those for a file.
         """
         if self._refusal is not None:
             raise RefusalError(self._refusal)

@@ -106,7 +106,7 @@ def write_bag(
 ) -> Path:
     """Write a snapshot as a bag of MCAP, with the stamps it was received with.
 
-    It is written in a hidden folder beside its place and then renamed, so that nobody meets
+    It is written in a hidden folder beside its place and then renamed, so that nobody reads
     half a bag. A valve file lies in it: `valve_friction identify BAG --valve BAG/valve.yaml` gives
     the numbers that the snapshot gives.
 
