@@ -113,7 +113,6 @@ class TestJson:
             "standard_error": 0.5,
             "half_width": 1.0,
             "interval": [149.0, 151.0],
-            "published": None,
             "unit": "N",
             "verdict": "identified",
             "reason": "",

@@ -237,7 +237,8 @@ class TestBadSamples:
         valve = only(bag)
         assert len(valve.recording()) == 50
         assert valve.notes == (
-            "2 messages of /fv_101/actuator_pressure cannot be decoded as its type, and were left out",
+            "2 messages of /fv_101/actuator_pressure cannot be decoded as its type, and were left "
+            "out",
         )
 
     def test_gap(self, tmp_path):

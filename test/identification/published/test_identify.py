@@ -277,8 +277,14 @@ class TestSettings:
         ("arguments", "message"),
         [
             ({"order": 1}, r"^order must be at least 2"),
-            ({"window": 30}, r"^derivative_window must be odd and at least order \+ 2 = 5, got 30"),
-            ({"window": 3}, r"^derivative_window must be odd and at least order \+ 2 = 5, got 3"),
+            (
+                {"derivative_window": 30},
+                r"^derivative_window must be odd and at least order \+ 2 = 5, got 30",
+            ),
+            (
+                {"derivative_window": 3},
+                r"^derivative_window must be odd and at least order \+ 2 = 5, got 3",
+            ),
             ({"steps": 0}, r"^steps \(0\) must be above zero"),
             ({"steps": 350}, r"^steps \(350\) .* below resolution \(350\)"),
             ({"assumed_mass": -1.0}, r"^assumed_mass must be above zero"),

@@ -164,4 +164,4 @@ class TestIdentifiedModel:
         assert model.parameters.stribeck_velocity == 3e-3
         assert model.parameters.viscous_asymmetry == 0.1
         (note,) = model.notes
-        assert note.startswith("clock_offset is left out")
+        assert note.startswith("clock_offset is not part of the model")
