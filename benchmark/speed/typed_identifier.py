@@ -4,15 +4,15 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from rclpy.executors import SingleThreadedExecutor
+import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.nodes.identifier import node as identifier
-from valve_friction_ros.nodes.plumbing.inputs import InputWatch
+from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
-from valve_friction_ros.nodes.plumbing.running import run_nodes
 from valve_friction_ros.streams import RecordBuffer
 
 
@@ -44,7 +44,7 @@ class TypedInputs:
         stamp = stamp_of(message.header.stamp)
         self._buffer.add_position(stamp, position_of(message, self._joint))
 
-    def flush(self) -> None:
+    def take(self) -> None:
         """Do nothing: every message has been taken."""
 
     def problems(self, timeout: float) -> list[str]:
@@ -52,7 +52,23 @@ class TypedInputs:
         return [told for watch in self._watches if (told := watch.problem(timeout))]
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Run the node in the default executor until it is interrupted."""
     identifier.ValveInputs = TypedInputs
+    for create in ("create_publisher", "create_subscription"):  # with its callbacks for events
+        setattr(identifier.Identifier, create, getattr(Node, create))
+    rclpy.init()
     with ThreadPoolExecutor(max_workers=1) as worker:
-        sys.exit(run_nodes(lambda: [identifier.Identifier(worker)], None, SingleThreadedExecutor))
+        node = identifier.Identifier(worker)
+        try:
+            rclpy.spin(node)
+        except (KeyboardInterrupt, ExternalShutdownException):
+            pass
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

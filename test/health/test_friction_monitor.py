@@ -26,6 +26,13 @@ def replaced(**changes):
     return dataclasses.replace(SETTINGS, **changes)
 
 
+def compared_with(baseline):
+    """A monitor that has a baseline."""
+    monitor = FrictionMonitor(SETTINGS)
+    monitor.baseline = baseline
+    return monitor
+
+
 def coulomb_friction(result):
     return result.parameters["coulomb_friction"]
 
@@ -53,7 +60,8 @@ class TestSettings:
             IdentificationSettings(derivative_window=value)
 
     def test_no_baseline_and_no_derivative_window_at_first(self):
-        assert (SETTINGS.baseline, SETTINGS.identification.derivative_window) == (None, None)
+        baseline = FrictionMonitor(SETTINGS).baseline
+        assert (baseline, SETTINGS.identification.derivative_window) == (None, None)
 
 
 class TestIdentification:
@@ -118,7 +126,7 @@ class TestMemory:
         assert monitor.diagnosis() == diagnose(result, BENCH_VALVE)
 
     def test_a_refusal_leaves_the_estimate(self, result):
-        monitor = FrictionMonitor(replaced(baseline=Baseline(coulomb_friction(result).value / 3)))
+        monitor = compared_with(Baseline(coulomb_friction(result).value / 3))
         monitor.accept(result, START)
         monitor.refuse(RefusalError("the stem did not move"))
         assert (monitor.result, monitor.stamp) == (result, START)
@@ -132,9 +140,49 @@ class TestMemory:
         )
 
 
+class TestInternalError:
+    def test_it_warns_until_an_identification_succeeds(self, result):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.accept(result, START)
+        good = monitor.diagnosis()
+        monitor.fail("internal error: a bug")
+        diagnosis = monitor.diagnosis()
+        assert (diagnosis.level, diagnosis.status_signal) == (
+            Level.WARN,
+            StatusSignal.CHECK_FUNCTION,
+        )
+        assert diagnosis.message == f"internal error: a bug; before: {good.message}"
+        assert (monitor.result, monitor.refusal) == (result, None)
+
+        monitor.refuse(RefusalError("the stem did not move"))
+        assert monitor.internal_error == "internal error: a bug"
+        assert monitor.diagnosis().level == Level.WARN
+        monitor.accept(result, START + 1)
+        assert monitor.internal_error is None
+        assert monitor.diagnosis() == good
+
+    def test_before_any_estimate(self):
+        monitor = FrictionMonitor(SETTINGS)
+        monitor.fail("internal error: a bug")
+        assert monitor.diagnosis().level == Level.WARN
+        assert monitor.diagnosis().message == (
+            "internal error: a bug; before: no estimate: nothing has been identified yet"
+        )
+
+    def test_an_alarm_stays(self, result):
+        monitor = compared_with(Baseline(coulomb_friction(result).value / 3))
+        monitor.accept(result, START)
+        alarm = monitor.diagnosis()
+        monitor.fail("internal error: a bug")
+        assert alarm.level == Level.ERROR
+        assert monitor.diagnosis() == dataclasses.replace(
+            alarm, message=f"internal error: a bug; before: {alarm.message}"
+        )
+
+
 class TestBaseline:
-    def test_of_the_settings(self, result):
-        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+    def test_a_given_value(self, result):
+        monitor = compared_with(Baseline(100.0))
         assert monitor.baseline == Baseline(100.0, 0.0)
         monitor.accept(result, START)
         ratio = monitor.diagnosis().ratio
@@ -145,48 +193,45 @@ class TestBaseline:
         monitor.accept(result, START)
         healthy = coulomb_friction(result)
         expected = Baseline(healthy.value, healthy.half_width)
-        assert monitor.set_baseline() == monitor.baseline == expected
+        monitor.baseline = monitor.result_as_baseline()
+        assert monitor.baseline == expected
         assert monitor.diagnosis().ratio.value == 1.0
         tight = friction(2.5 * healthy.value, 7.0)
         monitor.accept(with_values(coulomb_friction=tight), START + 1)
         assert monitor.diagnosis().ratio == expected.compared_with(tight)
         assert monitor.diagnosis().level == Level.ERROR
-        assert monitor.set_baseline() == Baseline(tight.value, 7.0)
+        monitor.baseline = monitor.result_as_baseline()
+        assert monitor.baseline == Baseline(tight.value, 7.0)
         assert monitor.diagnosis().level == Level.OK
 
     def test_needs_an_estimate(self):
         monitor = FrictionMonitor(SETTINGS)
         text = "^the valve has no result to take as baseline: identify it first$"
         with pytest.raises(RefusalError, match=text):
-            monitor.set_baseline()
+            monitor.result_as_baseline()
         assert monitor.baseline is None
 
     def test_however_small(self, with_values, friction):
         monitor = FrictionMonitor(SETTINGS)
         monitor.accept(with_values(coulomb_friction=friction(0.5, 0.1)), START)
-        assert monitor.set_baseline() == Baseline(0.5, 0.1)
-
-    def test_a_given_one_is_taken(self):
-        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
-        monitor.take_baseline(Baseline(120.0, 3.0))
-        assert monitor.baseline == Baseline(120.0, 3.0)
+        assert monitor.result_as_baseline() == Baseline(0.5, 0.1)
 
     @pytest.mark.parametrize("coulomb", [0.0, -3.0])
     def test_needs_a_friction(self, with_values, coulomb):
-        monitor = FrictionMonitor(replaced(baseline=Baseline(100.0)))
+        monitor = compared_with(Baseline(100.0))
         monitor.accept(with_values(coulomb_friction=coulomb), START)
         with pytest.raises(
             RefusalError, match=f"^a coulomb friction of {coulomb:.4g} N cannot be a baseline"
         ):
-            monitor.set_baseline()
+            monitor.result_as_baseline()
         assert monitor.baseline == Baseline(100.0)
 
     @pytest.mark.parametrize("before", [None, Baseline(100.0)])
     def test_needs_an_identifiable_friction(self, with_values, unknown, before):
-        monitor = FrictionMonitor(replaced(baseline=before))
+        monitor = compared_with(before)
         monitor.accept(with_values(coulomb_friction=unknown()), START)
         with pytest.raises(RefusalError) as refusal:
-            monitor.set_baseline()
+            monitor.result_as_baseline()
         assert str(refusal.value) == (
             "coulomb friction is not identifiable, so it cannot be the baseline: "
             "the record does not determine it"
@@ -196,8 +241,8 @@ class TestBaseline:
 
 
 class TestChangeOfSettings:
-    def filled(self, result, settings=SETTINGS):
-        monitor = FrictionMonitor(settings)
+    def filled(self, result, baseline=None):
+        monitor = compared_with(baseline)
         monitor.accept(result, START)
         monitor.buffer.add_pressure(START, 1e5)
         return monitor
@@ -228,11 +273,10 @@ class TestChangeOfSettings:
     @pytest.mark.parametrize(
         "changes",
         [
-            {"baseline": Baseline(3.0)},
             {"limits": FrictionLimits(warn_ratio=1.2)},
             {"identification": IdentificationSettings(derivative_window=51)},
         ],
-        ids=["baseline", "limits", "identification"],
+        ids=["limits", "identification"],
     )
     def test_other_changes_keep_it(self, result, changes):
         monitor = self.filled(result)
@@ -244,22 +288,14 @@ class TestChangeOfSettings:
 
     def test_a_baseline_that_was_set_survives_other_changes(self, result):
         monitor = self.filled(result)
-        monitor.set_baseline()
+        monitor.baseline = monitor.result_as_baseline()
         monitor.change_settings(replaced(limits=FrictionLimits(warn_ratio=1.2)))
         healthy = coulomb_friction(result)
         assert monitor.baseline == Baseline(healthy.value, healthy.half_width)
 
-    def test_but_not_a_baseline_of_the_settings(self, result):
-        monitor = self.filled(result, replaced(baseline=Baseline(100.0)))
-        monitor.set_baseline()
-        monitor.change_settings(replaced(baseline=Baseline(120.0)))
-        assert monitor.baseline == Baseline(120.0)
-        monitor.change_settings(SETTINGS)
-        assert monitor.baseline is None
-
     def test_new_limits_judge_the_old_estimate(self, result):
         healthy = Baseline(coulomb_friction(result).value / 1.2)
-        monitor = self.filled(result, replaced(baseline=healthy))
+        monitor = self.filled(result, healthy)
         assert monitor.diagnosis().level == Level.OK
         monitor.change_settings(dataclasses.replace(monitor.settings, limits=FrictionLimits(1.15)))
         assert monitor.diagnosis().level == Level.WARN

@@ -33,7 +33,7 @@ def test_a_success(monitor):
     snapshot = monitor.buffer.snapshot()
     result = identify_snapshot(snapshot, monitor.settings)
     monitor.accept(result, START)
-    baseline = monitor.set_baseline()
+    baseline = monitor.baseline = monitor.result_as_baseline()
     entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
     assert entry.parameters == dict(result.parameters)
     assert entry.span == (0, 499 * PERIOD)

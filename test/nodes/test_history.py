@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from histories import DAY, START, VALVE, success
+from histories import DAY, START, VALVE, as_kept, success
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 
@@ -17,7 +17,7 @@ NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
 PATIENT = {"input_timeout": 600.0}
 RECORD = quick_record()
-EXPECTED = identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
+EXPECTED = as_kept(identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
 
 
 @pytest.fixture

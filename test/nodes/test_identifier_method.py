@@ -26,7 +26,7 @@ def client(shared):
 
 def test_the_choice_is_described(client):
     (descriptor,) = client.describe(NODE, ["method"])
-    assert descriptor.additional_constraints == "one of refined, published, signature"
+    assert descriptor.additional_constraints == "one of refined, published, signature, robust"
 
 
 def test_a_signature_is_identified(client):

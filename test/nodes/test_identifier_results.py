@@ -192,17 +192,18 @@ def test_real_machine_gives_the_numbers_of_the_command(live):
     client.send_without_loss((stamps, force), (stamps, position))
     response = client.trigger("identify")
     assert response.success, response.message
-    figures = ("threshold", "sigma", "r_squared", "fit")
+    figures = ("threshold", "sigma", "r_squared")
     numbers = {
         **{name: expected["parameters"][name]["value"] for name in UNITS},
-        **{name: expected[name] for name in figures},
+        **{name: expected["evidence"][name] for name in figures},
+        "fit": expected["fit"],
     }
     known = {name: np.nan if value is None else value for name, value in numbers.items()}
-    assert as_told(client.friction(*UNITS, *figures)) == as_told(known)
+    assert as_told(client.friction(*UNITS, *figures, "fit")) == as_told(known)
     published = {name: expected["parameters"][name]["published"] for name in UNITS}
     assert as_told(client.published(*UNITS)) == as_told(published)
     status = client.status_values(lambda s: "samples" in values_of(s))
-    assert int(status["samples"]) == expected["samples"]
+    assert int(status["samples"]) == expected["evidence"]["samples"]
 
 
 def test_signals_of_different_rates(live):

@@ -42,7 +42,7 @@ def valve_with(coulomb_friction):
 def test_baseline_needs_an_estimate(healthy):
     _, refused, accepted = healthy
     assert not refused.success
-    assert "there is no estimate" in refused.message
+    assert "the valve has no result" in refused.message
     assert accepted.success
     assert "152.7" in accepted.message
 

@@ -3,15 +3,17 @@
 import failing_identifier
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, Domain, NodeProcess, buffered, stamps_of
+from live_nodes import NAMESPACE, Domain, NodeProcess, buffered, stamps_of, values_of
 from records import quick_record, simulated
 from slow_identifier import FINISH, SCRIPT
 from std_srvs.srv import Trigger
 
+from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.identification import published_estimate
 from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
 
 IDENTIFY = f"{NAMESPACE}/identifier/identify"
+OK, WARN = b"\x00", b"\x01"
 NODES = ("identifier", "simulator", "pressure_source")
 BAD_STARTS = {  # node, parameters, words of the only line
     "even window": ("identifier", {"derivative_window": 30}, "window must be odd"),
@@ -130,14 +132,36 @@ def test_long_identification_loses_no_sample(live, tmp_path):
     assert client.friction("sigma") == {"sigma": sigma}
 
 
-def test_unforeseen_failure_is_told_and_the_next_record_identifies(live, tmp_path):
-    live.start_identifier({"input_timeout": 600.0}, script=failing_identifier.SCRIPT)
+def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_path):
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    process = live.start_identifier({"input_timeout": 600.0}, script=failing_identifier.SCRIPT)
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)
     response = client.trigger("identify")
     assert not response.success
-    assert response.message.startswith("unexpected ZeroDivisionError: nobody foresaw it (")
+    words = "internal error: ZeroDivisionError: nobody foresaw it (failing_identifier.py, line "
+    assert response.message.startswith(words)
+    assert response.message.endswith("): report it, with what ~/save writes")
+
+    status = client.next_status()
+    assert status.level == WARN
+    assert status.message.startswith(words)
+    values = values_of(status)
+    assert values["NE 107"] == "C"
+    assert values["estimate_valid"] == "false"
+    assert values["reason"] == response.message
+    assert "[ERROR]" in process.errors
+    assert process.errors.count("Traceback (most recent call last)") == 1
+    assert 'raise ZeroDivisionError("nobody\\nforesaw it")' in process.errors
+
+    # The same bug again is not logged again.
+    assert client.trigger("identify").message == response.message
+    assert process.errors.count("Traceback (most recent call last)") == 1
+    assert history.entries() == ()
 
     (tmp_path / failing_identifier.MENDED).touch()
     client.identified_whole(1000)
+    assert client.next_status().level == OK
+    assert all(not entry.refusal for entry in history.entries())
+    process.forgive_tracebacks()

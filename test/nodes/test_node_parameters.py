@@ -71,12 +71,28 @@ def test_every_parameter_is_described_with_its_unit_and_its_range(live, name):
         assert re.search(r"\w.*\[[^\]]+\]", descriptor.description), (
             f"{descriptor.name}: no unit in {descriptor.description!r}"
         )
+        assert "[SI" not in descriptor.description
         if descriptor.type == ParameterType.PARAMETER_STRING:
             continue
         limits = range_of(descriptor)
         assert (limits is None) == (descriptor.name in CHECKED_BY_RULE), descriptor.name
         if limits is not None:
             assert limits[0] < limits[1]
+
+
+def test_known_values_have_the_units_of_their_parameters(client):
+    units = {
+        "mass": "kg",
+        "viscous_friction": "N·s/m",
+        "coulomb_friction": "N",
+        "static_friction": "N",
+        "spring_constant": "N/m",
+        "spring_preload": "N",
+        "limit_velocity": "m/s",
+    }
+    descriptors = client.describe(NODE, [f"fixed.{name}" for name in units])
+    for (name, unit), descriptor in zip(units.items(), descriptors, strict=True):
+        assert descriptor.description.startswith(f"Known value of {name} [{unit}],")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from std_msgs.msg import Header
 
 from valve_friction_ros.nodes.plumbing import raw_samples
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
-from valve_friction_ros.nodes.plumbing.raw_samples import RawSamples, positions_in, pressures_in
+from valve_friction_ros.nodes.plumbing.polled_subscription import TakenMessage
+from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, positions_in, pressures_in
 from valve_friction_ros.streams import Kind
 
 NUMBERS = st.floats(width=64)
@@ -143,20 +144,34 @@ def test_what_is_no_message_is_refused_by_the_library(cut):
         pressures_in([whole[:cut]])
 
 
-def test_arrivals_keep_their_order():
-    raw = RawSamples("stem")
-    order = [0, 1, 1, 0, 0, 1, 0]
-    for k, is_stem in enumerate(order):
-        header = Header(stamp=Time(nanosec=k))
-        if is_stem:
-            names = ["stem"] if k != 5 else ["arm"]
-            raw.add_stem(*serialised([JointState(header=header, name=names, position=[0.5 * k])]))
-        else:
-            raw.add_pressure(*serialised([FluidPressure(header=header, fluid_pressure=1.0 * k)]))
-    assert len(raw) == 7
-    kinds, stamps, values = raw.take()
+def taken(messages, received):
+    return [TakenMessage(*pair) for pair in zip(serialised(messages), received, strict=True)]
+
+
+def test_arrivals_are_in_the_order_of_their_receipt():
+    of_stem = [1, 2, 5]
+    pressures = taken(
+        (pressure(Time(nanosec=k), 1.0 * k) for k in (0, 3, 4, 6)), received=(10, 13, 14, 16)
+    )
+    stems = taken(
+        (
+            JointState(
+                header=Header(stamp=Time(nanosec=k)),
+                name=["stem" if k != 5 else "arm"],
+                position=[0.5 * k],
+            )
+            for k in of_stem
+        ),
+        received=(11, 12, 15),
+    )
+    kinds, stamps, values = arrivals_of(pressures, stems, "stem")
     assert kinds.tolist() == [0, 1, 1, 0, 0, Kind.NO_POSITION, 0]
     assert stamps.tolist() == list(range(7))
     assert_same(values, [0.0, 0.5, 1.0, 3.0, 4.0, np.nan, 6.0])
-    assert len(raw) == 0
-    assert raw.take().stamps.size == 0
+    assert arrivals_of([], [], "stem").stamps.size == 0
+
+
+def test_a_topic_keeps_its_order_when_the_clock_of_receipt_is_set_back():
+    pressures = taken((pressure(Time(nanosec=k), 1.0) for k in range(4)), received=(10, 20, 5, 6))
+    stems = taken([JointState(header=Header(stamp=Time(nanosec=9)), position=[0.0])], [15])
+    assert arrivals_of(pressures, stems, "").stamps.tolist() == [0, 9, 1, 2, 3]

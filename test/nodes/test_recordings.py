@@ -55,7 +55,8 @@ def identified(*arguments):
 def numbers_of(answer):
     """What the node publishes, comparable to the last bit, out of what the command prints."""
     parameters = answer["parameters"]
-    figures = {name: answer[name] for name in ("threshold", "sigma", "r_squared", "fit", "rms")}
+    figures = {name: answer["evidence"][name] for name in ("threshold", "sigma", "r_squared")}
+    figures |= {name: answer[name] for name in ("fit", "rms")}
     published = {f"published {name}": parameters[name]["published"] for name in UNITS}
     values = {name: parameters[name]["value"] for name in UNITS}
     return as_told({**figures, **published, **values})

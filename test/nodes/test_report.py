@@ -35,7 +35,7 @@ def test_the_last_estimate_is_drawn_from_its_own_record(bench):
     client, folder = bench
     before = client.trigger("report")
     assert not before.success
-    assert before.message == "there is no estimate to report: identify first"
+    assert before.message == "the valve has no result to report: identify it first"
     assert not folder.exists()
 
     low = quick_record()
@@ -108,5 +108,5 @@ def test_a_node_that_reports_nothing_loads_nothing_for_it():
         check=True,
         timeout=60,
     ).stdout.split()
-    assert "valve_friction_ros.nodes.identifier.reporting" in loaded
+    assert "valve_friction_ros.nodes.identifier.report_service" in loaded
     assert not {"matplotlib", "jinja2", "valve_friction_ros.reports"} & set(loaded)

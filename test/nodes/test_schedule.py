@@ -2,6 +2,7 @@
 
 import pytest
 from builtin_interfaces.msg import Time
+from histories import as_kept
 from live_nodes import NAMESPACE, SECOND, START, values_of
 from records import quick_record
 from rosgraph_msgs.msg import Clock
@@ -12,7 +13,7 @@ from valve_friction_ros.model import BENCH_VALVE, Recording
 
 NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
-EXPECTED = identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"]
+EXPECTED = as_kept(identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
 
 
 @pytest.fixture

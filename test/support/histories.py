@@ -23,6 +23,13 @@ OTHER = KeptValve("/area_2/lv_7/identifier", "LV-7")
 _SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
 
 
+def as_kept(one):
+    """The parameter as the history gives it back: without published value and bound."""
+    return Parameter(
+        one.name, one.value, one.standard_error, one.half_width, one.verdict, one.reason
+    )
+
+
 def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""):
     return Parameter(name, value, half_width / 2, half_width, verdict, reason)
 

@@ -12,6 +12,7 @@ from valve_friction_ros.health.diagnosis import (
 )
 from valve_friction_ros.health.friction_monitor import (
     FrictionMonitor,
+    IdentificationInput,
     MonitorSettings,
     identify_snapshot,
 )
@@ -21,6 +22,7 @@ __all__ = [
     "Diagnosis",
     "FrictionLimits",
     "FrictionMonitor",
+    "IdentificationInput",
     "Level",
     "MonitorSettings",
     "Ratio",

@@ -1,6 +1,7 @@
 """The monitor of one valve, without ROS: buffer, last result, baseline, diagnosis."""
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import (
@@ -21,7 +22,7 @@ from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 
-__all__ = ["FrictionMonitor", "MonitorSettings", "identify_snapshot"]
+__all__ = ["FrictionMonitor", "IdentificationInput", "MonitorSettings", "identify_snapshot"]
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,6 @@ class MonitorSettings:
         Name of the method of identification, among `METHODS`.
     limits : FrictionLimits
         Bounds of the friction.
-    baseline : Baseline or None
-        Friction of the healthy valve, if it is known.
     window : float
         Length of the buffered and identified record, s.
     """
@@ -48,13 +47,19 @@ class MonitorSettings:
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
     method: str = DEFAULT_METHOD
     limits: FrictionLimits = field(default_factory=FrictionLimits)
-    baseline: Baseline | None = None
     window: float = 60.0
 
     def __post_init__(self) -> None:
         """Refuse impossible windows and unknown methods."""
         method_named(self.method)
         require_positive("window", self.window)
+
+
+class IdentificationInput(NamedTuple):
+    """A copy of the buffer, and the settings for its identification."""
+
+    snapshot: Snapshot
+    settings: MonitorSettings
 
 
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
@@ -85,15 +90,23 @@ class FrictionMonitor:
     Parameters
     ----------
     settings : MonitorSettings
-        Valve, identification, limits, baseline and window.
+        Valve, identification, limits and window.
+
+    Attributes
+    ----------
+    buffer : RecordBuffer
+        The last seconds of both signals.
+    baseline : Baseline or None
+        Friction of the healthy valve.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
-        self._baseline = settings.baseline
         self._result: Result | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
+        self._internal_error: str | None = None
+        self.baseline: Baseline | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
 
     @property
@@ -102,18 +115,13 @@ class FrictionMonitor:
         return self._settings
 
     @property
-    def baseline(self) -> Baseline | None:
-        """Friction of the healthy valve."""
-        return self._baseline
-
-    @property
     def result(self) -> Result | None:
         """The latest result; a refusal leaves the one before it in place."""
         return self._result
 
     @property
     def stamp(self) -> int | None:
-        """When the latest result was made, ns."""
+        """When the latest result was found, ns."""
         return self._stamp
 
     @property
@@ -121,25 +129,37 @@ class FrictionMonitor:
         """Why the latest identification was refused; None if it was not."""
         return self._refusal
 
+    @property
+    def internal_error(self) -> str | None:
+        """The latest bug in an identification, until one succeeds."""
+        return self._internal_error
+
     def change_settings(self, settings: MonitorSettings) -> None:
         """Put new settings in force; a new window or valve empties the buffer."""
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear("valve or window parameters were changed")
-        if settings.baseline != self._settings.baseline:
-            self._baseline = settings.baseline
         self._settings = settings
 
+    def input(self) -> IdentificationInput:
+        """Return a copy of the buffer, with the settings in force."""
+        return IdentificationInput(self.buffer.snapshot(), self._settings)
+
     def accept(self, result: Result, stamp: int) -> None:
-        """Remember a result made at `stamp` (ns)."""
-        self._result, self._stamp, self._refusal = result, stamp, None
+        """Remember a result found at `stamp` (ns)."""
+        self._result, self._stamp = result, stamp
+        self._refusal = self._internal_error = None
 
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""
         self._refusal = str(refusal)
 
-    def set_baseline(self) -> Baseline:
-        """Make the Coulomb friction of the latest result the baseline, and return it.
+    def fail(self, internal_error: str) -> None:
+        """Remember that a bug has ended an identification, whatever its record."""
+        self._internal_error = internal_error
+
+    def result_as_baseline(self) -> Baseline:
+        """Return the Coulomb friction of the latest result, without making it the baseline.
 
         Raises
         ------
@@ -148,20 +168,27 @@ class FrictionMonitor:
         """
         if self._result is None:
             raise RefusalError("the valve has no result to take as baseline: identify it first")
-        self._baseline = Baseline.of(self._result)
-        return self._baseline
-
-    def take_baseline(self, baseline: Baseline) -> None:
-        """Use this baseline from now on."""
-        self._baseline = baseline
+        return Baseline.of(self._result)
 
     def diagnosis(self) -> Diagnosis:
-        """Return the diagnosis by the latest result, also after a refusal; OK without a result."""
+        """Return the diagnosis by the latest result, also after a refusal; OK without a result.
+
+        A bug in an identification raises the level to WARN at least, until one succeeds.
+        """
+        diagnosis = self._diagnosis_by_result()
+        if self._internal_error is None:
+            return diagnosis
+        message = f"{self._internal_error}; before: {diagnosis.message}"
+        if diagnosis.level >= Level.WARN:
+            return replace(diagnosis, message=message)
+        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
+
+    def _diagnosis_by_result(self) -> Diagnosis:
         if self._result is None:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
         diagnosis = diagnose(
-            self._result, self._settings.valve, self._baseline, self._settings.limits
+            self._result, self._settings.valve, self.baseline, self._settings.limits
         )
         if self._refusal is None:
             return diagnosis

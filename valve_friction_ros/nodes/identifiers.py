@@ -7,15 +7,18 @@ from concurrent.futures import ThreadPoolExecutor
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
-from valve_friction_ros.nodes.identifier.node import PAUSE, Identifier, identification_worker
+from valve_friction_ros.nodes.identifier import parameters
+from valve_friction_ros.nodes.identifier.node import Identifier, identification_worker
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
 from valve_friction_ros.nodes.plumbing.running import run_nodes
 
-__all__ = ["identifiers_of_valves", "main"]
+__all__ = ["PARAMETERS", "identifiers_of_valves", "main"]
 
 _VALVES = ParameterSpec(
     "valves", [""], "Namespaces of the valves, an identifier each [-]", read_only=True
 )
+PARAMETERS = (_VALVES, *parameters.PARAMETERS)
+"""Its own, and those of its identifiers."""
 
 
 def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
@@ -24,9 +27,9 @@ def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
     Raises
     ------
     ValueError
-        If no valve is named, or one twice, or ROS arguments remap their namespaces.
+        If no valve is named, or a valve is named twice, or ROS arguments remap a namespace.
     rclpy.exceptions.InvalidNamespaceException
-        If a name is no namespace.
+        If a name cannot be a namespace.
     """
     host = Node("identifiers")
     yield host
@@ -53,7 +56,7 @@ def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the nodes."""
     with identification_worker() as worker:
-        return run_nodes(lambda: identifiers_of_valves(worker), arguments, pause=PAUSE)
+        return run_nodes(lambda: identifiers_of_valves(worker), arguments)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure
 
 from valve_friction_ros.model import (
@@ -24,16 +23,19 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     values_of,
 )
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.records.csv_table import read_columns
 
-__all__ = ["PressureSource", "main"]
+__all__ = ["PARAMETERS", "PressureSource", "main"]
 
-_BLOCKS_PER_SECOND = 50.0
+_PAUSE = 0.02
+"""Time between two blocks of samples, s."""
+
 _SQUARE = SquareWave()
 
-_PARAMETERS = (
+PARAMETERS = (
     ParameterSpec(
         "excitation",
         "square",
@@ -97,13 +99,13 @@ def _excitation(kind: str, low: float, high: float, period: float, path: str) ->
     return waves[kind](low, high, period)
 
 
-class PressureSource(Node):
+class PressureSource(PolledNode):
     """Publishes the signal in blocks, each sample with its own stamp."""
 
     def __init__(self) -> None:
         super().__init__("pressure_source")
-        declare_parameters(self, _PARAMETERS)
-        values = values_of(self, _PARAMETERS)
+        declare_parameters(self, PARAMETERS)
+        values = values_of(self, PARAMETERS)
         self._excitation = _excitation(
             values["excitation"], values["low"], values["high"], values["period"], values["file"]
         )
@@ -118,11 +120,12 @@ class PressureSource(Node):
         self._publisher = self.create_publisher(
             FluidPressure, "actuator_pressure", stream(), qos_overriding_options=qos_overrides()
         )
-        self.create_timer(1.0 / _BLOCKS_PER_SECOND, self._publish_due)
 
-    def _publish_due(self) -> None:
+    def poll(self) -> None:
         """Publish all samples whose time has come since the last block."""
         now = self.get_clock().now().nanoseconds
+        if not now:  # use_sim_time, and the clock has not come yet
+            return
         if self._start is None or now < self._start:
             self._start = now
             self._sent = 0
@@ -157,7 +160,7 @@ class PressureSource(Node):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(PressureSource, arguments)
+    return run_node(PressureSource, arguments, _PAUSE)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.model import (
@@ -24,6 +23,8 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     reject_invalid,
     values_of,
 )
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.valve_parameters import (
@@ -34,10 +35,13 @@ from valve_friction_ros.nodes.plumbing.valve_parameters import (
     valve_from,
 )
 
-__all__ = ["Simulator", "main"]
+__all__ = ["PARAMETERS", "Simulator", "main"]
+
+_PAUSE = 0.02
+"""Time between two looks for pressures, s: as often as `pressure_source` sends some."""
 
 _HIGHEST_PRESSURE = 1e9
-"""Pressure, Pa, above which a number is none that a valve can meet, and may overflow the model."""
+"""Pressure, Pa, beyond any valve: a larger number may overflow the model."""
 
 _NOISE_PARAMETERS = (
     ParameterSpec(
@@ -46,6 +50,7 @@ _NOISE_PARAMETERS = (
     ParameterSpec("noise_seed", 0, "Seed of the noise [-]", (0, 2**31 - 1), read_only=True),
 )
 _CHANGEABLE = (*VALVE_PARAMETERS, *KARNOPP_PARAMETERS, *_NOISE_PARAMETERS)
+PARAMETERS = (*_CHANGEABLE, JOINT)
 
 
 class _Plant(NamedTuple):
@@ -62,12 +67,12 @@ def _plant(values: Mapping[str, Any]) -> _Plant:
     )
 
 
-class Simulator(Node):
+class Simulator(PolledNode):
     """Steps the model by the stamps of the pressure and publishes the stem at the same stamps."""
 
     def __init__(self) -> None:
         super().__init__("simulator")
-        declare_parameters(self, (*_CHANGEABLE, JOINT))
+        declare_parameters(self, PARAMETERS)
         self._plant = _plant(values_of(self, _CHANGEABLE))
         reject_invalid(self, _CHANGEABLE, _plant)
         self.add_post_set_parameters_callback(self._take_parameters)
@@ -80,18 +85,17 @@ class Simulator(Node):
         self._publisher = self.create_publisher(
             JointState, "stem_state", stream(), qos_overriding_options=qos_overrides()
         )
-        self.create_subscription(
-            FluidPressure,
-            "actuator_pressure",
-            self._on_pressure,
-            stream(),
-            qos_overriding_options=qos_overrides(),
-        )
+        self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
 
     def _take_parameters(self, _: object) -> None:
         self._plant = _plant(values_of(self, _CHANGEABLE))
 
-    def _on_pressure(self, message: FluidPressure) -> None:
+    def poll(self) -> None:
+        """Let the stem follow the pressures that have come."""
+        for pressure in self._pressures.take():
+            self._follow(pressure.message)
+
+    def _follow(self, message: FluidPressure) -> None:
         stamp, pressure = stamp_of(message.header.stamp), message.fluid_pressure
         valve, parameters, noise = self._plant
         if not abs(pressure) <= _HIGHEST_PRESSURE:
@@ -126,7 +130,7 @@ class Simulator(Node):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(Simulator, arguments)
+    return run_node(Simulator, arguments, _PAUSE)
 
 
 if __name__ == "__main__":

@@ -2,51 +2,49 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future as ThreadFuture
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
-from rclpy.node import Node
-from rclpy.task import Future
-from std_srvs.srv import Trigger
 
-from valve_friction_ros.health import FrictionMonitor, identify_snapshot
-from valve_friction_ros.identification import RefusalError, Result
+from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import compile_kernels
-from valve_friction_ros.nodes.identifier.keeping import Job, Keeping
+from valve_friction_ros.nodes.identifier.bag_service import saved_bag
+from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
-    FIXED_AT_START,
+    INPUT_TIMEOUT,
+    PARAMETERS,
+    VALVE_TAG,
     monitor_settings,
+    require_valid,
 )
-from valve_friction_ros.nodes.identifier.reporting import Reporting
+from valve_friction_ros.nodes.identifier.report_service import written_report
 from valve_friction_ros.nodes.identifier.results import ResultTopics
-from valve_friction_ros.nodes.identifier.saving import saving
 from valve_friction_ros.nodes.identifier.schedule import Schedule
 from valve_friction_ros.nodes.identifier.status import friction_status, trend_values
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
-from valve_friction_ros.nodes.plumbing.guarded_work import guarded
-from valve_friction_ros.nodes.plumbing.late_answers import create_service_with_late_answers
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     reject_invalid,
     values_of,
 )
-from valve_friction_ros.nodes.plumbing.running import run_nodes
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.running import run_node
+from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT
 from valve_friction_ros.streams import Arrivals
 
-__all__ = ["PAUSE", "Identifier", "identification_worker", "main"]
+__all__ = ["PARAMETERS", "Identifier", "identification_worker", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
-PAUSE = 0.05
-"""Time, s, for which messages gather before they are taken."""
 
 
 @contextlib.contextmanager
@@ -60,12 +58,11 @@ def identification_worker() -> Iterator[ThreadPoolExecutor]:
         worker.shutdown(wait=False, cancel_futures=True)
 
 
-class Identifier(Node):
-    """Gathers pressure and stem position, identifies them on request, publishes the verdict.
+class Identifier(PolledNode):
+    """Gathers pressure and stem position, identifies them on request, publishes the diagnosis.
 
     The identification runs in a thread of its own on a copy of the buffer, while the executor
-    goes on receiving; its result comes back into the executor's thread, which alone touches the
-    monitor.
+    goes on; its callback awaits it, so the executor's thread alone touches the monitor.
 
     Parameters
     ----------
@@ -77,27 +74,34 @@ class Identifier(Node):
 
     def __init__(self, worker: ThreadPoolExecutor, namespace: str | None = None) -> None:
         super().__init__("identifier", namespace=namespace)
-        declare_parameters(self, (*CHANGEABLE, *FIXED_AT_START, JOINT))
-        self._monitor = FrictionMonitor(monitor_settings(values_of(self, CHANGEABLE)))
-        self._reporting = Reporting(self, self._monitor)
-        reject_invalid(self, CHANGEABLE, monitor_settings)
+        declare_parameters(self, PARAMETERS)
+        values = values_of(self, CHANGEABLE)
+        require_valid(values)
+        reject_invalid(self, CHANGEABLE, require_valid)
         self._worker = worker
+        self._monitor = FrictionMonitor(monitor_settings(values))
+        tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
         self._results = ResultTopics(self)
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
         self._inputs = ValveInputs(self, joint, self._take_samples)
-        self.add_post_set_parameters_callback(self._take_parameters)
         self._identifying = False
         self._identified_until: int | None = None
-        self._schedule = Schedule(self, self._identify_as_scheduled)
-        tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
-        self._keeping = Keeping(self, self._monitor, tag)
-        self._keeping.begin()
-        create_service_with_late_answers(self, Trigger, "~/identify", self._identify)
-        create_service_with_late_answers(self, Trigger, "~/save", self._save)
-        create_service_with_late_answers(self, Trigger, "~/report", self._report)
-        create_service_with_late_answers(self, Trigger, "~/set_baseline", self._set_baseline)
-        self.create_service(Trigger, "~/clear", self._clear)
+        waiting = ReentrantCallbackGroup()
+        self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
+        self._history = HistoryWriter(self, self._monitor, tag)
+        self._baseline = BaselineInForce(self, self._monitor)
+        self._baseline.begin(self._history.prepare(), self._history.path)
+        self._history.read_trend()
+        self.add_post_set_parameters_callback(self._take_parameters)
+        for name, work in {
+            "identify": self._identify,
+            "save": self._save,
+            "report": self._report,
+            "set_baseline": self._set_baseline,
+            "clear": self._clear,
+        }.items():
+            create_trigger_service(self, f"~/{name}", work, waiting)
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
         self._jump_handle = self.get_clock().create_jump_callback(
             JumpThreshold(
@@ -111,16 +115,9 @@ class Identifier(Node):
         self._jump_handle.unregister()
         super().destroy_node()
 
-    def _take_parameters(self, _: object) -> None:
-        self._inputs.flush()
-        self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
-        self._schedule.follow()
-
-    def _on_time_jump(self, jump: TimeJump) -> None:
-        cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
-        self._inputs.flush()
-        self._monitor.buffer.clear(cause)
-        self.get_logger().warning(f"{cause}: the buffer was cleared")
+    def poll(self) -> None:
+        """Take the samples that have come."""
+        self._inputs.take()
 
     def _take_samples(self, arrivals: Arrivals) -> None:
         rejected, cleared = self._monitor.buffer.add_arrivals(arrivals)
@@ -130,163 +127,131 @@ class Identifier(Node):
         if cleared is not None:
             self.get_logger().warning(cleared, throttle_duration_sec=_LOG_EVERY)
 
-    def _identify(
-        self, _: Trigger.Request, response: Trigger.Response
-    ) -> "Trigger.Response | Future":
-        """Begin to identify a copy of the buffer; its result arrives in the executor's thread."""
+    def _take_parameters(self, _: object) -> None:
+        self._inputs.take()
+        self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
+        self._baseline.follow_parameter()
+        self._schedule.follow()
+
+    def _on_time_jump(self, jump: TimeJump) -> None:
+        cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
+        self._inputs.take()
+        self._monitor.buffer.clear(cause)
+        self.get_logger().warning(f"{cause}: the buffer was cleared")
+
+    async def _identify(self) -> str:
+        """Identify the buffer and keep what came of it; return the diagnosis."""
         if self._identifying:
-            response.message = "an identification is already running: wait for it"
-            return response
-        answer = Future()
-        self._begin(lambda done, job: self._conclude(done, job, answer))
-        return answer
-
-    def _identify_as_scheduled(self) -> None:
-        self._inputs.flush()
-        newest = self._monitor.buffer.newest_stamp
-        if self._identifying:
-            self._schedule.skip("an identification was already running")
-        elif newest is not None and newest == self._identified_until:
-            self._schedule.stall()
-        else:
-            self._begin(self._conclude_scheduled)
-
-    def _begin(self, conclude: "Callable[[ThreadFuture[Result], Job], None]") -> None:
-        """Identify a copy of the buffer in the worker, then conclude in the executor's thread."""
-        self._inputs.flush()
-        self._identifying = True
-        self._identified_until = self._monitor.buffer.newest_stamp
-        job = Job(self._monitor.buffer.snapshot(), self._monitor.settings)
-        self._in_worker(lambda done: conclude(done, job), identify_snapshot, *job)
-
-    def _in_worker(
-        self,
-        conclude: Callable[["ThreadFuture[Any]"], None],
-        work: Callable[..., Any],
-        *arguments: object,
-    ) -> None:
-        """Do some work in the worker; `conclude` takes over in the executor's thread."""
-        executor = self.executor
-        submitted = self._worker.submit(guarded(work), *arguments)
-        submitted.add_done_callback(lambda done: executor.create_task(conclude, done))
-
-    def _conclude(self, done: "ThreadFuture[Result]", job: Job, answer: Future) -> None:
-        """Take over what was asked for, and answer when it has been kept."""
-        self._identifying = False
-        response = Trigger.Response()
+            raise RefusalError("an identification is already running: wait for it")
+        record, refused = self._copied_buffer(), None
         try:
-            self._accept(done.result(), job)
+            await self._identified(record)
         except RefusalError as refusal:
             self._monitor.refuse(refusal)
             self.get_logger().warning(f"identification refused: {refusal}")
-            response.message = str(refusal)
-        else:
-            response.success = True
-            told = (*self._input_problems(), self._monitor.diagnosis().message)
-            response.message = "; ".join(told)
-
-        def respond() -> None:
-            answer.set_result(response)
+            refused = refusal
+        except InternalError:
             self._publish_diagnostics()
-
-        self._keeping.keep(job, respond)
-
-    def _conclude_scheduled(self, done: "ThreadFuture[Result]", job: Job) -> None:
-        """Take over a success; a record that cannot be identified leaves everything as it is."""
-        self._identifying = False
-        try:
-            self._accept(done.result(), job)
-        except RefusalError as refusal:
-            self._schedule.skip(str(refusal))
-        else:
-            self._schedule.succeed()
-            self._keeping.keep(job, self._publish_diagnostics)
-
-    def _accept(self, assessment: Result, job: Job) -> None:
-        now = self.get_clock().now().nanoseconds
-        self._monitor.accept(assessment, now)
-        self._reporting.remember(job, assessment, now)
-        self._results.publish(assessment, self._monitor)
-
-    def _save(self, _: Trigger.Request, __: Trigger.Response) -> Future:
-        answer = Future()
-        self._inputs.flush()
-        self._in_worker(
-            lambda done: answer.set_result(self._saved(done)),
-            saving(self, self._monitor, self._inputs.names),
-        )
+            raise
+        answer = "; ".join((*self._input_problems(), self._monitor.diagnosis().message))
+        await self._history.keep(record)
+        self._publish_diagnostics()
+        if refused is not None:
+            raise refused
         return answer
 
-    def _saved(self, done: "ThreadFuture[Path]") -> Trigger.Response:
+    async def _identify_as_scheduled(self) -> None:
+        """Identify the buffer; a record that cannot be identified leaves everything as it is."""
+        self._inputs.take()
+        newest = self._monitor.buffer.newest_stamp
+        if self._identifying:
+            self._schedule.skip("an identification was already running")
+            return
+        if newest is not None and newest == self._identified_until:
+            self._schedule.stall()
+            return
+        record = self._copied_buffer()
         try:
-            return Trigger.Response(success=True, message=str(done.result()))
+            await self._identified(record)
+        except (RefusalError, InternalError) as error:
+            self._schedule.skip(str(error))
+            return
+        self._schedule.succeed()
+        await self._history.keep(record)
+        self._publish_diagnostics()
+
+    def _copied_buffer(self) -> IdentificationInput:
+        self._inputs.take()
+        self._identified_until = self._monitor.buffer.newest_stamp
+        return self._monitor.input()
+
+    async def _identified(self, record: IdentificationInput) -> None:
+        """Identify a record in the worker, then take over and publish the result.
+
+        Raises
+        ------
+        RefusalError
+            If the record cannot be identified.
+        InternalError
+            If a bug is met; the monitor shows it until an identification succeeds.
+        """
+        self._identifying = True
+        try:
+            with bugs_reported(self, known=self._monitor.internal_error):
+                result = await done_in(self._worker, identify_snapshot, *record)
+                self._monitor.accept(result, self.get_clock().now().nanoseconds)
+                self._results.publish(result, self._monitor)
+        except InternalError as error:
+            self._monitor.fail(str(error))
+            raise
+        finally:
+            self._identifying = False
+
+    async def _save(self) -> str:
+        self._inputs.take()
+        try:
+            return str(await saved_bag(self, self._monitor, self._inputs.names, self._worker))
         except RefusalError as refusal:
             self.get_logger().warning(f"the buffer was not saved: {refusal}")
-            return Trigger.Response(message=str(refusal))
+            raise
 
-    def _report(
-        self, _: Trigger.Request, response: Trigger.Response
-    ) -> "Trigger.Response | Future":
+    async def _report(self) -> str:
         try:
-            writing = self._reporting.writing()
-        except RefusalError as refusal:
-            response.message = str(refusal)
-            return response
-        answer = Future()
-        self._in_worker(lambda done: answer.set_result(self._reported(done)), writing)
-        return answer
-
-    def _reported(self, done: "ThreadFuture[Path]") -> Trigger.Response:
-        try:
-            return Trigger.Response(success=True, message=str(done.result()))
+            tag = self._history.valve.tag
+            return str(await written_report(self, self._monitor, tag, self._worker))
         except RefusalError as refusal:
             self.get_logger().warning(f"no report was written: {refusal}")
-            return Trigger.Response(message=str(refusal))
+            raise
 
-    def _set_baseline(
-        self, _: Trigger.Request, response: Trigger.Response
-    ) -> "Trigger.Response | Future":
-        try:
-            baseline = self._monitor.set_baseline()
-        except RefusalError as refusal:
-            response.message = str(refusal)
-            return response
-        self._keeping.put_in_force(baseline)
-        answer = Future()
+    async def _set_baseline(self) -> str:
+        baseline = self._monitor.result_as_baseline()
+        self._baseline.put_in_force(baseline)
+        await self._history.keep_baseline(baseline)
+        self._publish_diagnostics()
+        return (
+            f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
+            f"± {baseline.half_width:.2g} N{self._history.reservation}"
+        )
 
-        def respond() -> None:
-            response.success = True
-            response.message = (
-                f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
-                f"± {baseline.half_width:.2g} N{self._keeping.reservation}"
-            )
-            answer.set_result(response)
-            self._publish_diagnostics()
-
-        self._keeping.keep_baseline(baseline, respond)
-        return answer
-
-    def _clear(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._inputs.flush()
+    async def _clear(self) -> str:
+        self._inputs.take()
         self._monitor.buffer.clear("on request")
-        response.success = True
-        response.message = "the buffer is empty; estimate and baseline are kept"
-        return response
+        return "the buffer is empty; estimate and baseline are kept"
 
     def _input_problems(self) -> list[str]:
-        return self._inputs.problems(self.get_parameter("input_timeout").value)
+        return self._inputs.problems(self.get_parameter(INPUT_TIMEOUT.name).value)
 
     def _publish_diagnostics(self) -> None:
-        self._inputs.flush()
+        self._inputs.take()
         now = self.get_clock().now()
         status = friction_status(
             self._monitor,
             f"{self.get_fully_qualified_name()}: friction",
-            self._keeping.valve.tag,
+            self._history.valve.tag,
             now.nanoseconds,
             self._input_problems(),
-            self._keeping.problems,
-            {**trend_values(self._keeping.trend), **self._schedule.values()},
+            self._history.problems,
+            {**trend_values(self._history.trend), **self._schedule.values()},
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()
@@ -296,7 +261,7 @@ class Identifier(Node):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
     with identification_worker() as worker:
-        return run_nodes(lambda: [Identifier(worker)], arguments, pause=PAUSE)
+        return run_node(lambda: Identifier(worker), arguments)
 
 
 if __name__ == "__main__":

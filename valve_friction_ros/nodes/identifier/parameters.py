@@ -1,4 +1,4 @@
-"""Parameters of the identifier and what they mean."""
+"""All parameters of the identifier, and what is built from them."""
 
 import math
 from collections.abc import Mapping
@@ -9,28 +9,73 @@ from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     FIXABLE,
     METHODS,
+    UNITS,
     IdentificationSettings,
 )
-from valve_friction_ros.nodes.identifier.keeping import HISTORY_DAYS, HISTORY_FILE
-from valve_friction_ros.nodes.identifier.reporting import REPORT_FOLDER
-from valve_friction_ros.nodes.identifier.saving import SAVE_FOLDER
-from valve_friction_ros.nodes.identifier.schedule import PERIOD
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, optional
-from valve_friction_ros.nodes.plumbing.valve_parameters import VALVE_PARAMETERS, valve_from
+from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT, VALVE_PARAMETERS, valve_from
+from valve_friction_ros.records.data_folder import history_file
 
-__all__ = ["CHANGEABLE", "FIXED_AT_START", "monitor_settings"]
+__all__ = [
+    "BASELINE",
+    "CHANGEABLE",
+    "HISTORY_DAYS",
+    "HISTORY_FILE",
+    "INPUT_TIMEOUT",
+    "PARAMETERS",
+    "PERIOD",
+    "REPORT_FOLDER",
+    "SAVE_FOLDER",
+    "VALVE_TAG",
+    "baseline_from",
+    "monitor_settings",
+    "require_valid",
+]
 
 _DEFAULTS = IdentificationSettings()
 _LIMITS = FrictionLimits()
+_UNITS = {**UNITS, "limit_velocity": "m/s"}
 
-FIXED_AT_START = (
-    ParameterSpec(
-        "valve_tag",
-        "",
-        "Tag of the valve, hardware_id of its diagnostics [-]; empty: the namespace",
-        read_only=True,
-    ),
-    HISTORY_FILE,
+VALVE_TAG = ParameterSpec(
+    "valve_tag",
+    "",
+    "Tag of the valve, hardware_id of its diagnostics [-]; empty: the namespace",
+    read_only=True,
+)
+HISTORY_FILE = ParameterSpec(
+    "history_file",
+    str(history_file()),
+    "File in which identifications and baselines are kept [-]; empty: nowhere",
+    read_only=True,
+)
+HISTORY_DAYS = ParameterSpec(
+    "history_days", 1100.0, "Time for which they are kept [days]; 0: for ever", (0.0, 36525.0)
+)
+INPUT_TIMEOUT = ParameterSpec(
+    "input_timeout", 3.0, "Silence of an input after which it is reported [s]", (0.1, 86400.0)
+)
+BASELINE = ParameterSpec(
+    "baseline_coulomb_friction",
+    math.nan,
+    "Coulomb friction of the healthy valve [N], above zero; .nan: not known",
+)
+SAVE_FOLDER = ParameterSpec(
+    "save_folder",
+    "",
+    "Folder that ~/save writes bags into [-]; empty: valve_friction_ros/saved under ROS_HOME, or "
+    "under ~/.ros",
+)
+REPORT_FOLDER = ParameterSpec(
+    "report_folder",
+    "",
+    "Folder that ~/report writes pages into [-]; empty: valve_friction_ros/reports under ROS_HOME, "
+    "or under ~/.ros",
+)
+PERIOD = ParameterSpec(
+    "period",
+    0.0,
+    "Time from one scheduled identification to the next [s]; 0: only on demand",
+    (0.0, 31_557_600.0),
 )
 
 CHANGEABLE = (
@@ -38,21 +83,20 @@ CHANGEABLE = (
     ParameterSpec(
         "window", 60.0, "Length of the record that is kept and identified [s]", (0.1, 86400.0)
     ),
-    ParameterSpec(
-        "input_timeout", 3.0, "Silence of an input after which it is reported [s]", (0.1, 86400.0)
-    ),
+    INPUT_TIMEOUT,
     ParameterSpec(
         "method",
         DEFAULT_METHOD,
-        "Method of identification [-]: sweep, for several fast strokes; force_balance, for a valve "
-        "signature: two periods of a slow triangle within the window",
+        "Method of identification [-]: refined, for several fast strokes; published, where refined "
+        "starts from; signature, for two periods of a slow triangle within the window; robust, "
+        "experimental, for jittered stamps and other imperfections of a plant",
         choices=tuple(METHODS),
     ),
     ParameterSpec(
         "derivative_window",
         0,
         "Length d of the derivative window [samples], odd; 0: 31 for the published estimate, and "
-        "chosen from the noise of each record for the refined one",
+        "chosen from the noise of each record for the refined result",
         (0, 100_001),
     ),
     ParameterSpec(
@@ -66,22 +110,18 @@ CHANGEABLE = (
     ParameterSpec(
         "assumed_mass",
         _DEFAULTS.assumed_mass,
-        "Mass assumed where a record does not tell it [kg]",
+        "Mass assumed where a record does not determine it [kg]",
         (1e-6, 1e6),
     ),
     *(
         ParameterSpec(
             f"fixed.{name}",
             math.nan,
-            f"Known value of {name} [SI unit], which is then not identified; .nan: not known",
+            f"Known value of {name} [{_UNITS[name]}], then not identified; .nan: not known",
         )
         for name in FIXABLE
     ),
-    ParameterSpec(
-        "baseline_coulomb_friction",
-        math.nan,
-        "Coulomb friction of the healthy valve [N], above zero; .nan: not known",
-    ),
+    BASELINE,
     ParameterSpec(
         "warn_ratio", _LIMITS.warn_ratio, "Friction over baseline worth maintenance [-]", (1.0, 1e3)
     ),
@@ -99,6 +139,9 @@ CHANGEABLE = (
     HISTORY_DAYS,
     PERIOD,
 )
+"""Those that can be changed while the node runs."""
+
+PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, JOINT)
 
 
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
@@ -109,7 +152,6 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     ValueError
         If they break a rule; the message names it.
     """
-    baseline = optional(values["baseline_coulomb_friction"])
     fixed = {name: optional(values[f"fixed.{name}"]) for name in FIXABLE}
     return MonitorSettings(
         valve=valve_from(values),
@@ -122,6 +164,17 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
         ),
         method=values["method"],
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),
-        baseline=None if baseline is None else Baseline(baseline),
         window=values["window"],
     )
+
+
+def baseline_from(values: Mapping[str, Any]) -> Baseline | None:
+    """Build the baseline that the parameter gives; raises ValueError for an impossible one."""
+    value = optional(values[BASELINE.name])
+    return None if value is None else Baseline(value)
+
+
+def require_valid(values: Mapping[str, Any]) -> None:
+    """Raise ValueError, which names the broken rule, if parameter values break one."""
+    monitor_settings(values)
+    baseline_from(values)

@@ -22,7 +22,7 @@ _FIGURES = (
 
 
 class ResultTopics:
-    """Publishes each number of an result on a topic of its own, and the sweep.
+    """Publishes each number of a result on a topic of its own, and the sweep.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class ResultTopics:
         self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
 
     def publish(self, result: Result, monitor: FrictionMonitor) -> None:
-        """Publish an result that the monitor has accepted."""
+        """Publish a result that the monitor has accepted."""
         ratio = monitor.diagnosis().ratio
         evidence = result.evidence
         unknown = float("nan")

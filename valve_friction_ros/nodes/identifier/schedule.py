@@ -1,38 +1,37 @@
 """Identification every so many seconds, and what came of it when nothing could be identified."""
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.timer import Timer
 
-from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
+from valve_friction_ros.nodes.identifier.parameters import PERIOD
 
-__all__ = ["PERIOD", "Schedule"]
-
-PERIOD = ParameterSpec(
-    "period",
-    0.0,
-    "Time from one scheduled identification to the next [s]; 0: only on demand",
-    (0.0, 31_557_600.0),
-)
+__all__ = ["Schedule"]
 
 
 class Schedule:
     """Calls for an identification by the node's clock, and remembers why the last was skipped.
 
-    A skip is nobody's fault: it changes neither verdict nor level, and it is not logged.
+    A skip changes neither diagnosis nor level, and it is not logged.
 
     Parameters
     ----------
     node : Node
-        The identifier, with the parameter above.
+        The identifier, with its parameters.
     identify : callable
-        Begins an identification.
+        Coroutine that identifies.
+    group : CallbackGroup
+        Reentrant, so that other callbacks run while an identification is awaited.
     """
 
-    def __init__(self, node: Node, identify: Callable[[], None]) -> None:
+    def __init__(
+        self, node: Node, identify: Callable[[], Awaitable[None]], group: CallbackGroup
+    ) -> None:
         self._node = node
         self._identify = identify
+        self._group = group
         self._period = 0.0
         self._timer: Timer | None = None
         self._skip: tuple[str, int] | None = None
@@ -47,7 +46,9 @@ class Schedule:
             self._node.destroy_timer(self._timer)
             self._timer = None
         if period > 0:
-            self._timer = self._node.create_timer(period, self._identify)
+            self._timer = self._node.create_timer(
+                period, self._identify, callback_group=self._group
+            )
         self._period, self._skip = period, None
 
     def skip(self, reason: str) -> None:
@@ -64,7 +65,7 @@ class Schedule:
         self._skip = None
 
     def values(self) -> dict[str, str]:
-        """Return the values of the diagnostic that tell of the last skip, if there is one."""
+        """Return the values of the diagnostic for the last skip, if there was any."""
         if self._skip is None:
             return {}
         reason, stamp = self._skip

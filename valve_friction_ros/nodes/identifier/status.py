@@ -8,44 +8,45 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from valve_friction_ros.health import FrictionMonitor, Level, StatusSignal, dead_band
 from valve_friction_ros.history import Trend
-from valve_friction_ros.identification import PARAMETER_UNITS, Result
+from valve_friction_ros.identification import Result
 
 __all__ = ["friction_status", "trend_values"]
 
 
-def _number(value: float) -> str:
-    return f"{value:.9g}"
+_EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
 
 
-def _assessed_values(result: Result, monitor: FrictionMonitor) -> dict[str, str]:
+def _number(value: float | None) -> str:
+    return f"{math.nan if value is None else value:.9g}"
+
+
+def _result_values(result: Result, dead_band_share: float) -> dict[str, str]:
+    """Return what the diagnostic shows of a result, from its one rendering."""
+    shown = result.to_dict()
     values: dict[str, str] = {}
-    for name, one in result.parameters.items():
-        unit = PARAMETER_UNITS[name]
-        values[f"{name} [{unit}]"] = _number(one.value)
-        values[f"{name} half width [{unit}]"] = _number(one.half_width)
-        values[f"{name} verdict"] = one.verdict.value
-        if one.reason:
-            values[f"{name} reason"] = one.reason
-        if math.isfinite(one.published):
-            values[f"{name} published [{unit}]"] = _number(one.published)
-    share = dead_band(result, monitor.settings.valve)
-    if math.isfinite(share):
-        values["dead_band [%]"] = _number(100 * share)
-    if math.isfinite(result.rms):
-        values["fit [%]"] = _number(100 * result.fit)
-        values["rms [µm]"] = _number(1e6 * result.rms)
-    if result.misfit is not None:
-        values["systematic misfit [µm]"] = _number(1e6 * result.misfit.systematic)
-    values["method"] = result.method
-    values["derivative_window [samples]"] = str(result.derivative_window)
-    estimate = result.estimate
-    if estimate is not None:
-        values["threshold [m/s]"] = _number(estimate.threshold)
-        values["samples"] = str(estimate.samples)
-        values["sigma [N]"] = _number(estimate.sigma)
-        values["r_squared"] = _number(estimate.r_squared)
-    values["fixed"] = ", ".join(monitor.settings.identification.fixed)
-    values["warnings"] = "; ".join(result.warnings)
+    for name, parameter in shown["parameters"].items():
+        unit = parameter["unit"]
+        values[f"{name} [{unit}]"] = _number(parameter["value"])
+        values[f"{name} half width [{unit}]"] = _number(parameter["half_width"])
+        values[f"{name} verdict"] = parameter["verdict"]
+        if parameter["reason"]:
+            values[f"{name} reason"] = parameter["reason"]
+        if parameter["published"] is not None:
+            values[f"{name} published [{unit}]"] = _number(parameter["published"])
+    if math.isfinite(dead_band_share):
+        values["dead_band [%]"] = _number(100 * dead_band_share)
+    if shown["rms"] is not None:
+        values["fit [%]"] = _number(100 * shown["fit"])
+        values["rms [µm]"] = _number(1e6 * shown["rms"])
+    if shown["systematic_misfit"] is not None:
+        values["systematic misfit [µm]"] = _number(1e6 * shown["systematic_misfit"])
+    values["method"] = shown["method"]
+    values["derivative_window [samples]"] = str(shown["derivative_window"])
+    for name, unit in _EVIDENCE_UNITS.items():
+        if name in shown["evidence"]:
+            values[name + unit] = _number(shown["evidence"][name])
+    values["fixed"] = ", ".join(shown["settings"]["fixed"])
+    values["warnings"] = "; ".join(shown["warnings"])
     return values
 
 
@@ -54,7 +55,7 @@ def _date(time: int) -> str:
 
 
 def trend_values(trend: Trend | None) -> dict[str, str]:
-    """Return the values that tell of a drift, if it is significant."""
+    """Return the values of a drift, if it is significant."""
     if trend is None or not trend.is_significant:
         return {}
     values = {
@@ -83,17 +84,17 @@ def friction_status(
     Parameters
     ----------
     monitor : FrictionMonitor
-        Estimate, baseline and verdict.
+        Result, baseline and diagnosis.
     name : str
         Name of the status.
     hardware_id : str
         Tag of the valve.
     now : int
-        Time, ns, for the age of the estimate.
+        Time, ns, for the age of the result.
     input_problems : sequence of str
         What is wrong with the inputs; any raises the level to WARN at least.
     upkeep_problems : sequence of str
-        What else needs somebody's hand, while the verdict holds; likewise.
+        Other problems, which leave the diagnosis valid; any raises the level to WARN at least.
     more : mapping of str to str
         Further values.
 
@@ -110,8 +111,9 @@ def friction_status(
         level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
     result = monitor.result
     friction = None if result is None else result.parameters["coulomb_friction"]
-    valid = friction is not None and math.isfinite(friction.value) and monitor.refusal is None
-    reason = monitor.refusal or ("" if friction is None or valid else friction.reason)
+    trouble = monitor.internal_error or monitor.refusal
+    valid = friction is not None and math.isfinite(friction.value) and trouble is None
+    reason = trouble or ("" if friction is None or valid else friction.reason)
     values: dict[str, str] = {
         "estimate_valid": str(valid).lower(),
         "reason": reason,
@@ -119,7 +121,7 @@ def friction_status(
     }
     if result is not None and monitor.stamp is not None:
         values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
-        values |= _assessed_values(result, monitor)
+        values |= _result_values(result, dead_band(result, monitor.settings.valve))
     if monitor.baseline is not None:
         values["baseline_coulomb_friction [N]"] = _number(monitor.baseline.coulomb_friction)
         values["baseline half width [N]"] = _number(monitor.baseline.half_width)

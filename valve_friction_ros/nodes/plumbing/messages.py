@@ -61,7 +61,7 @@ def rows_of(message: Float64MultiArray) -> Arrivals:
 def sweep_message(sweep: Sweep | None) -> Float64MultiArray:
     """Table of a sweep: a row a threshold, the columns named in the label of the second axis.
 
-    Empty for a method without a sweep, so that a latched one of before does not stay.
+    Empty for a method without a sweep, so that an older latched sweep is replaced.
     """
     if sweep is None:
         return Float64MultiArray()

@@ -1,4 +1,4 @@
-"""Declaration of node parameters: every one with a description, a unit and a range."""
+"""Declaration of node parameters, each with a description, a unit and a range."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping

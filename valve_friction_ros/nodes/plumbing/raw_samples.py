@@ -1,9 +1,9 @@
 """Samples out of serialised messages, by the block.
 
-The stream of one publisher repeats everything but stamps and numbers: frame, joint names and counts
-lie at the same bytes of each message. So one message is taken apart, and the others, once their
-bytes are seen to repeat, give their numbers to NumPy as columns of a table. Messages that are laid
-out differently are deserialised by rclpy, one by one.
+In the messages of a publisher only stamps and numbers change; frame, joint names and counts are the
+same bytes at the same places. So the first message shows where the numbers are, and NumPy reads
+them from all messages at once, if the other bytes are equal. Messages of different layouts are
+deserialised by rclpy.
 """
 
 import struct
@@ -16,10 +16,11 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing.polled_subscription import TakenMessage
 from valve_friction_ros.streams import Arrivals, Kind, Samples
 from valve_friction_ros.streams.joint_position import joint_index
 
-__all__ = ["RawSamples", "positions_in", "pressures_in"]
+__all__ = ["arrivals_of", "positions_in", "pressures_in"]
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _BODY = 4
@@ -38,7 +39,7 @@ class _Layout(NamedTuple):
 class _Reader:
     """Reads the beginning of a serialised message (CDR, little endian).
 
-    Raises struct.error or ValueError where it is not one.
+    Raises struct.error or ValueError if the bytes are not a message.
     """
 
     def __init__(self, message: bytes) -> None:
@@ -140,42 +141,25 @@ def positions_in(messages: Sequence[bytes], joint: str) -> Arrivals:
     )
 
 
-class RawSamples:
-    """Messages of both topics as they came, not yet looked at.
+def arrivals_of(
+    pressures: Sequence[TakenMessage], stems: Sequence[TakenMessage], joint: str
+) -> Arrivals:
+    """Return the samples of serialised messages of both topics, in the order of their receipt.
 
     Parameters
     ----------
+    pressures, stems : sequence of TakenMessage
+        Serialised sensor_msgs/FluidPressure and sensor_msgs/JointState messages.
     joint : str
         Joint of the stem; empty: the first.
     """
-
-    def __init__(self, joint: str) -> None:
-        self._joint = joint
-        self._pressures: list[bytes] = []
-        self._stems: list[bytes] = []
-        self._order = bytearray()
-
-    def __len__(self) -> int:
-        """Count the messages."""
-        return len(self._order)
-
-    def add_pressure(self, message: bytes) -> None:
-        """Keep a serialised FluidPressure."""
-        self._pressures.append(message)
-        self._order.append(Kind.PRESSURE)
-
-    def add_stem(self, message: bytes) -> None:
-        """Keep a serialised JointState."""
-        self._stems.append(message)
-        self._order.append(Kind.POSITION)
-
-    def take(self) -> Arrivals:
-        """Return the samples of all messages in the order of their arrival, and forget them."""
-        kinds = np.frombuffer(bytes(self._order), np.uint8).copy()
-        pressures, stems = pressures_in(self._pressures), positions_in(self._stems, self._joint)
-        self._pressures, self._stems, self._order = [], [], bytearray()
-        stamps, values = np.empty(kinds.size, np.int64), np.empty(kinds.size)
-        of_stem = kinds == Kind.POSITION
-        stamps[~of_stem], values[~of_stem] = pressures
-        kinds[of_stem], stamps[of_stem], values[of_stem] = stems
-        return Arrivals(kinds, stamps, values)
+    pressure = pressures_in([one.message for one in pressures])
+    stem = positions_in([one.message for one in stems], joint)
+    kinds = np.concatenate([np.full(len(pressures), Kind.PRESSURE, np.uint8), stem.kinds])
+    # Messages of a topic stay as they came, though the clock of their receipt may be set back.
+    receipts = [np.array([one.received for one in part], np.int64) for part in (pressures, stems)]
+    received = np.concatenate([np.maximum.accumulate(part) for part in receipts])
+    order = np.argsort(received, kind="stable")
+    stamps = np.concatenate([pressure.stamps, stem.stamps])
+    values = np.concatenate([pressure.values, stem.values])
+    return Arrivals(kinds[order], stamps[order], values[order])

@@ -2,91 +2,92 @@
 
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
-__all__ = ["quick_executor", "run_node", "run_nodes"]
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 
-_WAKE_UP_PERIOD = 0.2
+__all__ = ["run_node", "run_nodes"]
+
+_PAUSE = 0.1
+_LIVELY_PAUSE = 0.02
+"""Times between two turns, s: while nothing is asked, and while services are in use."""
+_LIVELY_TIME = 2.0
+"""Time, s, for which services count as in use after the start and after each answer."""
+_PAUSE_OF_A_NODE = 1e-3
+"""Time, s, by which each node of a process lengthens the pause: ten times what its turn costs, so
+that a hundred nodes without any messages take a tenth of a core."""
+
 _WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
 """What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
 
 
-def quick_executor() -> Executor:
-    """Return the executor with the least work per message that this rclpy has.
-
-    The events executor costs about a third of the default one. It cannot run service callbacks
-    that wait; `create_service_with_late_answers` is for those.
-    """
-    try:
-        from rclpy.experimental import EventsExecutor  # noqa: PLC0415 - newer than early Jazzy
-    except ImportError:
-        return SingleThreadedExecutor()
-    return EventsExecutor()
-
-
 def _cannot_start(error: Exception) -> int:
-    """Say on one line what was wrong, and return the exit code."""
+    """Write what was wrong in one line, and return the exit code."""
     print(f"cannot start: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
     return 2
 
 
-def _announce(stop: threading.Event, stopped: Future) -> None:
-    """Wake the executor as soon as the stop is requested, busy as it may be."""
-    stop.wait()
-    stopped.set_result(None)
+class _StopRequest:
+    """Whether Ctrl-C or SIGTERM has come.
+
+    A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
+    context down under a callback that is still publishing. So the request is only noted.
+    """
+
+    def __init__(self) -> None:
+        self.has_come = False
+        for request in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(request, self._note)
+
+    def _note(self, *_: object) -> None:
+        self.has_come = True
 
 
-def _spin(executor: Executor, stop: threading.Event, stopped: Future, pause: float) -> None:
-    """Run callbacks until the stop is requested."""
-    # An unlimited wait is no option: the events executor would turn without a pause.
-    wake_up_period = _WAKE_UP_PERIOD
-    if pause and not isinstance(executor, SingleThreadedExecutor):
-        wake_up_period = 0.0  # the events executor runs all that has gathered, then returns
-    while rclpy.ok() and not stop.is_set():
-        executor.spin_until_future_complete(stopped, wake_up_period)
-        if not wake_up_period:
-            time.sleep(pause)
+def _run(nodes: Sequence[Node], executor: TurnExecutor, pause: float, stop: _StopRequest) -> None:
+    """Take turns until the stop is requested."""
+    polled = [node for node in nodes if isinstance(node, PolledNode)]
+    least = _PAUSE_OF_A_NODE * len(nodes)
+    lively_until = time.monotonic() + _LIVELY_TIME
+    while rclpy.ok() and not stop.has_come:
+        is_lively = executor.turn()
+        for node in polled:
+            node.poll()
+        now = time.monotonic()
+        if is_lively:
+            lively_until = now + _LIVELY_TIME
+        time.sleep(max(least, min(pause, _LIVELY_PAUSE) if now < lively_until else pause))
 
 
 def run_nodes(
     create: Callable[[], Iterable[Node]],
     arguments: Sequence[str] | None = None,
-    create_executor: Callable[[], Executor] = quick_executor,
-    pause: float = 0.0,
+    pause: float = _PAUSE,
 ) -> int:
     """Run nodes in one process until Ctrl-C, SIGTERM or shutdown.
 
     Parameters
     ----------
     create : callable
-        Builds the nodes; what they or rclpy refuse is told in one line.
+        Builds the nodes; what they or rclpy refuse is written to stderr in one line.
     arguments : sequence of str, optional
         ROS arguments, by default those of the process.
-    create_executor : callable
-        Builds the executor.
     pause : float
-        Time, s, for which the events executor lets messages gather before it runs their callbacks.
-        To be woken for each message costs more than to take it.
+        Time between two turns, s, while no service is in use: for so long messages gather, and
+        a first request waits.
 
     Returns
     -------
     int
         Exit code: 0 after a clean stop, 2 if arguments or parameters do not let it start.
     """
-    # A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
-    # context down under a callback that is still publishing. So the request is only noted.
-    stop = threading.Event()
-    for request in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(request, lambda *_: stop.set())
+    stop = _StopRequest()
     nodes: list[Node] = []
     executor = None
     try:
@@ -99,15 +100,10 @@ def run_nodes(
                 nodes.append(node)  # noqa: PERF402 - those before a refused one are destroyed too
         except _WRONG_REQUESTS as error:
             return _cannot_start(error)
-        executor = create_executor()
+        executor = TurnExecutor()
         for node in nodes:
             executor.add_node(node)
-        stopped = Future(executor=executor)
-        announcer = threading.Thread(target=_announce, args=(stop, stopped), daemon=True)
-        announcer.start()
-        _spin(executor, stop, stopped, pause)
-        if stop.is_set():
-            announcer.join()
+        _run(nodes, executor, pause, stop)
     except ExternalShutdownException:
         pass
     finally:
@@ -120,6 +116,8 @@ def run_nodes(
     return 0
 
 
-def run_node(create: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
+def run_node(
+    create: Callable[[], Node], arguments: Sequence[str] | None = None, pause: float = _PAUSE
+) -> int:
     """Run one node, as `run_nodes` does."""
-    return run_nodes(lambda: [create()], arguments)
+    return run_nodes(lambda: [create()], arguments, pause)

@@ -11,7 +11,7 @@ __all__ = ["InputWatch"]
 
 
 class InputWatch:
-    """Tells what is wrong with one subscribed topic.
+    """Says what is wrong with one subscribed topic.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ class InputWatch:
         """The topic, fully resolved."""
         return self._topic
 
-    def arrived(self, ago: float = 0.0) -> None:
-        """Note that a message came, the last one `ago` seconds before now."""
-        self._since = self._node.get_clock().now().nanoseconds - round(ago * 1e9)
+    def arrived(self) -> None:
+        """Note that a message has come."""
+        self._since = self._node.get_clock().now().nanoseconds
         self._has_arrived = True
 
     def silence(self) -> float:
@@ -45,7 +45,7 @@ class InputWatch:
         return float(self._node.get_clock().now().nanoseconds - self._since) / 1e9
 
     def is_used(self) -> bool:
-        """Tell whether a message has ever come, or somebody publishes the topic."""
+        """Return whether a message has ever come, or the topic has a publisher."""
         return self._has_arrived or self._node.count_publishers(self._topic) > 0
 
     def _is_unreliable(self, publishers: Sequence[TopicEndpointInfo]) -> bool:

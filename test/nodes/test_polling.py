@@ -1,0 +1,221 @@
+"""Streams that are polled, and the executor that runs what is ready, over real DDS."""
+
+import importlib.metadata
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+import rclpy
+from live_nodes import PATIENCE, SECOND, Client, Domain
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.plumbing.background import done_in
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.qos import blocks
+from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
+
+CHECKED = "7.1.6"
+
+
+@pytest.fixture
+def bench():
+    """A polled node in this process, the executor of its services, and a client beside it."""
+    domain = Domain()
+    client = Client(domain)
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, domain_id=domain.number)
+    node = PolledNode("polled", context=context)
+    executor = TurnExecutor(context=context)
+    executor.add_node(node)
+    yield node, executor, client
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
+    client.close()
+    domain.release()
+
+
+def wait_until(condition, what):
+    deadline = time.monotonic() + PATIENCE
+    while not (met := condition()):
+        assert time.monotonic() < deadline, f"not within {PATIENCE:g} s: {what}"
+        time.sleep(0.01)
+    return met
+
+
+def sender(client, polled):
+    """Create a publisher that the subscription has met."""
+    publisher = client.node.create_publisher(Float64, polled.subscription.topic_name, blocks())
+    wait_until(publisher.get_subscription_count, "the subscription")
+    return lambda *values: [publisher.publish(Float64(data=float(value))) for value in values]
+
+
+def taken(polled, count):
+    """Poll until `count` messages have come."""
+    messages = []
+    wait_until(lambda: messages.extend(polled.take()) or len(messages) >= count, "the messages")
+    return messages
+
+
+def test_rclpy_has_what_polled_subscriptions_use(bench):
+    node, *_ = bench
+    polled = PolledSubscription(node, Float64, "numbers", blocks())
+    handle = polled.subscription.handle
+    version = importlib.metadata.version("ros-jazzy-rclpy")
+    moved = (
+        f"rclpy {version} takes messages in another way than {CHECKED}: "
+        "change nodes/plumbing/polled_subscription.py, which alone uses it"
+    )
+    assert callable(getattr(handle, "take_message", None)), moved
+    with handle:
+        assert handle.take_message(Float64, False) is None, moved
+
+
+@pytest.mark.parametrize("raw", [False, True])
+def test_messages_are_taken_in_their_order(bench, raw):
+    node, _, client = bench
+    polled = PolledSubscription(node, Float64, "numbers", blocks(), raw)
+    assert polled.take() == []
+    begin = time.time_ns()
+    sender(client, polled)(*range(500))
+    messages = taken(polled, 500)
+    read = [deserialize_message(one.message, Float64) if raw else one.message for one in messages]
+    assert [one.data for one in read] == list(range(500))
+    received = [one.received for one in messages]
+    assert received == sorted(received)
+    assert begin - SECOND < received[0] <= received[-1] < time.time_ns() + SECOND
+
+
+def test_no_executor_takes_them(bench):
+    node, executor, client = bench
+    polled = PolledSubscription(node, Float64, "numbers", blocks())
+    sender(client, polled)(1, 2, 3)
+    time.sleep(0.2)
+    executor.turn()
+    assert [one.message.data for one in taken(polled, 3)] == [1, 2, 3]
+
+    other = SingleThreadedExecutor(context=node.context)
+    other.add_node(node)
+    client.node.create_publisher(Float64, "/polled/numbers", blocks())
+    sender(client, polled)(4)
+    for _ in range(20):
+        other.spin_once(timeout_sec=0.01)
+    assert [one.message.data for one in taken(polled, 1)] == [4]
+    other.shutdown()
+
+
+def test_no_events_of_the_middleware_are_watched(bench):
+    node, *_ = bench
+    node.create_publisher(Float64, "out", 1)
+    PolledSubscription(node, Float64, "numbers", blocks())
+    assert list(node.waitables) == []
+
+
+class TestTurn:
+    def requests(self, client, count, name="/polled/work"):
+        caller = client.node.create_client(Trigger, name)
+        wait_until(caller.service_is_ready, "the service")
+        return [caller.call_async(Trigger.Request()) for _ in range(count)]
+
+    def answers(self, executor, client, requests):
+        def all_answered():
+            executor.turn()
+            client._executor.spin_once(timeout_sec=0.01)
+            return all(one.done() for one in requests)
+
+        wait_until(all_answered, "the answers")
+        return [(one.result().success, one.result().message) for one in requests]
+
+    def test_one_answers_all_requests_that_wait(self, bench):
+        node, executor, client = bench
+        answered = []
+
+        async def work():
+            answered.append(1)
+            return ""
+
+        create_trigger_service(node, "~/work", work, ReentrantCallbackGroup())
+        for _ in range(10):  # clients, each of which sends up to ten requests at once
+            self.requests(client, 5)
+        time.sleep(0.5)
+        assert executor.turn()
+        assert len(answered) == 50
+        assert not executor.turn()
+
+    def test_it_runs_timers_and_does_not_wait(self, bench):
+        node, executor, _ = bench
+        ticks = []
+        node.create_timer(0.05, lambda: ticks.append(1))
+        begin = time.monotonic()
+        executor.turn()
+        assert time.monotonic() - begin < 0.04
+        time.sleep(0.1)
+        assert not executor.turn()
+        assert ticks == [1]
+
+    def test_others_go_on_while_work_is_awaited(self, bench):
+        node, executor, client = bench
+        finish, group = threading.Event(), ReentrantCallbackGroup()
+        with ThreadPoolExecutor(max_workers=1) as pool:
+
+            async def work():
+                return f"worked {await done_in(pool, lambda: finish.wait(PATIENCE))}"
+
+            async def quick():
+                return "quick"
+
+            create_trigger_service(node, "~/work", work, group)
+            create_trigger_service(node, "~/quick", quick, group)
+            (slow,) = self.requests(client, 1)
+            wait_until(executor.turn, "the request")
+            assert executor.turn()  # it is awaited
+            quick_one = self.requests(client, 1, "/polled/quick")
+            assert self.answers(executor, client, quick_one) == [(True, "quick")]
+            assert not slow.done()
+            finish.set()
+            assert self.answers(executor, client, [slow]) == [(True, "worked True")]
+
+    def test_what_work_raises_is_answered(self, bench, capfd):
+        node, executor, client = bench
+
+        def refuse():
+            raise RefusalError("the stem did not move")
+
+        def fail():
+            raise KeyError("a bug")
+
+        with ThreadPoolExecutor(max_workers=1) as pool:
+            for name, work in (("refuse", refuse), ("fail", fail)):
+
+                async def in_pool(work=work):
+                    return await done_in(pool, work)
+
+                create_trigger_service(node, f"~/{name}", in_pool, ReentrantCallbackGroup())
+            refusal, failure = (
+                self.answers(executor, client, self.requests(client, 1, f"/polled/{name}"))[0]
+                for name in ("refuse", "fail")
+            )
+        assert refusal == (False, "the stem did not move")
+        assert not failure[0]
+        assert failure[1].startswith("internal error: KeyError: 'a bug' (test_polling.py, line ")
+        errors = capfd.readouterr().err
+        assert errors.count("Traceback (most recent call last)") == 1
+        assert "in fail\n" in errors
+
+    def test_what_a_callback_raises_ends_the_turn(self, bench):
+        node, executor, _ = bench
+
+        def fail():
+            raise KeyError("a bug")
+
+        node.create_timer(0.01, fail)
+        time.sleep(0.05)
+        with pytest.raises(KeyError, match="a bug"):
+            executor.turn()

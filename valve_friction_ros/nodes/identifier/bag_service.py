@@ -1,0 +1,39 @@
+"""``~/save``: the identifier's buffer as a bag."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from rclpy.node import Node
+
+from valve_friction_ros.health import FrictionMonitor
+from valve_friction_ros.nodes.identifier.parameters import SAVE_FOLDER
+from valve_friction_ros.nodes.plumbing.background import done_in
+from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+from valve_friction_ros.records.bags.topics import StreamNames
+
+__all__ = ["saved_bag"]
+
+
+async def saved_bag(
+    node: Node, monitor: FrictionMonitor, names: StreamNames, worker: ThreadPoolExecutor
+) -> Path:
+    """Write what the buffer holds now as a bag, in a thread of `worker`; return its path.
+
+    Raises
+    ------
+    RefusalError
+        If it cannot be written.
+    """
+    given = node.get_parameter(SAVE_FOLDER.name).value
+    name = file_name(node, node.get_clock().now().nanoseconds)
+    snapshot, settings = monitor.input()
+
+    def write() -> Path:
+        # Costs memory and time at the start, and most nodes never save.
+        from valve_friction_ros.records.bags.writing import write_bag  # noqa: PLC0415
+
+        mass = settings.identification.assumed_mass
+        with output_folder(given, "saved", "a bag") as folder:
+            return write_bag(folder, name, snapshot, names, settings.valve, mass)
+
+    return await done_in(worker, write)

@@ -1,0 +1,158 @@
+"""The history of the plant: what the identifier writes to it, and reads from it at the start."""
+
+import contextlib
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from rclpy.node import Node
+
+from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput
+from valve_friction_ros.history import (
+    HistoryError,
+    HistoryFile,
+    KeptBaseline,
+    KeptValve,
+    Trend,
+    current_trend,
+    entry_of,
+)
+from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
+
+__all__ = ["HistoryWriter"]
+
+_MOST_WAITING = 1000
+"""Changes that wait for a file that cannot be written; then the oldest are given up."""
+
+_T = TypeVar("_T")
+
+
+class HistoryWriter:
+    """Writes to the history in a thread of its own, so that no slow disk holds up the node.
+
+    What could not be written waits, and is tried again with what comes next.
+
+    Parameters
+    ----------
+    node : Node
+        The identifier, with its parameters.
+    monitor : FrictionMonitor
+        What it knows.
+    tag : str
+        Tag of the valve.
+    """
+
+    def __init__(self, node: Node, monitor: FrictionMonitor, tag: str) -> None:
+        self._node = node
+        self._monitor = monitor
+        self._valve = KeptValve(node.get_fully_qualified_name(), tag)
+        path = node.get_parameter(HISTORY_FILE.name).value
+        self._file = HistoryFile(Path(path).expanduser()) if path else None
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="history")
+        self._waiting: deque[Callable[[HistoryFile], None]] = deque(maxlen=_MOST_WAITING)
+        self._problem: str | None = None
+        self._trend: Trend | None = None
+
+    @property
+    def valve(self) -> KeptValve:
+        """The valve, as the history calls it."""
+        return self._valve
+
+    @property
+    def path(self) -> Path | None:
+        """The file; None if nothing is kept."""
+        return None if self._file is None else self._file.path
+
+    @property
+    def problems(self) -> list[str]:
+        """Why the latest writing failed; empty if it did not."""
+        return [f"the history is not written: {self._problem}"] if self._problem else []
+
+    @property
+    def reservation(self) -> str:
+        """What to add to the news that something was kept."""
+        return "".join(f", but it is lost with this node: {one}" for one in self.problems)
+
+    @property
+    def trend(self) -> Trend | None:
+        """Drift of the Coulomb friction, as of the latest identification."""
+        return self._trend
+
+    def prepare(self) -> KeptBaseline | None:
+        """Make the file if it is not there, and return the valve's baseline in it, if any."""
+        self._tried(HistoryFile.prepare)
+        return self._tried(lambda file: file.baseline(self._valve.name))
+
+    def read_trend(self) -> None:
+        """Compute the trend with the baseline and settings of now."""
+        self._trend = self._tried(self._trend_job())
+
+    def _tried(self, job: Callable[[HistoryFile], _T]) -> _T | None:
+        """Do a job on the file, if there is one; of several problems the first is reported."""
+        if self._file is None:
+            return None
+        try:
+            return job(self._file)
+        except HistoryError as error:
+            if self._problem is None:
+                self._complain(error)
+            return None
+
+    async def keep(self, identified: IdentificationInput) -> None:
+        """Keep the identification that the monitor has just accepted or refused."""
+        now = self._node.get_clock().now().nanoseconds
+        days = self._node.get_parameter(HISTORY_DAYS.name).value
+        with self._failures_remembered():
+            entry = entry_of(self._monitor, self._valve, *identified, time=now)
+            await self._written(lambda file: file.add(entry, days))
+
+    async def keep_baseline(self, baseline: Baseline) -> None:
+        """Keep the baseline that was taken from the latest estimate."""
+        now = self._node.get_clock().now().nanoseconds
+        since = now if self._monitor.stamp is None else self._monitor.stamp
+        kept = KeptBaseline(baseline, now, since)
+        with self._failures_remembered():
+            await self._written(lambda file: file.set_baseline(self._valve, kept))
+
+    def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
+        """Return what computes the trend with the baseline and settings of now, in any thread."""
+        monitor, name = self._monitor, self._valve.name
+        return partial(
+            current_trend, valve=name, baseline=monitor.baseline, settings=monitor.settings
+        )
+
+    async def _written(self, change: Callable[[HistoryFile], None]) -> None:
+        """Write a change, and what waits since before; then compute the trend."""
+        if self._file is None:
+            return
+        self._waiting.append(change)
+        self._trend = await done_in(self._writer, self._write, self._file, self._trend_job())
+
+    @contextlib.contextmanager
+    def _failures_remembered(self) -> Iterator[None]:
+        try:
+            with bugs_reported(self._node, HistoryError, known=self._problem):
+                yield
+            self._problem = None
+        except (HistoryError, InternalError) as error:
+            self._complain(error)
+
+    def _write(
+        self, file: HistoryFile, trend: Callable[[HistoryFile], Trend | None]
+    ) -> Trend | None:
+        """Write, in the writer's thread, all that waits."""
+        while self._waiting:
+            change = self._waiting[0]
+            change(file)
+            with contextlib.suppress(ValueError):  # given up meanwhile
+                self._waiting.remove(change)
+        return trend(file)
+
+    def _complain(self, error: HistoryError | InternalError) -> None:
+        if str(error) != self._problem:
+            self._problem = str(error)
+            self._node.get_logger().warning(self.problems[0])

@@ -1,0 +1,61 @@
+"""``~/report``: a page on the identifier's last result."""
+
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timezone
+from itertools import count
+from pathlib import Path
+
+from rclpy.node import Node
+
+from valve_friction_ros.health import FrictionMonitor
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
+from valve_friction_ros.nodes.plumbing.background import done_in
+from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+
+__all__ = ["written_report"]
+
+
+async def written_report(
+    node: Node, monitor: FrictionMonitor, tag: str, worker: ThreadPoolExecutor
+) -> Path:
+    """Write a page on the last result, in a thread of `worker`; return its path.
+
+    Raises
+    ------
+    RefusalError
+        If there is no result, or the page cannot be written.
+    """
+    result, stamp, refusal = monitor.result, monitor.stamp, monitor.refusal
+    if result is None or stamp is None:
+        raise RefusalError("the valve has no result to report: identify it first")
+    time = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
+    given, name = node.get_parameter(REPORT_FOLDER.name).value, file_name(node, stamp)
+    title, node_name = tag or node.get_name(), node.get_fully_qualified_name()
+    baseline, limits = monitor.baseline, monitor.settings.limits
+
+    def write() -> Path:
+        # Costs memory and time at the start, and most nodes never report.
+        from valve_friction_ros import reports  # noqa: PLC0415
+
+        with output_folder(given, "reports", "a report") as folder:
+            folder.mkdir(parents=True, exist_ok=True)
+            path = _free_name(folder, name)
+            record = reports.IdentifiedRecord(
+                name=title,
+                source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
+                result=result,
+                baseline=baseline,
+                limits=limits,
+                notes=() if refusal is None else (f"a later record was refused: {refusal}",),
+            )
+            reports.write_report(reports.identification_report(record), path)
+            return path
+
+    return await done_in(worker, write)
+
+
+def _free_name(folder: Path, name: str) -> Path:
+    """Return the first file of this name, or with a number after it, that is not there."""
+    names = (f"{name}.html" if number == 1 else f"{name}_{number}.html" for number in count(1))
+    return next(path for path in map(folder.joinpath, names) if not path.exists())

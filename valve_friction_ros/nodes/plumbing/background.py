@@ -1,0 +1,75 @@
+"""Work in another thread, awaited by a callback, and what becomes of a bug."""
+
+import contextlib
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+from valve_friction_ros.identification import RefusalError
+
+__all__ = ["InternalError", "bugs_reported", "done_in"]
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+class InternalError(Exception):
+    """A bug of this package, described for who asked; its traceback is in the log."""
+
+
+def _internal_error(bug: Exception) -> InternalError:
+    place = traceback.extract_tb(bug.__traceback__)[-1]
+    words = " ".join(f"{type(bug).__name__}: {bug}".split())
+    where = f"{Path(place.filename).name}, line {place.lineno}"
+    return InternalError(f"internal error: {words} ({where}): report it, with what ~/save writes")
+
+
+@contextlib.contextmanager
+def bugs_reported(
+    node: Node, *expected: type[Exception], known: str | None = None
+) -> Iterator[None]:
+    """Turn a bug into an InternalError, and log its traceback.
+
+    An exception that leaves a callback would end the node, with all valves of its process.
+
+    Parameters
+    ----------
+    node : Node
+        Logs the traceback.
+    *expected : type
+        Exceptions that are not bugs, beside RefusalError; they pass unchanged.
+    known : str, optional
+        An internal error that is in the log already: the same is not logged again.
+    """
+    passed: tuple[type[Exception], ...] = (RefusalError, InternalError, *expected)
+    try:
+        yield
+    except passed:
+        raise
+    except Exception as bug:
+        error = _internal_error(bug)
+        if str(error) != known:
+            node.get_logger().error(f"{error}\n{''.join(traceback.format_exception(bug))}")
+        raise error from bug
+
+
+async def done_in(
+    pool: ThreadPoolExecutor,
+    work: Callable[_Arguments, _Result],
+    *arguments: _Arguments.args,
+    **named: _Arguments.kwargs,
+) -> _Result:
+    """Do some work in a thread of `pool`, while the executor goes on.
+
+    For callbacks that are coroutines, in a callback group that lets others run meanwhile. Returns
+    what the work returns, and raises what it raises, in the executor's thread.
+    """
+    finished = Future()
+    pool.submit(work, *arguments, **named).add_done_callback(finished.set_result)
+    result: _Result = (await finished).result()
+    return result

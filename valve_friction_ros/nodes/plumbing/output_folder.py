@@ -1,0 +1,48 @@
+"""Files that a node writes on request, named by valve and time."""
+
+import contextlib
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+
+from rclpy.node import Node
+
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.records.data_folder import data_folder
+
+__all__ = ["file_name", "output_folder"]
+
+
+@contextlib.contextmanager
+def output_folder(given: str, usual: str, content: str) -> Iterator[Path]:
+    """Provide the folder for some content, and refuse what cannot be written into it.
+
+    Parameters
+    ----------
+    given : str
+        The folder that a parameter gives; empty: `usual` in the data folder.
+    usual : str
+        Name of the folder in the data folder.
+    content : str
+        What is written, with its article, for the refusal.
+
+    Raises
+    ------
+    RefusalError
+        If the home directory in its path is unknown, or the block raises OSError.
+    """
+    try:
+        folder = Path(given).expanduser() if given else data_folder() / usual
+    except RuntimeError as error:  # pathlib's, where a home directory is unknown
+        raise RefusalError(f"cannot write {content} into {given or '~/.ros'}: {error}") from None
+    try:
+        yield folder
+    except OSError as error:
+        cause = error.strerror or error
+        raise RefusalError(f"cannot write {content} into {folder}: {cause}") from None
+
+
+def file_name(node: Node, stamp: int) -> str:
+    """Name a file, without its ending, after the node's valve and a time (ns)."""
+    valve = node.get_namespace().strip("/").replace("/", "_") or node.get_name()
+    return f"{valve}_{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y%m%dT%H%M%SZ}"

@@ -1,0 +1,75 @@
+"""Nodes that look for their messages themselves, and the executor of their services."""
+
+import contextlib
+from typing import Any
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import (
+    ConditionReachedException,
+    ShutdownException,
+    SingleThreadedExecutor,
+    TimeoutException,
+)
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+
+__all__ = ["PolledNode", "TurnExecutor"]
+
+
+class PolledNode(Node):
+    """A node whose streams are polled by `run_nodes`, between the callbacks of its services.
+
+    Its publishers and subscriptions watch no events of the middleware, save where they are given
+    callbacks for them. rclpy watches two events of each by default, only to log that a quality of
+    service or a type does not match; each would be looked at in every turn of the executor, and
+    rmw_fastrtps can lock up while it takes an event.
+    """
+
+    def create_publisher(self, *arguments: Any, **named: Any) -> Publisher:
+        """Create a publisher as rclpy does, without its default callbacks for events."""
+        named.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
+        return super().create_publisher(*arguments, **named)
+
+    def create_subscription(self, *arguments: Any, **named: Any) -> Subscription:
+        """Create a subscription as rclpy does, without its default callbacks for events."""
+        named.setdefault("event_callbacks", SubscriptionEventCallbacks(use_default_callbacks=False))
+        return super().create_subscription(*arguments, **named)
+
+    def poll(self) -> None:
+        """Do what has become due; called in every turn."""
+
+
+class TurnExecutor(SingleThreadedExecutor):
+    """Runs what is ready and returns; it never waits in the middleware.
+
+    A look at what is ready costs about 0.1 ms for a node with twelve services. `spin_once` looks
+    once for each callback, this executor once for all callbacks that are ready.
+    """
+
+    def turn(self) -> bool:
+        """Run what is ready; return whether a service has a new or an unanswered request."""
+        is_lively = False
+        while True:
+            asked, answered = self._look()
+            is_lively |= asked
+            if not answered:  # else the service may have more requests
+                return is_lively
+
+    def _look(self) -> tuple[bool, bool]:
+        """Run what is ready now; return whether a service has a request, and has answered it."""
+        has_run = asked = answered = False
+
+        def is_done() -> bool:  # ends the look when all that was ready has run
+            return has_run
+
+        with contextlib.suppress(TimeoutException, ShutdownException, ConditionReachedException):
+            while True:
+                task, entity, _ = self.wait_for_ready_callbacks(0.0, None, is_done)
+                has_run = True
+                task()
+                task.result()  # raises what the callback has raised
+                if isinstance(entity, Service):
+                    asked, answered = True, answered or task.done()
+        return asked, answered

@@ -1,0 +1,43 @@
+"""Services without arguments, which may take their time to answer."""
+
+from collections.abc import Awaitable, Callable
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
+from valve_friction_ros.nodes.plumbing.qos import REQUESTS
+
+__all__ = ["create_trigger_service"]
+
+
+def create_trigger_service(
+    node: Node, name: str, work: Callable[[], Awaitable[str]], group: CallbackGroup
+) -> None:
+    """Create a std_srvs/Trigger service.
+
+    Parameters
+    ----------
+    node : Node
+        The node that offers it.
+    name : str
+        Its name.
+    work : callable
+        Coroutine that returns the message of a success, or raises RefusalError with the reason;
+        anything else that it raises is answered as an internal error.
+    group : CallbackGroup
+        Reentrant, if other callbacks shall run while the work waits.
+    """
+
+    async def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            with bugs_reported(node):
+                response.message = await work()
+            response.success = True
+        except (RefusalError, InternalError) as error:
+            response.message = str(error)
+        return response
+
+    node.create_service(Trigger, name, answer, qos_profile=REQUESTS, callback_group=group)

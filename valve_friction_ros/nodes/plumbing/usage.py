@@ -1,0 +1,34 @@
+"""What a node prints for ``--help``."""
+
+from collections.abc import Iterable
+
+import yaml
+
+from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
+
+__all__ = ["usage"]
+
+
+def usage(name: str, purpose: str, specs: Iterable[ParameterSpec]) -> str:
+    """Say how a node is run, and what its parameters mean.
+
+    Parameters
+    ----------
+    name : str
+        Name of the executable.
+    purpose : str
+        What the node does.
+    specs : iterable of ParameterSpec
+        Its parameters.
+    """
+    lines = [
+        f"usage: {name} [--ros-args [-r __ns:=/fv_101] [-p NAME:=VALUE] [--params-file FILE]]",
+        "",
+        purpose,
+        "",
+        "Ctrl-C stops it. Parameters and their defaults, as they are written in a FILE:",
+    ]
+    for spec in specs:
+        default = yaml.safe_dump(spec.default, default_flow_style=True).splitlines()[0]
+        lines.append(f"  {spec.name}: {default}  # {spec.description}")
+    return "\n".join(lines)
