@@ -167,8 +167,11 @@ def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, quick_r
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["--report", "r.pdf"], "r.pdf: a report is a page: give it a name that ends in .html"),
-        (["--report", "no/r.html"], "no/r.html: there is no folder no"),
+        (
+            ["--report", "r.pdf"],
+            "r.pdf: a report is an HTML page: give it a name that ends in .html",
+        ),
+        (["--report", "no/r.html"], "no/r.html: there is no folder no: create it, or name another"),
         (
             ["--baseline-half-width", "2"],
             "--baseline-half-width: give the baseline itself by --baseline-coulomb-friction",

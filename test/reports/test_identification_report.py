@@ -44,7 +44,7 @@ def test_without_a_baseline_nothing_is_said_of_excess(with_friction):
     record = with_friction(150.0, 3.0)
     assert "excess friction" not in rows(record, FRICTION)
     words = section(identification_report(record), FRICTION).blocks[0].text
-    assert words.startswith("There is no baseline")
+    assert words.startswith("Excess friction is unknown, because this valve has no baseline.")
 
 
 def test_what_is_not_identifiable_has_no_ratio(with_friction):
@@ -59,11 +59,15 @@ def test_what_is_not_identifiable_has_no_ratio(with_friction):
 
 def test_the_time_of_a_record_is_told_where_its_clock_is_that_of_the_world(identified):
     dated = dataclasses.replace(identified.recording, start_time=1.7e9)
-    told = rows(dataclasses.replace(identified, recording=dated), "Record")
-    assert told["began"] == ("2023-11-14 22:13:20 UTC",)
+
+    def of(recording):
+        result = dataclasses.replace(identified.result, recording=recording)
+        return rows(dataclasses.replace(identified, result=result), "Record")
+
+    assert of(dated)["began"] == ("2023-11-14 22:13:20 UTC",)
     assert "began" not in rows(identified, "Record")
     mistaken = dataclasses.replace(identified.recording, start_time=1.7e18)
-    assert "began" not in rows(dataclasses.replace(identified, recording=mistaken), "Record")
+    assert "began" not in of(mistaken)
 
 
 def test_notes_of_the_record_come_before_those_of_the_estimate(identified):
@@ -75,7 +79,7 @@ def test_notes_of_the_record_come_before_those_of_the_estimate(identified):
 
 def test_the_region_holds_the_choice_and_ends_where_sigma_leaves_its_tenth(identified):
     sweep = dataclasses.replace(
-        identified.result.sweep,
+        identified.result.estimate.sweep,
         thresholds=np.arange(1.0, 8.0),
         sigma=np.array([9.0, 1.2, 1.05, 1.0, 0.95, 0.8, 1.0]),
     )
@@ -96,9 +100,9 @@ def test_autocorrelation_of_what_is_known():
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("report.pdf", "a report is a page: give it a name that ends in .html"),
-        ("nowhere/report.html", "there is no folder {folder}/nowhere"),
-        ("folder.html", "is a folder: give the report another name"),
+        ("report.pdf", "a report is an HTML page: give it a name that ends in .html"),
+        ("nowhere/report.html", "there is no folder {folder}/nowhere: create it, or name another"),
+        ("folder.html", "this is a folder: give the report another name"),
     ],
 )
 def test_files_that_are_no_place_for_a_report(tmp_path, name, reason):

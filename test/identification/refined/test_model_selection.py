@@ -51,6 +51,7 @@ def test_what_can_be_found_has_a_unit():
         "coulomb_asymmetry",
         "viscous_asymmetry",
         "clock_offset",
+        "sliding_friction",
     }
 
 

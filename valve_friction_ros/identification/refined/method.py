@@ -211,7 +211,7 @@ def _finding(outcome: _Outcome, valve: Valve) -> str:
         return f"the regression reproduces {100 * outcome.fit:.2f} % of the force"
     return (
         f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
-        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it are not noise"
+        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not noise"
     )
 
 
