@@ -6,12 +6,20 @@ The sub-command is this module and one line of `SUB_COMMANDS`.
 import os
 import signal
 import sys
+import time
 
 from valve_friction_ros.commands import main
 
 
 class RefusedError(Exception):
     """A refusal of its own kind."""
+
+
+class Interrupting:
+    """Python ignores what its end raises, as it does in callbacks of an import."""
+
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 REFUSALS = (RefusedError,)
@@ -30,6 +38,9 @@ def run(options):
             os.kill(os.getpid(), signal.SIGINT)
         except KeyboardInterrupt as interrupt:
             raise ImportError("numpy cannot be imported") from interrupt
+    if options.ending == "ignored":
+        Interrupting()
+        time.sleep(30)
     if options.ending == "own refusal":
         raise RefusedError("not this\none")
     if options.ending == "refusal":

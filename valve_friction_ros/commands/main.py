@@ -6,6 +6,7 @@ import importlib
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
@@ -31,6 +32,9 @@ SUB_COMMANDS = {
     "demo": "tighten the packing of a simulated valve that is monitored",
 }
 """The line in ``--help`` by sub-command; ``identify-folder`` is the module `identify_folder`."""
+
+_REPEAT = 0.02
+"""Time until an ignored Ctrl-C is repeated, s: callbacks are shorter."""
 
 
 class SubCommand(Protocol):
@@ -107,6 +111,14 @@ def run(arguments: Sequence[str]) -> int:
         return ExitCode.OUTPUT_CLOSED if is_closed else ExitCode.REFUSED
 
 
+def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Repeat a Ctrl-C that Python ignores, since it came within a callback of an import."""
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        threading.Timer(_REPEAT, os.kill, (os.getpid(), signal.SIGINT)).start()
+    else:
+        sys.__unraisablehook__(unraisable)
+
+
 def main() -> int:
     """Run as a process, which Ctrl-C ends with one line, too."""
     is_interrupted = False
@@ -121,6 +133,7 @@ def main() -> int:
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, interrupt)
+        sys.unraisablehook = _interrupt_again
     try:
         code = run(sys.argv[1:])
     except BaseException:  # numpy makes an ImportError of a KeyboardInterrupt while it is imported
