@@ -79,7 +79,9 @@ def test_paper_window_by_default():
 def test_one_full_window_is_enough_and_less_is_refused():
     assert differentiate(np.zeros(31), 1e-3).velocity.shape == (1,)
     for size in (30, 1, 0):
-        with pytest.raises(ValueError, match=rf"^{size} samples are fewer than the window of 31"):
+        with pytest.raises(
+            ValueError, match=rf"^{size} samples are fewer than the derivative window of 31"
+        ):
             differentiate(np.zeros(size), 1e-3)
 
 
