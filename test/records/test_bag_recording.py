@@ -202,8 +202,8 @@ class TestBadSamples:
         bag = write_bag(tmp_path / "bag", with_pressure((10, again), (20, again[:4] + b"\0" * 40)))
         assert problem(bag) == (
             ", /fv_101: bad samples: actuator_pressure repeats a stamp (1 samples): "
-            "use a stretch of the record without them; 1 messages of /fv_101/actuator_pressure are "
-            "no such messages, and were left out"
+            "use a stretch of the record without them; 1 messages of /fv_101/actuator_pressure "
+            "cannot be decoded as its type, and were left out"
         )
 
     def test_not_finite(self, tmp_path):
