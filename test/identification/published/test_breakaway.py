@@ -9,14 +9,12 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.identification.published.breakaway import find_breakaways
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
-from valve_friction_ros.signals import differentiate
 
 SETTINGS = IdentificationSettings()
 
 
 def found_in(record):
-    derivatives = differentiate(record.position, record.sample_period)
-    return find_breakaways(record, derivatives, SETTINGS)
+    return find_breakaways(record, SETTINGS)
 
 
 @pytest.fixture(scope="module")
