@@ -297,3 +297,13 @@ class TestRefusals:
     def test_pressures_of_a_step(self, pressures):
         with pytest.raises(ValueError, match=r"^pressure must be finite"):
             advance(StemState(0.0), BENCH_VALVE, LOW_FRICTION, pressures, 1e-3)
+
+    @pytest.mark.parametrize(
+        ("start", "last", "what"),
+        [(StemState(0.01), 0.0, "starts or stops"), (StemState(0.0, 0.015), 1e6, "turns")],
+    )
+    def test_a_stem_that_swings_for_ever(self, start, last, what):
+        """A massless stem on a stiff spring swings 10^10 times within the sample of 10 s."""
+        swinging = packing(mass=1e-12, spring=1e7)
+        with pytest.raises(ArithmeticError, match=f"{what} a million times within a sample"):
+            advance(start, FREE, swinging, (0.0, last), 10.0)

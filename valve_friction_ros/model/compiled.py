@@ -2,13 +2,18 @@
 
 A kernel is an ordinary Python function on scalars, arrays and named tuples. Decorated with
 `compiled` it runs as machine code, compiled at its first call and cached on disk for the next
-process. The cache of a kernel is renewed when its own file changes, not when only a kernel that it
-calls does: after such a change run ``make clean``. The environment variable
+process. A kernel may call kernels, and use numbers, of this folder and of its own: the cache is
+renewed when a file of either changes. Where no folder for a cache can be written, neither beside
+the sources nor at home, each process compiles anew. The environment variable
 ``NUMBA_DISABLE_JIT=1`` runs kernels as plain Python instead.
 """
 
+import contextlib
+import hashlib
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 import numba
 
@@ -18,16 +23,38 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
+@cache
+def _sources(folder: Path) -> str:
+    """Digest of the modules in a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
+    """Compile with a cache, if there is a place for one."""
+    kernel: Any
+    try:
+        kernel = numba.njit(cache=True, nogil=True, **options)(function)
+    except RuntimeError:  # numba's "cannot cache function: no locator available"
+        kernel = numba.njit(nogil=True, **options)(function)
+    folders = (Path(function.__code__.co_filename).parent, Path(__file__).parent)
+    # Numba renews a cache when the kernel's own file changes, and has nothing public to widen that.
+    # A plain function, and a kernel without a cache, have no such attribute.
+    with contextlib.suppress(AttributeError):
+        kernel._cache._cache_file._source_stamp = tuple(map(_sources, folders))  # noqa: SLF001
+    return kernel  # type: ignore[no-any-return]
+
+
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` with numba, without the interpreter lock, cached on disk."""
-    kernel: Callable[_P, _R] = numba.njit(cache=True, nogil=True)(function)
-    return kernel
+    return _kernel(function)
 
 
 def compiled_products(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` like `compiled`, and let it fuse products with sums."""
-    kernel: Callable[_P, _R] = numba.njit(cache=True, nogil=True, fastmath={"contract"})(function)
-    return kernel
+    return _kernel(function, fastmath={"contract"})
 
 
 def compiled_reductions(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -36,7 +63,4 @@ def compiled_reductions(function: Callable[_P, _R]) -> Callable[_P, _R]:
     Sums over an array then run several terms at once; the last digit of a result may differ from
     that of a sum taken in order.
     """
-    kernel: Callable[_P, _R] = numba.njit(
-        cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}
-    )(function)
-    return kernel
+    return _kernel(function, fastmath={"reassoc", "contract", "nsz"})

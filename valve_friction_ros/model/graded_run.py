@@ -50,13 +50,13 @@ def _rest_on(
     pull = forces[sample] - held
     if not -down - grip[sample] <= pull <= up + grip[sample]:
         return sample
-    while sample < forces.size - 1 and np.isnan(anew[sample + 1]):
-        pull = forces[sample + 1] - held
-        if not -down - grip[sample + 1] <= pull <= up + grip[sample + 1]:
-            break
-        sample += 1
-        positions[sample], velocities[sample] = position, 0.0
-    return sample
+    for following in range(sample + 1, forces.size):
+        pull = forces[following] - held
+        is_held = -down - grip[following] <= pull <= up + grip[following]
+        if not (is_held and np.isnan(anew[following])):
+            return following - 1
+        positions[following], velocities[following] = position, 0.0
+    return forces.size - 1
 
 
 @compiled_products
@@ -79,6 +79,7 @@ def _slide_on(
     push = side * (excess - spring * position - viscous * velocity)
     if side * velocity <= way.limit_velocity:
         return sample
+    left = forces.size - sample
     while sample < forces.size - 1 and np.isnan(anew[sample + 1]):
         after = forces[sample + 1] - side * (dry + grip[sample + 1])
         place, following = slid(slide, position, velocity, excess, after - excess)
@@ -94,6 +95,9 @@ def _slide_on(
         sample += 1
         positions[sample], velocities[sample] = place, following
         position, velocity, excess, push = place, following, after, final_push
+        left -= 1
+        if left < 0:
+            raise ArithmeticError("the stem slid on beyond the last sample")
     return sample
 
 
@@ -115,7 +119,9 @@ def _slide_on_falling(
     if side * velocity <= way.limit_velocity:
         return sample
     top = ladder.slides.shape[0] - 1
-    while sample < forces.size - 1 and np.isnan(anew[sample + 1]):
+    for _ in range(sample, forces.size - 1):
+        if not np.isnan(anew[sample + 1]):
+            return sample
         rung = min(int(side * velocity / ladder.spacing), top)
         friction, viscous = ladder.chords[rung, 0], ladder.chords[rung, 1]
         row = ladder.slides[rung]
@@ -188,7 +194,7 @@ def run_graded_stem(
     is_quick = has_short_cut(upward, period) and has_short_cut(downward, period)
     falls = upward.stribeck_velocity > 0.0
     sample = 0
-    while True:
+    for _ in range(forces.size):
         velocity = velocities[sample]
         side = 1.0 if velocity > 0 else -1.0
         way = upward if velocity > 0 else downward
@@ -213,3 +219,4 @@ def run_graded_stem(
             positions[sample + 1] = anew[sample + 1]
             velocities[sample + 1] = leaving[sample + 1]
         sample += 1
+    raise ArithmeticError("the simulation did not reach its last sample")

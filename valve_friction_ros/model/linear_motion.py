@@ -26,6 +26,11 @@ from valve_friction_ros.model.compiled import compiled
 __all__ = ["Motion", "Response", "first_turn", "impulse_response", "motion_after"]
 
 
+_MOST_TERMS = 64
+"""Terms of a power series: where one is used, its terms fall faster than 2⁻ⁿ/n!, and some twenty
+count."""
+
+
 class Response(NamedTuple):
     """Impulse response at one time: its derivative, itself, its first and second integral."""
 
@@ -49,13 +54,13 @@ def _series_response(damping: float, stiffness: float, time: float) -> Response:
     term, previous = time, 0.0
     slope, value = 1.0, time
     integral, second_integral = term * time / 2, term * time * time / 6
-    order = 1
-    while abs(term) > 1e-18 * time or abs(previous) > 1e-18 * time:
-        following = -(damping * time * order * term + stiffness * time * time * previous) / (
-            order * (order + 1)
+    for order in range(2, _MOST_TERMS):
+        if not (abs(term) > 1e-18 * time or abs(previous) > 1e-18 * time):
+            break
+        following = -(damping * time * (order - 1) * term + stiffness * time * time * previous) / (
+            order * (order - 1)
         )
         previous, term = term, following
-        order += 1
         value += term
         slope += order * term / time
         integral += term * time / (order + 1)
@@ -70,11 +75,11 @@ def _decay_integrals(rate: float, time: float) -> tuple[float, float]:
     if abs(exponent) < 0.5:
         term = 0.5
         total = term
-        order = 3
-        while abs(term) > 1e-18:
+        for order in range(3, _MOST_TERMS):
+            if not abs(term) > 1e-18:
+                break
             term *= exponent / order
             total += term
-            order += 1
         second = total * time * time
         return time + rate * second, second
     first = math.expm1(exponent) / rate

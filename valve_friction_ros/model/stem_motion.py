@@ -32,6 +32,17 @@ _ROOT_ITERATIONS = 100
 _ROOT_TOLERANCE = 1e-11
 """Step of Newton's method, over the time searched, after which only rounding is left."""
 
+_MOST_EVENTS = 1_000_000
+"""Events within a sample, or turns within a slide, with which the simulation is given up.
+
+Of 288 simulations with samples of 1 ms to 1 s the busiest had 1089 events and 117 turns; a million
+take about a second.
+"""
+
+_MOST_TRIES = 64
+"""Tries of a shorter chord. Each has at most two thirds of the length of the one before, so that
+the 52nd is shorter than a billionth of the sample, and is taken whatever it gives."""
+
 STRIBECK_STEP = 0.04
 """Approximate change of speed per chord, over the Stribeck velocity.
 
@@ -111,7 +122,7 @@ def _time_to_rest(
     half_period = math.pi / math.sqrt(swing) if swing > 0 else math.inf
     early, early_velocity = 0.0, start.velocity
     late = min(first_turn(start.acceleration, jerk, damping, stiffness), duration)
-    while True:
+    for _ in range(_MOST_EVENTS):
         end = motion_after(start, jerk, impulse_response(damping, stiffness, late), late)
         if early_velocity > dynamics.limit_velocity >= end.velocity:
             time = _time_of_velocity(start, jerk, dynamics, dynamics.limit_velocity, early, late)
@@ -125,6 +136,7 @@ def _time_to_rest(
             return math.inf
         early, early_velocity = late, end.velocity
         late = min(late + half_period, duration)
+    raise ArithmeticError("the stem turns a million times within a sample: sample faster")
 
 
 @compiled
@@ -206,7 +218,7 @@ def _slide_one_way(
     largest = _chord_reach(dynamics, speed)
     change = abs(start.acceleration) * duration
     step = duration if change <= largest else duration * largest / change
-    while True:
+    for _ in range(_MOST_TRIES):
         gain = min(max(start.acceleration * step, -0.5 * speed), largest)
         other = speed + (gain if abs(gain) > _NARROW * largest else _NARROW * largest)
         local = _chord(dynamics, speed, other)
@@ -216,6 +228,7 @@ def _slide_one_way(
         if final == 0.0 or strays <= 1.5 * allowed or step < 1e-9 * duration:
             return reached, final, time
         step *= max(allowed / strays, 0.01)
+    raise ArithmeticError("the falling friction has no chord that is short enough")
 
 
 @compiled
@@ -281,13 +294,15 @@ def advance_stem(
     """
     shortest_phase = 1e-12 * duration
     elapsed = 0.0
-    while elapsed < duration:
+    for _ in range(_MOST_EVENTS):
+        if not elapsed < duration:
+            return position, velocity
         pull = force + slope * elapsed - upward.spring_constant * position
         if velocity == 0.0:
             side, wait = _breakaway(position, pull, slope, upward, downward)
             elapsed += wait
             if elapsed >= duration:
-                break
+                return position, velocity
         else:
             side = 1.0 if velocity > 0 else -1.0
         reached, speed, time = _slide_one_way(
@@ -301,4 +316,4 @@ def advance_stem(
         )
         position, velocity = side * reached, side * speed
         elapsed += max(time, shortest_phase)
-    return position, velocity
+    raise ArithmeticError("the stem starts or stops a million times within a sample: sample faster")

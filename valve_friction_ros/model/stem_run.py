@@ -32,10 +32,11 @@ def _rest_on(
     highest, lowest = held + upward.static_friction, held - downward.static_friction
     if not lowest <= forces[sample] <= highest:
         return sample
-    while sample < forces.size - 1 and lowest <= forces[sample + 1] <= highest:
-        sample += 1
-        positions[sample], velocities[sample] = position, 0.0
-    return sample
+    for following in range(sample + 1, forces.size):
+        if not lowest <= forces[following] <= highest:
+            return following - 1
+        positions[following], velocities[following] = position, 0.0
+    return forces.size - 1
 
 
 @compiled_products
@@ -65,6 +66,7 @@ def _slide_on(
     push = side * (excess - spring * position - viscous * velocity)
     if side * velocity <= way.limit_velocity:
         return sample
+    left = forces.size - sample  # in a `for` loop numba fuses other products: other last digits
     while sample < forces.size - 1:
         after = forces[sample + 1] - friction
         change = after - excess
@@ -81,6 +83,9 @@ def _slide_on(
         sample += 1
         positions[sample], velocities[sample] = place, following
         position, velocity, excess, push = place, following, after, final_push
+        left -= 1
+        if left < 0:
+            raise ArithmeticError("the stem slid on beyond the last sample")
     return sample
 
 
@@ -104,7 +109,7 @@ def _slide_on_falling(
     if side * velocity <= way.limit_velocity:
         return sample
     top = ladder.slides.shape[0] - 1
-    while sample < forces.size - 1:
+    for _ in range(sample, forces.size - 1):
         rung = min(int(side * velocity / ladder.spacing), top)
         friction, viscous = side * ladder.chords[rung, 0], ladder.chords[rung, 1]
         row = ladder.slides[rung]
@@ -149,7 +154,7 @@ def run_stem(
     is_quick = has_short_cut(upward, period) and has_short_cut(downward, period)
     falls = upward.stribeck_velocity > 0.0
     sample = 0
-    while True:
+    for _ in range(forces.size):
         velocity = velocities[sample]
         side = 1.0 if velocity > 0 else -1.0
         way = upward if velocity > 0 else downward
@@ -176,3 +181,4 @@ def run_stem(
             downward,
         )
         sample += 1
+    raise ArithmeticError("the simulation did not reach its last sample")

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmark.speed.plain_sweep import plain_sweep
+from benchmark.speed.plain_sweep import incremental_sweep, plain_sweep
 from benchmark.speed.records import VALVES, noisy_record
 from benchmark.speed.rows import Row, Settings, medians
 from valve_friction_ros.identification import (
@@ -77,6 +77,9 @@ def measure(settings: Settings) -> Iterator[Row]:
                 "few": lambda one=regression, at=few: sweep_thresholds(one, at),
                 "double": lambda one=double, at=thresholds: sweep_thresholds(one, at),
                 "floor": lambda one=regression: _read_through(one.columns),
+                "incremental": lambda one=regression, at=thresholds: incremental_sweep(
+                    one.columns, one.force, one.speed, at
+                ),
             },
             8 * settings.repeats,
         ) | medians(
@@ -96,6 +99,13 @@ def measure(settings: Settings) -> Iterator[Row]:
             "numpy.linalg.lstsq for each threshold",
             f"{_TIMES_FASTER} times faster",
             milliseconds["plain"] >= _TIMES_FASTER * milliseconds["ours"],
+        )
+        yield Row(
+            f"sweep, {name} friction",
+            milliseconds["ours"],
+            "ms",
+            milliseconds["incremental"],
+            "numpy.linalg.qr, each row taken in once",
         )
         difference = _largest_difference(regression)
         yield Row(

@@ -1,0 +1,65 @@
+"""Kernels are compiled anew when they must be, and run where nothing can be cached."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+INNER = """
+from valve_friction_ros.model.compiled import compiled
+
+@compiled
+def inner():
+    return {}
+"""
+OUTER = """
+from inner import inner
+from valve_friction_ros.model.compiled import compiled
+
+@compiled
+def outer():
+    return inner()
+
+print(outer(), sum(outer.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def kernels(tmp_path):
+    (tmp_path / "inner.py").write_text(INNER.format(1))
+    (tmp_path / "outer.py").write_text(OUTER)
+    return tmp_path
+
+
+def run(folder, **variables):
+    """What the kernel `outer` answers in a new process, and whether it came out of the cache."""
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    found = subprocess.run(
+        [sys.executable, "-B", "outer.py"],
+        cwd=folder,
+        env=environment | variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stderr
+    value, hits = map(int, found.stdout.split())
+    return value, bool(hits)
+
+
+def test_a_change_of_a_kernel_that_another_one_calls(kernels):
+    """Numba itself would go on with the compiled `outer`, the old `inner` in it."""
+    assert run(kernels) == (1, False)
+    assert run(kernels) == (1, True)
+    (kernels / "inner.py").write_text(INNER.format(2))
+    assert run(kernels) == (2, False)
+    assert run(kernels) == (2, True)
+
+
+def test_nowhere_to_cache(kernels):
+    """As of a read-only installation, used by somebody without a home."""
+    (kernels / "__pycache__").write_text("a file, so that no folder can be made")
+    nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
+    assert run(kernels, **nowhere) == (1, False)
+    assert run(kernels, **nowhere) == (1, False)
