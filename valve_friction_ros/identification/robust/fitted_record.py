@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
@@ -98,9 +97,8 @@ class FittedRecord:
     anew, leaving : ndarray of float, shape (g,)
         Where the stem is set anew after a gap, m, nan elsewhere; and its velocity there and at the
         start, m/s.
-    reading : sparse matrix, shape (c, g)
-        Makes the means of cells of one step, as the stem's stamps lie in them, of positions at
-        each step.
+    cells : ndarray of float, shape (c,)
+        Mean stamp of the positions between two steps, in steps.
     position : ndarray of float, shape (c,)
         The means that were measured, m.
     time : ndarray of float, shape (c,)
@@ -128,7 +126,7 @@ class FittedRecord:
     rate: NDArray[np.float64] = field(repr=False)
     anew: NDArray[np.float64] = field(repr=False)
     leaving: NDArray[np.float64] = field(repr=False)
-    reading: sparse.csr_matrix = field(repr=False)
+    cells: NDArray[np.float64] = field(repr=False)
     position: NDArray[np.float64] = field(repr=False)
     time: NDArray[np.float64] = field(repr=False)
     samples: NDArray[np.float64] = field(repr=False)
@@ -251,13 +249,6 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     step, share = step[used], share[used]
     first, cell, count = np.unique(step, return_inverse=True, return_counts=True)
     weight: NDArray[np.float64] = 1.0 / count[cell]
-    reading = sparse.csr_matrix(
-        (
-            np.concatenate([(1.0 - share) * weight, share * weight]),
-            (np.concatenate([cell, cell]), np.concatenate([step, step + 1])),
-        ),
-        shape=(first.size, grid.size),
-    )
     position = np.bincount(cell, weight * stem.value[used])
     time = np.bincount(cell, weight * stem.time[used])
     force = valve.actuator_force(pressure)
@@ -267,7 +258,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
         force,
         np.gradient(force, period),
         *_set_anew(lost, grid, stem, stem_noise),
-        reading,
+        first + np.bincount(cell, weight * share),
         np.asarray(position, dtype=np.float64),
         np.asarray(time, dtype=np.float64),
         count.astype(np.float64),

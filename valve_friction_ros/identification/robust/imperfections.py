@@ -36,9 +36,9 @@ class Imperfection:
 
 IMPERFECTIONS: Mapping[str, Imperfection] = MappingProxyType(
     {
-        "delay": Imperfection(1.0, 2e-3, "clock offset (stem late or early)"),
-        "stem_lag": Imperfection(1.0, 2e-3, "lag of a slow stem sensor"),
-        "force_lag": Imperfection(1.0, 2e-3, "lag of the pressure: slow sensor or volume"),
+        "delay": Imperfection(1.0, 2e-4, "clock offset (stem late or early)"),
+        "stem_lag": Imperfection(1.0, 2e-4, "lag of a slow stem sensor"),
+        "force_lag": Imperfection(1.0, 2e-4, "lag of the pressure: slow sensor or volume"),
         "along_travel": Imperfection(0.1, 0.02, "friction that changes along the travel"),
         "in_record": Imperfection(0.1, 0.02, "friction that changes during the record"),
         "at_low_speed": Imperfection(0.1, 0.03, "friction that falls with speed (Stribeck)"),
@@ -62,7 +62,7 @@ BOUNDS: Mapping[str, float] = MappingProxyType(
     {
         "coulomb_friction": 0.0,
         "viscous_friction": 0.0,
-        "spring_constant": 1.0,
+        "spring_constant": 1e-12,
         "slip_force": 0.0,
         "mass": 0.02,
         "stem_lag": 0.0,
@@ -71,7 +71,7 @@ BOUNDS: Mapping[str, float] = MappingProxyType(
         "stribeck_velocity": 1e-4,
     }
 )
-"""Least values of the coordinates that have one."""
+"""Least values of the straight coordinates that have one; that of the spring is one of 1/k."""
 
 
 def deviations(

@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.robust.broad_model import MAIN
+from valve_friction_ros.identification.robust.coordinates import MAIN
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.numbers import (
     REPORTED,

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.robust.broad_model import BroadModel, Coordinates
+from valve_friction_ros.identification.robust.broad_model import BroadModel
+from valve_friction_ros.identification.robust.coordinates import Coordinates
 
 __all__ = ["REPORTED", "ReportedNumber", "loop_friction", "reported_numbers"]
 

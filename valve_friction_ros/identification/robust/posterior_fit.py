@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.bounded_step import bounded_minimum
-from valve_friction_ros.identification.robust.broad_model import BroadModel, Coordinates
-from valve_friction_ros.identification.robust.imperfections import BOUNDS
-from valve_friction_ros.identification.robust.weights import (
-    inflation,
-    reading_weights,
-    stroke_cells,
+from valve_friction_ros.identification.robust.broad_model import BroadModel
+from valve_friction_ros.identification.robust.coordinates import (
+    Coordinates,
+    jacobian,
+    physical,
+    straight,
 )
+from valve_friction_ros.identification.robust.imperfections import BOUNDS
+from valve_friction_ros.identification.robust.weights import inflation, stroke_cells
 
 __all__ = ["PosteriorFit", "Stage", "fit"]
 
@@ -90,7 +92,7 @@ class PosteriorFit:
 
 
 class _Problem:
-    """The linear problem at one place, in coordinates scaled to unit curvature."""
+    """The linear problem at one place, in straight coordinates scaled to unit curvature."""
 
     def __init__(
         self,
@@ -104,31 +106,32 @@ class _Problem:
         record = model.record
         self.model, self.at, self.names, self.centre = model, at, names, centre
         self.residual = record.position - readings
-        self.weights = reading_weights(record, max(at["spring_constant"], 1.0))
-        scaled = self.residual * self.weights
+        scaled = self.residual * model.weights
         self.inflation = inflation(scaled, stroke_cells(record))
         self.precision = np.array(
             [1.0 / deviations[name] ** 2 if name in deviations else 0.0 for name in names]
         )
         self.distance = np.array([at[name] - centre.get(name, 0.0) for name in names])
-        slopes = model.sensitivity(at, names, readings) * self.weights[:, None]
-        curvature = slopes.T @ slopes / self.inflation + np.diag(self.precision)
+        self.jacobian = jacobian(at, names)
+        size = np.abs(np.diag(self.jacobian))
+        slopes = model.sensitivity(at, names) * model.weights[:, None]
+        curvature = slopes.T @ slopes / self.inflation + np.diag(self.precision * size**2)
         diagonal = np.diag(curvature)
         self.scale = np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), 1.0)
         self.curvature = curvature / np.outer(self.scale, self.scale)
-        self.slope = (
-            slopes.T @ scaled / self.inflation - self.precision * self.distance
-        ) / self.scale
-        values = np.array([at[name] for name in names])
-        lowest = np.array([BOUNDS.get(name, -np.inf) for name in names])
-        self.lowest = np.minimum((lowest - values) * self.scale, 0.0)
+        gradient = slopes.T @ scaled / self.inflation - self.precision * size * self.distance
+        self.slope = gradient / self.scale
+        self.straight = straight(at, names)
+        lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]
+        self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
 
     def stage(self) -> Stage:
-        inverse = np.linalg.pinv(self.curvature, rcond=1e-13, hermitian=True)
+        inverse = np.linalg.pinv(self.curvature, rcond=1e-15, hermitian=True)
+        inverse /= np.outer(self.scale, self.scale)
         return Stage(
             self.at,
-            inverse / np.outer(self.scale, self.scale),
-            float(np.sum((self.residual * self.weights) ** 2)),
+            self.jacobian @ inverse @ self.jacobian.T,
+            float(np.sum((self.residual * self.model.weights) ** 2)),
             float(self.precision @ self.distance**2),
         )
 
@@ -141,27 +144,24 @@ class _Problem:
         return float(2.0 * self.slope @ scaled - scaled @ self.curvature @ scaled)
 
     def objective(self, at: Coordinates, readings: NDArray[np.float64]) -> float:
-        misfit = np.sum(((self.model.record.position - readings) * self.weights) ** 2)
+        misfit = np.sum(((self.model.record.position - readings) * self.model.weights) ** 2)
         distance = np.array([at[name] - self.centre.get(name, 0.0) for name in self.names])
         return float(misfit / self.inflation + self.precision @ distance**2)
 
     def moved(self, step: NDArray[np.float64]) -> dict[str, float]:
-        return {
-            **self.at,
-            **{
-                name: max(self.at[name] + change, BOUNDS.get(name, -np.inf))
-                for name, change in zip(self.names, step.tolist(), strict=True)
-            },
-        }
+        there = dict(self.straight)
+        for name, change in zip(self.names, step.tolist(), strict=True):
+            there[name] = max(there[name] + change, BOUNDS.get(name, -np.inf))
+        return physical(there, self.names)
 
     def largest_share(self, step: NDArray[np.float64]) -> float:
         """Share of a step that changes no force by more than half of its size."""
         share = 1.0
         for name, change in zip(self.names, step.tolist(), strict=True):
             if name in _MOVED and change != 0:
-                size = 100.0 * self.model.step(self.at, name)
+                size = 1e4 * self.model.step(self.at, name)
                 if name == "slip_force":
-                    size = max(self.at["coulomb_friction"], 1e-6)
+                    size = self.straight["coulomb_friction"] + 1e-12
                 share = min(share, _LARGEST_CHANGE * size / abs(change))
         return share
 
@@ -230,7 +230,7 @@ def fit(
     if at is not problem.at:
         problem = _Problem(model, at, names, deviations, centre, readings)
         stages.append(problem.stage())
-    remaining = problem.step(0.0)
+    remaining = problem.jacobian @ problem.step(0.0)
     return PosteriorFit(
         model,
         names,

@@ -6,19 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.robust.broad_model import (
-    ABSENT,
-    MAIN,
-    BroadModel,
-    Coordinates,
-)
+from valve_friction_ros.identification.robust.broad_model import ABSENT, BroadModel
+from valve_friction_ros.identification.robust.coordinates import MAIN, Coordinates
 from valve_friction_ros.identification.robust.fitted_record import (
     FittedRecord,
     set_anew_at_rests,
 )
 from valve_friction_ros.identification.robust.imperfections import deviations
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, fit
-from valve_friction_ros.identification.robust.weights import reading_weights
 
 __all__ = ["Prior", "search"]
 
@@ -128,11 +123,9 @@ def _nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinat
 
     The mean magnitude counts: a single jump at the wrong time says little of a start.
     """
-    record = model.record
-    weights = reading_weights(record, starts[0]["spring_constant"])
-
     def distance(start: Coordinates) -> float:
-        return float(np.sum(np.abs((record.position - model.readings(start)) * weights)))
+        residual = model.record.position - model.readings(start)
+        return float(np.sum(np.abs(residual * model.weights)))
 
     return sorted(starts, key=distance)
 
@@ -141,9 +134,9 @@ class _Search:
     """The fits of one record."""
 
     def __init__(self, record: FittedRecord, prior: Prior) -> None:
-        self.model, self.prior = BroadModel(record), prior
-        self.stepwise = BroadModel(set_anew_at_rests(record))
         self.sliding = _sliding(record)
+        self.model, self.prior = BroadModel(record, self.sliding.spring_constant), prior
+        self.stepwise = BroadModel(set_anew_at_rests(record), self.sliding.spring_constant)
         self.known = dict(prior.fixed)
         self.centre = {"mass": prior.mass}
         self.spread = deviations(
