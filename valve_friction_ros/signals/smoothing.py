@@ -7,6 +7,7 @@ between them.
 """
 
 import math
+from bisect import bisect_left
 from functools import cache
 from itertools import pairwise
 
@@ -179,7 +180,8 @@ def longest_faithful_window(
 
     The residual of a smoother on white noise, averaged over blocks of a quarter window, has a
     variance that follows from the weights. A smoother that removes signal leaves a larger variance
-    of the block averages. Windows grow by half until that happens.
+    of the block averages. Windows that grow by half are tried, the longest first and then by
+    bisection: a window within a faithful one is faithful too.
 
     Parameters
     ----------
@@ -199,14 +201,19 @@ def longest_faithful_window(
     """
     if noise == 0:
         return 1
-    chosen, window = 1, 5
+    windows, window = [], _ORDER + 2
     while window <= min(longest, signal.size // 4):
-        residual = signal - smooth_between(signal, corners, window)
-        if chosen > 1 and not _is_noise(residual, noise, window):
-            break
-        chosen = window
+        windows.append(window)
         window = (3 * window // 2) | 1
-    return chosen
+    if not windows:
+        return 1
+
+    def is_faithful(window: int) -> bool:
+        return _is_noise(signal - smooth_between(signal, corners, window), noise, window)
+
+    if is_faithful(windows[-1]):
+        return windows[-1]
+    return windows[bisect_left(windows[1:-1], True, key=lambda one: not is_faithful(one))]
 
 
 def _is_noise(residual: NDArray[np.float64], noise: float, window: int) -> bool:

@@ -22,7 +22,7 @@ from valve_friction_ros.identification.robust.driven_stem import (
 )
 
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
-from valve_friction_ros.identification.robust.imperfections import BOUNDS, IMPERFECTIONS
+from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS
 from valve_friction_ros.identification.robust.weights import reading_weights
 
 __all__ = ["ABSENT", "BroadModel", "Simulated"]
@@ -30,11 +30,11 @@ __all__ = ["ABSENT", "BroadModel", "Simulated"]
 ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
 """Nothing imperfect; the mass has to be set."""
 
-_STEP = 1e-4
+_STEP = 1e-6
 """Change of a main coordinate over its size by which to differentiate.
 
 The main coordinates nearly make up for one another, so their derivatives must be good to four
-digits; the simulation is exact, so the step may be small."""
+digits and more; the simulation is exact, so the step may be small."""
 
 
 class Simulated(NamedTuple):
@@ -74,49 +74,59 @@ class BroadModel:
         """One over the effective deviation of each reading, 1/m."""
         return reading_weights(self.record, self.usual_spring)
 
-    @cached_property
-    def course(self) -> Course:
-        """What drives the stem, and the slow terms along it."""
+    def course(self, force: NDArray[np.float64]) -> Course:
+        """Return what drives the stem, and the slow terms along it."""
         record, slow = self.record, self.record.slow
         return Course(
             record.period,
             record.travel,
             slow.range,
             float(np.ptp(record.force)),
-            record.force,
-            record.rate,
+            force,
             slow.place,
             slow.age,
             slow.speed,
-            np.exp(slow.speed / -LOW_SPEED),
+            self.slowness,
             record.anew,
             record.leaving,
         )
+
+    @cached_property
+    def slowness(self) -> NDArray[np.float64]:
+        """exp(−speed/`LOW_SPEED`) at each step."""
+        return np.exp(self.record.slow.speed / -LOW_SPEED)
+
+    @cached_property
+    def halves(self) -> tuple[Course, Course]:
+        """The same driven by each half of the samples of the pressure."""
+        even, odd = self.record.halves
+        return self.course(even), self.course(odd)
 
     def simulate(self, at: Coordinates) -> Simulated:
         """Simulate the stem itself."""
         force = np.empty_like(self.record.force)
         position, velocity = np.empty_like(force), np.empty_like(force)
-        run_stem(self.course, Place(**at), force, position, velocity)
+        run_stem(self.course(self.record.force), Place(**at), force, position, velocity)
         return Simulated(position, velocity)
 
     def readings(self, at: Coordinates) -> NDArray[np.float64]:
-        """Return what the stem's sensor would read, m, a value a cell."""
-        readings = np.empty_like(self.record.position)
-        read_stem(self.course, Place(**at), self.record.cells, readings)
+        """Return what the stem's sensor would read, m, a value a cell, by each half: (2, c)."""
+        place = Place(**at)
+        readings = np.empty((2, self.record.position.size))
+        for course, row in zip(self.halves, readings, strict=True):
+            read_stem(course, place, self.record.cells, row)
         return readings
 
-    def sensitivity(self, at: Coordinates, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """Differentiate the readings by the straight coordinates `names`, shape (c, p)."""
-        slopes = np.empty((self.record.position.size, len(names)), order="F")
+    def sensitivity(
+        self, at: Coordinates, names: tuple[str, ...], readings: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Differentiate the `readings` by the straight coordinates `names`, shape (2, p, c)."""
+        slopes = np.empty((2, len(names), self.record.position.size))
         centre = straight(at, names)
-        for column, name in enumerate(names):
+        for row, name in enumerate(names):
             step = self.step(at, name)
-            low, high = centre[name] - step, centre[name] + step
-            low = max(low, BOUNDS.get(name, low))
-            after = self.readings(physical({**centre, name: high}, names))
-            before = self.readings(physical({**centre, name: low}, names))
-            slopes[:, column] = (after - before) / (high - low)
+            after = self.readings(physical({**centre, name: centre[name] + step}, names))
+            slopes[:, row] = (after - readings) / step
         return slopes
 
     def step(self, at: Coordinates, name: str) -> float:

@@ -30,8 +30,8 @@ class Course(NamedTuple):
         Of the valve, m.
     stroke, span : float
         Range of the measured positions, m, and of the force, N.
-    force, rate : ndarray of float, shape (g,)
-        Actuator force, N, and its derivative, N/s.
+    force : ndarray of float, shape (g,)
+        Actuator force, N.
     place, age : ndarray of float, shape (g,)
         Measured position and time, −1 to 1.
     speed : ndarray of float, shape (g,)
@@ -47,7 +47,6 @@ class Course(NamedTuple):
     stroke: float
     span: float
     force: NDArray[np.float64]
-    rate: NDArray[np.float64]
     place: NDArray[np.float64]
     age: NDArray[np.float64]
     speed: NDArray[np.float64]
@@ -120,7 +119,9 @@ def run_stem(
     for step in range(force.size):
         place, age = course.place[step], course.age[step]
         if at.force_lag < 0.0:
-            force[step] -= at.force_lag * course.rate[step]
+            before, after = max(step - 1, 0), min(step + 1, force.size - 1)
+            rise = course.force[after] - course.force[before]
+            force[step] -= at.force_lag * rise / ((after - before) * course.period)
         square = place * place
         force[step] += (
             drift * age

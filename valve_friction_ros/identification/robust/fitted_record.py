@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,9 @@ __all__ = ["FittedRecord", "SlowView", "fitted_record", "set_anew_at_rests"]
 
 _LONGEST_PERIOD = 5e-3
 """Longest step of the simulation, s: within it a corner of the pressure may lie."""
+
+_MOST_STEPS = 12_500
+"""Steps of the simulation in a record; those of a longer record are longer, up to four times."""
 
 _SAMPLES_A_WINDOW = 32
 _CORNER_TIME = 0.04
@@ -43,7 +48,8 @@ _MEMORY = 2.5
 
 _FEWEST = 100
 _STILL = 0.01
-"""Share of the top speed below which the averaged stem rests."""
+_STILL_NOISE = 4.0
+"""The averaged stem rests below this share of its top speed, or so many deviations of its noise."""
 
 _REST_MEAN = 0.1
 _REST_MARGIN = 0.15
@@ -92,8 +98,8 @@ class FittedRecord:
         Step of the simulation, s.
     force : ndarray of float, shape (g,)
         Smoothed actuator force at each step, N.
-    rate : ndarray of float, shape (g,)
-        Its derivative, N/s.
+    halves : ndarray of float, shape (2, g)
+        The same from the even samples alone and from the odd ones: their noise is independent.
     anew, leaving : ndarray of float, shape (g,)
         Where the stem is set anew after a gap, m, nan elsewhere; and its velocity there and at the
         start, m/s.
@@ -123,7 +129,7 @@ class FittedRecord:
 
     period: float
     force: NDArray[np.float64] = field(repr=False)
-    rate: NDArray[np.float64] = field(repr=False)
+    halves: NDArray[np.float64] = field(repr=False)
     anew: NDArray[np.float64] = field(repr=False)
     leaving: NDArray[np.float64] = field(repr=False)
     cells: NDArray[np.float64] = field(repr=False)
@@ -143,18 +149,74 @@ class FittedRecord:
         """Time from the first step to the last, s."""
         return (self.force.size - 1) * self.period
 
+    @cached_property
+    def still(self) -> NDArray[np.bool_]:
+        """Steps at which the measured stem rests, shape (g,).
 
-def _smoothed(
-    pressure: NDArray[np.float64], noise: float, period: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Smooth the pressure between its corners; return it, its leverages and the window."""
-    corners = find_corners(pressure, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
+        The derivative of a signal averaged twice over T, with n samples in it, has the noise
+        s·√(2/n)/T.
+        """
+        averaged = max(float(np.sum(self.samples)) * _SLOW / self.duration, 1.0)
+        noise = self.noise * math.sqrt(2.0 / averaged) / _SLOW
+        top = float(np.quantile(self.slow.speed, 0.98))
+        return self.slow.speed < max(_STILL * top, min(_STILL_NOISE * noise, 0.2 * top))
+
+
+class _Smoothed(NamedTuple):
+    """A smoothed signal on a grid.
+
+    Attributes
+    ----------
+    whole : ndarray of float, shape (g,)
+        From all samples.
+    halves : ndarray of float, shape (2, g)
+        From the even samples and from the odd ones.
+    variance : ndarray of float, shape (g,)
+        Of the noise of `whole`.
+    window : int
+        Steps of the grid over which it is smoothed.
+    """
+
+    whole: NDArray[np.float64]
+    halves: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    window: int
+
+    def at(self, grid: NDArray[np.float64], steps: NDArray[np.float64]) -> "_Smoothed":
+        """Return it at other steps."""
+        whole, even, odd, variance = (
+            np.interp(steps, grid, row) for row in (self.whole, *self.halves, self.variance)
+        )
+        return _Smoothed(whole, np.stack([even, odd]), variance, self.window)
+
+
+def _noise_on_grid(signal: StampedSignal, grid: NDArray[np.float64], noise: float) -> float:
+    """Return the deviation of white noise that averages as the interpolated noise does.
+
+    A sample that counts w steps adds w²·s² to the variance of a sum of steps.
+    """
+    after = np.clip(np.searchsorted(signal.time, grid, side="right"), 1, signal.time.size - 1)
+    share = (grid - signal.time[after - 1]) / (signal.time[after] - signal.time[after - 1])
+    share = np.clip(share, 0.0, 1.0)
+    counts = np.bincount(after, share, signal.time.size)
+    counts += np.bincount(after - 1, 1.0 - share, signal.time.size)
+    return noise * math.sqrt(float(np.sum(counts**2)) / grid.size)
+
+
+def _smoothed(signal: StampedSignal, grid: NDArray[np.float64]) -> _Smoothed:
+    """Smooth a signal between its corners."""
+    period = float(grid[1] - grid[0])
+    whole = np.interp(grid, signal.time, signal.value)
+    noise = _noise_on_grid(signal, grid, stamped_noise(signal))
+    corners = find_corners(whole, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
     longest = max(round(_LONGEST_SMOOTHING / period), 1)
-    window = longest_faithful_window(pressure, corners, noise, longest)
+    window = longest_faithful_window(whole, corners, noise, longest)
     if window == 1:
-        return pressure, np.ones_like(pressure), window
-    smooth = smooth_between(pressure, corners, window)
-    return smooth, smoothing_leverage(pressure.size, corners, window), window
+        return _Smoothed(whole, np.stack([whole, whole]), np.full(grid.size, noise**2), window)
+    parts = [np.interp(grid, signal.time[i::2], signal.value[i::2]) for i in (0, 1)]
+    whole, even, odd = (smooth_between(one, corners, window) for one in (whole, *parts))
+    variance = noise**2 * smoothing_leverage(grid.size, corners, window)
+    return _Smoothed(whole, np.stack([even, odd]), variance, window)
 
 
 def _averaged_twice(signal: NDArray[np.float64], length: int) -> NDArray[np.float64]:
@@ -229,18 +291,16 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     drive = StampedSignal(record.pressure.time - begin, record.pressure.value)
     finest = min(stem.period, drive.period)
     grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
-    raw = np.interp(grid, drive.time, drive.value)
-    pressure_noise = stamped_noise(drive)
-    pressure, leverage, window = _smoothed(raw, pressure_noise, finest)
-    if finest > _LONGEST_PERIOD:
-        period = finest / math.ceil(finest / _LONGEST_PERIOD - 1e-9)
+    pressure = _smoothed(drive, grid)
+    longest = _LONGEST_PERIOD * min(max((end - begin) / (_LONGEST_PERIOD * _MOST_STEPS), 1.0), 4.0)
+    if finest > longest:
+        period = finest / math.ceil(finest / longest - 1e-9)
         fine = np.arange(0.0, grid[-1], period, dtype=np.float64)
-        pressure, leverage = np.interp(fine, grid, pressure), np.interp(fine, grid, leverage)
-        grid = fine
+        pressure, grid = pressure.at(grid, fine), fine
     else:
-        stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / finest)), 1)
+        stride = max(min(pressure.window // _SAMPLES_A_WINDOW, int(longest / finest + 1e-9)), 1)
         period = stride * finest
-        grid, pressure, leverage = grid[::stride], pressure[::stride], leverage[::stride]
+        pressure, grid = pressure.at(grid, grid[::stride]), grid[::stride]
     lost = _gaps(drive, grid) | _gaps(stem, grid)
     place = stem.time / period
     step = np.minimum(place.astype(np.intp), grid.size - 2)
@@ -251,20 +311,20 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     weight: NDArray[np.float64] = 1.0 / count[cell]
     position = np.bincount(cell, weight * stem.value[used])
     time = np.bincount(cell, weight * stem.time[used])
-    force = valve.actuator_force(pressure)
+    force = valve.actuator_force(pressure.whole)
     stem_noise = max(stamped_noise(stem), 1e-9 * float(np.ptp(position)))
     return FittedRecord(
         period,
         force,
-        np.gradient(force, period),
+        valve.actuator_force(pressure.halves),
         *_set_anew(lost, grid, stem, stem_noise),
         first + np.bincount(cell, weight * share),
         np.asarray(position, dtype=np.float64),
         np.asarray(time, dtype=np.float64),
         count.astype(np.float64),
         stem_noise,
-        np.interp(time, grid, leverage) * (valve.diaphragm_area * pressure_noise) ** 2,
-        max(window * finest / (_MEMORY * period), 1.0),
+        np.interp(time, grid, pressure.variance) * valve.diaphragm_area**2,
+        max(pressure.window * finest / (_MEMORY * period), 1.0),
         _slow_view(grid, np.interp(grid, time, position), force, period),
         valve.travel,
         float(np.count_nonzero(lost)) * period,
@@ -300,8 +360,7 @@ def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
     that is simulated at the wrong time then spoils no other. What a place is off by noise is the
     price; the end of a fit does without.
     """
-    speed = record.slow.speed
-    still = speed < _STILL * np.quantile(speed, 0.98)
+    still = record.still
     edges = np.flatnonzero(np.diff(still)) + 1
     bounds = np.concatenate([[0], edges, [still.size]])
     positions = np.interp(np.arange(still.size) * record.period, record.time, record.position)

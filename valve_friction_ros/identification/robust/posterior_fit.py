@@ -25,6 +25,7 @@ _WORTH = 0.02
 """Fall of the sum of squares, in variances, below which a step is not worth taking."""
 
 _LARGEST_CHANGE = 0.5
+_LEAST_COMMON = 0.01
 _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
 
 
@@ -69,7 +70,7 @@ class PosteriorFit:
     remaining : ndarray of float, shape (p,)
         Step that the linear model would still take.
     residual : ndarray of float, shape (c,)
-        Measured less simulated readings, m.
+        Measured less simulated readings, m, the mean of both halves.
     """
 
     model: BroadModel
@@ -91,6 +92,25 @@ class PosteriorFit:
         return self.stages[-1].misfit + self.stages[-1].penalty
 
 
+def _misfit(model: BroadModel, residual: NDArray[np.float64]) -> float:
+    """Sum the products of both halves' residuals: noise of the pressure adds nothing to it."""
+    even, odd = residual * model.weights
+    return float(even @ odd)
+
+
+def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the information that both halves share.
+
+    What the noise of the pressure adds to the derivatives is not in their products `cross`. Where
+    chance leaves less than `_LEAST_COMMON` of what one half for itself claims, that much is kept.
+    """
+    values, vectors = np.linalg.eigh(own)
+    root = np.sqrt(np.maximum(values, 1e-15 * values[-1]))
+    shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
+    back = (vectors * root) @ turned
+    return (back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T
+
+
 class _Problem:
     """The linear problem at one place, in straight coordinates scaled to unit curvature."""
 
@@ -107,20 +127,22 @@ class _Problem:
         self.model, self.at, self.names, self.centre = model, at, names, centre
         self.residual = record.position - readings
         scaled = self.residual * model.weights
-        self.inflation = inflation(scaled, stroke_cells(record))
+        self.inflation = inflation(scaled.mean(axis=0), stroke_cells(record))
         self.precision = np.array(
             [1.0 / deviations[name] ** 2 if name in deviations else 0.0 for name in names]
         )
         self.distance = np.array([at[name] - centre.get(name, 0.0) for name in names])
         self.jacobian = jacobian(at, names)
         size = np.abs(np.diag(self.jacobian))
-        slopes = model.sensitivity(at, names) * model.weights[:, None]
-        curvature = slopes.T @ slopes / self.inflation + np.diag(self.precision * size**2)
-        diagonal = np.diag(curvature)
+        even, odd = model.sensitivity(at, names, readings) * model.weights
+        own = 0.5 * (even @ even.T + odd @ odd.T)
+        diagonal = np.diag(own) / self.inflation + self.precision * size**2
         self.scale = np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), 1.0)
-        self.curvature = curvature / np.outer(self.scale, self.scale)
-        gradient = slopes.T @ scaled / self.inflation - self.precision * size * self.distance
-        self.slope = gradient / self.scale
+        outer = np.outer(self.scale, self.scale) * self.inflation
+        information = _common(own / outer, 0.5 * (even @ odd.T + odd @ even.T) / outer)
+        self.curvature = information + np.diag(self.precision * size**2 / self.scale**2)
+        gradient = 0.5 * (even @ scaled[1] + odd @ scaled[0]) / self.inflation
+        self.slope = (gradient - self.precision * size * self.distance) / self.scale
         self.straight = straight(at, names)
         lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]
         self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
@@ -131,7 +153,7 @@ class _Problem:
         return Stage(
             self.at,
             self.jacobian @ inverse @ self.jacobian.T,
-            float(np.sum((self.residual * self.model.weights) ** 2)),
+            _misfit(self.model, self.residual),
             float(self.precision @ self.distance**2),
         )
 
@@ -144,7 +166,7 @@ class _Problem:
         return float(2.0 * self.slope @ scaled - scaled @ self.curvature @ scaled)
 
     def objective(self, at: Coordinates, readings: NDArray[np.float64]) -> float:
-        misfit = np.sum(((self.model.record.position - readings) * self.model.weights) ** 2)
+        misfit = _misfit(self.model, self.model.record.position - readings)
         distance = np.array([at[name] - self.centre.get(name, 0.0) for name in self.names])
         return float(misfit / self.inflation + self.precision @ distance**2)
 
@@ -159,7 +181,7 @@ class _Problem:
         share = 1.0
         for name, change in zip(self.names, step.tolist(), strict=True):
             if name in _MOVED and change != 0:
-                size = 1e4 * self.model.step(self.at, name)
+                size = 1e6 * self.model.step(self.at, name)
                 if name == "slip_force":
                     size = self.straight["coulomb_friction"] + 1e-12
                 share = min(share, _LARGEST_CHANGE * size / abs(change))
@@ -198,6 +220,10 @@ def fit(
     is made small; κ is the `inflation` of the residual. The posterior covariance is
 
         (HᵀW²H/κ + Λ)⁻¹ .
+
+    The simulated stem carries noise of the pressure, and less of it the more the model damps; a
+    plain sum of squares would take that for information. In each product one factor is therefore
+    of the even samples of the pressure, the other one of the odd ones, whose noise is independent.
 
     Parameters
     ----------
@@ -238,5 +264,5 @@ def fit(
         problem.inflation,
         problem.precision,
         remaining,
-        problem.residual,
+        problem.residual.mean(axis=0),
     )

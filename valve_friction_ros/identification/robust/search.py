@@ -35,6 +35,11 @@ _START_TIME = 5e-3
 """The first position is known to so many deviations of its noise, and to what the stem moves in
 such a time (s) and in that by which its sensor may be late."""
 
+_MOST_WORK = 40_000_000
+"""Steps of simulations after which no other branch begins: about two seconds of a processor.
+
+A count and not a time, so that the answer does not depend on the machine."""
+
 _TRIED = 2
 _FEW_STEPS = 6
 _MORE_STEPS = 12
@@ -134,6 +139,7 @@ class _Search:
     """The fits of one record."""
 
     def __init__(self, record: FittedRecord, prior: Prior) -> None:
+        self.work = 0
         self.sliding = _sliding(record)
         self.model, self.prior = BroadModel(record, self.sliding.spring_constant), prior
         self.stepwise = BroadModel(set_anew_at_rests(record), self.sliding.spring_constant)
@@ -166,34 +172,41 @@ class _Search:
             **self.known,
         }
 
-    def fit(self, start: Coordinates, names: tuple[str, ...], steps: int) -> PosteriorFit:
-        """Fit from a start."""
+    def fit(
+        self,
+        start: Coordinates,
+        names: tuple[str, ...],
+        steps: int,
+        model: BroadModel | None = None,
+    ) -> PosteriorFit:
+        """Fit from a start, and count the work."""
         start = {**start, **self.known}
-        return fit(self.model, start, names, self.spread, self.centre, steps)
+        found = fit(model or self.model, start, names, self.spread, self.centre, steps)
+        self.work += len(found.stages) * 2 * len(names) * self.model.record.force.size
+        return found
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether another branch may be tried."""
+        return self.work < _MOST_WORK
 
     def from_moves(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
         """Fit each move for itself, from the nearest starts; then the whole from the best."""
         near = _nearest(self.stepwise, starts)[:_TRIED]
-        apart = [
-            fit(self.stepwise, one, names, self.spread, self.centre, _MORE_STEPS) for one in near
-        ]
+        apart = [self.fit(one, names, _MORE_STEPS, self.stepwise) for one in near]
         best = min(apart, key=lambda one: one.objective)
         return self.fit(best.at, names, _MORE_STEPS)
 
-    def plain(self) -> PosteriorFit:
-        """Fit the Karnopp model alone, with a slip jump where it helps."""
-        starts = [{**self.base, **_split(self.sliding, share)} for share in _DRY_SHARES]
-        plain = self.fit(_nearest(self.model, starts)[0], self.main, _FEW_STEPS)
-        if plain.inflation < _SUSPICIOUS or "slip_force" in self.known:
-            return plain
-        slips = []
+    def slipping(self, full: PosteriorFit) -> PosteriorFit:
+        """Fit friction that falls as soon as the stem moves."""
+        starts = []
         overall = {**self.base, **_overall_spring(self.model.record)}
-        for at in (self.base, plain.at, overall):
+        for at in (self.base, full.at, overall):
             total = max(at["coulomb_friction"], 0.1 * self.sliding.friction)
             for share in _SLIP_SHARES:
                 for slip in _SLIPS:
                     lost = (1 - share) * total / self.sliding.speed
-                    slips.append(
+                    starts.append(
                         {
                             **at,
                             "coulomb_friction": share * total,
@@ -202,16 +215,19 @@ class _Search:
                         }
                     )
         names = (*self.main, "slip_force")
-        whole = [self.fit(one, names, _MORE_STEPS) for one in _nearest(self.model, slips)[:_TRIED]]
-        trials = [plain, *whole, self.from_moves(slips, names)]
-        return min(trials, key=lambda one: one.objective)
+        near = _nearest(self.model, starts)[:_TRIED]
+        trials = [self.fit(one, names, _MORE_STEPS) for one in near]
+        if self.may_go_on:
+            trials.append(self.from_moves(starts, names))
+        best = min(trials, key=lambda one: one.objective)
+        return self.fit(best.at, self.all, _FEW_STEPS)
 
-    def branches(self, full: PosteriorFit) -> list[PosteriorFit]:
-        """Fit friction that falls over a range of speeds, and a dead zone of the speed."""
+    def falling(self, full: PosteriorFit) -> PosteriorFit:
+        """Fit friction that falls over a range of speeds."""
         spring = {name: full.at[name] for name in ("spring_constant", "spring_preload")}
         springs = (spring, _overall_spring(self.model.record))
         top = float(np.quantile(self.model.record.slow.speed, 0.98))
-        falling = [
+        starts = [
             {
                 **self.base,
                 **one,
@@ -220,27 +236,32 @@ class _Search:
                 "stribeck_velocity": speed,
             }
             for speed in _STRIBECK_SPEEDS
-            if speed < top
+            if speed < max(top, 2 * _STRIBECK_SPEEDS[0])
             for share in (0.5, 0.75)
             for slip in (0.3, 1.0)
             for one in springs
         ]
-        found = []
-        if falling and "slip_force" not in self.known:
-            names = (*self.main, "slip_force", "stribeck_velocity")
-            first = self.from_moves(falling, names)
-            found.append(self.fit(first.at, (*self.all, "stribeck_velocity"), _FEW_STEPS))
+        first = self.from_moves(starts, (*self.main, "slip_force", "stribeck_velocity"))
+        return self.fit(first.at, (*self.all, "stribeck_velocity"), _FEW_STEPS)
+
+    def stopping(self, full: PosteriorFit) -> PosteriorFit:
+        """Fit a dead zone of the speed."""
         dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
-        found.append(self.fit(_nearest(self.model, dead)[0], self.all, _FEW_STEPS))
-        return found
+        return self.fit(_nearest(self.model, dead)[0], self.all, _FEW_STEPS)
 
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
-        plain = self.plain()
-        full = self.fit(plain.at, self.all, _FEW_STEPS)
-        if full.inflation < _SUSPICIOUS:
-            return full
-        return min([full, *self.branches(full)], key=lambda one: one.objective)
+        starts = [{**self.base, **_split(self.sliding, share)} for share in _DRY_SHARES]
+        plain = self.fit(_nearest(self.model, starts)[0], self.main, _FEW_STEPS)
+        best = self.fit(plain.at, self.all, _FEW_STEPS)
+        branches = [self.stopping]
+        if "slip_force" in self.all:
+            branches = [self.slipping, self.falling, self.stopping]
+        for branch in branches:
+            if best.inflation < _SUSPICIOUS or not self.may_go_on:
+                break
+            best = min(best, branch(best), key=lambda one: one.objective)
+        return best
 
 
 def search(record: FittedRecord, prior: Prior) -> PosteriorFit:

@@ -7,7 +7,6 @@ from valve_friction_ros.identification.robust.fitted_record import FittedRecord
 
 __all__ = ["inflation", "reading_weights", "stroke_cells"]
 
-_STILL = 0.01
 _MOVING = 0.1
 _FEWEST_BLOCKS = 8
 
@@ -20,9 +19,7 @@ def reading_weights(record: FittedRecord, spring_constant: float) -> NDArray[np.
     smoothing window, or of a rest, which keeps what the stem had when it stopped. L such cells
     count as one if each has the variance s_x²/n + L·s_F²/k².
     """
-    slow = record.slow
-    steps = np.arange(slow.speed.size) * record.period
-    still = np.interp(record.time, steps, slow.speed) < _STILL * np.quantile(slow.speed, 0.98)
+    still = record.still[np.rint(record.cells).astype(np.intp)]
     edges = np.flatnonzero(np.diff(still)) + 1
     bounds = np.concatenate([[0], edges, [still.size]])
     lengths = np.diff(bounds)
