@@ -1,5 +1,7 @@
 """How much each reading counts: noise of both sensors, and misfit that lasts."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,13 +24,16 @@ def reading_weights(record: FittedRecord, spring_constant: float) -> NDArray[np.
     still = record.still[np.rint(record.cells).astype(np.intp)]
     edges = np.flatnonzero(np.diff(still)) + 1
     bounds = np.concatenate([[0], edges, [still.size]])
-    lengths = np.diff(bounds)
-    lasting = np.repeat(np.where(still[bounds[:-1]], lengths, 0), lengths)
-    memory = np.maximum(lasting, record.memory)
+    lasting = np.full(still.size, record.memory)
+    variance = record.force_variance.copy()
+    reach = math.ceil(record.memory)
+    for begin, end in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        if still[begin]:
+            at_stop = record.force_variance[max(begin - reach, 0) : begin + reach]
+            variance[begin:end] = np.max(at_stop)
+            lasting[begin:end] = max(end - begin, record.memory)
     white = record.noise**2 / record.samples
-    weights: NDArray[np.float64] = 1.0 / np.sqrt(
-        white + memory * record.force_variance / spring_constant**2
-    )
+    weights: NDArray[np.float64] = 1.0 / np.sqrt(white + lasting * variance / spring_constant**2)
     return weights
 
 
