@@ -22,7 +22,7 @@ from valve_friction_ros.identification.robust.driven_stem import (
 )
 
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
-from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS
+from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.weights import reading_weights
 
 __all__ = ["ABSENT", "BroadModel", "Simulated"]
@@ -30,7 +30,10 @@ __all__ = ["ABSENT", "BroadModel", "Simulated"]
 ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
 """Nothing imperfect; the mass has to be set."""
 
-_STEP = 1e-6
+_LARGEST_COARSENESS = 10.0
+"""Of the imperfections but the timing, whose changes are wide already."""
+
+_STEP = 1e-5
 """Change of a main coordinate over its size by which to differentiate.
 
 The main coordinates nearly make up for one another, so their derivatives must be good to four
@@ -64,10 +67,14 @@ class BroadModel:
     usual_spring : float
         Spring constant, N/m, by which noise of the force counts as noise of the stem. It is the
         same throughout a fit, so that no fit gains by a spring that makes the noise count less.
+    coarseness : float
+        Factor of the changes by which to differentiate. Far from the end of a fit, wide ones see
+        over the kinks at which a stem stops or breaks away.
     """
 
     record: FittedRecord
     usual_spring: float
+    coarseness: float = 1.0
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:
@@ -135,8 +142,10 @@ class BroadModel:
         dry = max(abs(at["coulomb_friction"]), 1e-6) / spring
         if name == "slip_force":
             return IMPERFECTIONS[name].step * dry
+        if name in TIMING:
+            return IMPERFECTIONS[name].step * self.coarseness
         if name in IMPERFECTIONS:
-            return IMPERFECTIONS[name].step
+            return IMPERFECTIONS[name].step * min(self.coarseness, _LARGEST_COARSENESS)
         sizes = {
             "coulomb_friction": dry,
             "spring_preload": dry,
@@ -144,4 +153,4 @@ class BroadModel:
             "spring_constant": 1.0 / spring,
             "start_position": dry,
         }
-        return _STEP * sizes[name]
+        return _STEP * self.coarseness * sizes[name]

@@ -36,21 +36,21 @@ class Imperfection:
 
 IMPERFECTIONS: Mapping[str, Imperfection] = MappingProxyType(
     {
-        "delay": Imperfection(1.0, 2e-05, "clock offset (stem late or early)"),
-        "stem_lag": Imperfection(1.0, 2e-05, "lag of a slow stem sensor"),
-        "force_lag": Imperfection(1.0, 2e-05, "lag of the pressure: slow sensor or volume"),
-        "along_travel": Imperfection(0.1, 0.0001, "friction that changes along the travel"),
-        "in_record": Imperfection(0.1, 0.0001, "friction that changes during the record"),
-        "at_low_speed": Imperfection(0.1, 0.0001, "friction that falls with speed (Stribeck)"),
-        "curvature": Imperfection(0.02, 2e-05, "curved spring, area or flow force along travel"),
-        "cubic": Imperfection(0.01, 2e-05, "stiffness of the spring varies along travel"),
-        "drift": Imperfection(2e-3, 1e-05, "zero of the pressure drifts with time"),
-        "presliding": Imperfection(2e-5, 1e-06, "presliding (elastic creep before it slides)"),
+        "delay": Imperfection(1.0, 0.0002, "clock offset (stem late or early)"),
+        "stem_lag": Imperfection(1.0, 0.0002, "lag of a slow stem sensor"),
+        "force_lag": Imperfection(1.0, 0.0002, "lag of the pressure: slow sensor or volume"),
+        "along_travel": Imperfection(0.1, 0.001, "friction that changes along the travel"),
+        "in_record": Imperfection(0.1, 0.001, "friction that changes during the record"),
+        "at_low_speed": Imperfection(0.1, 0.001, "friction that falls with speed (Stribeck)"),
+        "curvature": Imperfection(0.02, 0.0002, "curved spring, area or flow force along travel"),
+        "cubic": Imperfection(0.01, 0.0002, "stiffness of the spring varies along travel"),
+        "drift": Imperfection(2e-3, 5e-05, "zero of the pressure drifts with time"),
+        "presliding": Imperfection(2e-5, 2e-06, "presliding (elastic creep before it slides)"),
         "limit_velocity": Imperfection(3e-4, 0.0001, "dead zone of speed (limit velocity DV)"),
-        "viscous_asymmetry": Imperfection(0.1, 0.0001, "asymmetric friction, upward and downward"),
-        "mass": Imperfection(2.0, 0.01, "mass"),
+        "viscous_asymmetry": Imperfection(0.1, 0.001, "asymmetric friction, upward and downward"),
+        "mass": Imperfection(2.0, 0.05, "mass"),
         "slip_force": Imperfection(0.5, 0.02, "static friction (slip jump)"),
-        "stribeck_velocity": Imperfection(4e-3, 1e-06, "friction that falls with speed"),
+        "stribeck_velocity": Imperfection(4e-3, 1e-05, "friction that falls with speed"),
     }
 )
 """By the name of the coordinate. Shares are of F_c (friction, slip force), of k times the measured

@@ -181,7 +181,7 @@ class _Problem:
         share = 1.0
         for name, change in zip(self.names, step.tolist(), strict=True):
             if name in _MOVED and change != 0:
-                size = 1e6 * self.model.step(self.at, name)
+                size = 1e5 * self.model.step(self.at, name) / self.model.coarseness
                 if name == "slip_force":
                     size = self.straight["coulomb_friction"] + 1e-12
                 share = min(share, _LARGEST_CHANGE * size / abs(change))

@@ -28,15 +28,15 @@ _SLOW = 0.02
 
 def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
     pauses = np.diff(signal.time) / signal.period
-    whole = np.rint(pauses)
-    scatter = float(np.std(pauses[whole <= 1.0]))
-    lost = float(np.sum(np.maximum(whole[whole <= _GAP] - 1.0, 0.0))) / signal.time.size
+    near = pauses[pauses <= _GAP]
+    scatter = float(np.std(pauses[pauses < 1.5]))
+    lost = max(1.0 - 1.0 / float(np.mean(near)), 0.0)
     remarks = []
     if scatter > _JITTER:
         remarks.append(f"the stamps of {name} jitter by {100 * scatter:.2g} % of their interval")
     if lost > _DROPS:
         remarks.append(f"{100 * lost:.2g} % of the samples of {name} are missing")
-    gaps = pauses[whole > _GAP]
+    gaps = pauses[pauses > _GAP]
     if gaps.size:
         seconds = float(np.sum(gaps)) * signal.period
         remarks.append(f"{gaps.size} gaps in {name}, {seconds:.2g} s together, are left out")

@@ -1,7 +1,7 @@
 """From a record to the best fit: starts from a regression, and branches where it is stuck."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,12 @@ _MOST_WORK = 40_000_000
 """Steps of simulations after which no other branch begins: about two seconds of a processor.
 
 A count and not a time, so that the answer does not depend on the machine."""
+
+_COARSENESS = 100.0
+"""Of the derivatives until a fit is near its end."""
+
+_CHORDS = 20
+"""Time of a simulation in which friction falls with speed over that of one in which it does not."""
 
 _TRIED = 2
 _FEW_STEPS = 6
@@ -141,8 +147,9 @@ class _Search:
     def __init__(self, record: FittedRecord, prior: Prior) -> None:
         self.work = 0
         self.sliding = _sliding(record)
-        self.model, self.prior = BroadModel(record, self.sliding.spring_constant), prior
-        self.stepwise = BroadModel(set_anew_at_rests(record), self.sliding.spring_constant)
+        self.exact = BroadModel(record, self.sliding.spring_constant)
+        self.model = replace(self.exact, coarseness=_COARSENESS)
+        self.stepwise = replace(self.model, record=set_anew_at_rests(record))
         self.known = dict(prior.fixed)
         self.centre = {"mass": prior.mass}
         self.spread = deviations(
@@ -182,8 +189,15 @@ class _Search:
         """Fit from a start, and count the work."""
         start = {**start, **self.known}
         found = fit(model or self.model, start, names, self.spread, self.centre, steps)
-        self.work += len(found.stages) * 2 * len(names) * self.model.record.force.size
+        slow = _CHORDS if found.at["stribeck_velocity"] > 0 else 1
+        self.work += len(found.stages) * 2 * len(names) * self.model.record.force.size * slow
         return found
+
+    def full(self, start: Coordinates, *more: str) -> PosteriorFit:
+        """Fit with all imperfections, and those that are named."""
+        names = (*self.all, *more)
+        near = self.fit(start, names, _MORE_STEPS)
+        return self.fit(near.at, names, _MORE_STEPS, self.exact)
 
     @property
     def may_go_on(self) -> bool:
@@ -220,7 +234,7 @@ class _Search:
         if self.may_go_on:
             trials.append(self.from_moves(starts, names))
         best = min(trials, key=lambda one: one.objective)
-        return self.fit(best.at, self.all, _FEW_STEPS)
+        return self.full(best.at)
 
     def falling(self, full: PosteriorFit) -> PosteriorFit:
         """Fit friction that falls over a range of speeds."""
@@ -241,19 +255,21 @@ class _Search:
             for slip in (0.3, 1.0)
             for one in springs
         ]
-        first = self.from_moves(starts, (*self.main, "slip_force", "stribeck_velocity"))
-        return self.fit(first.at, (*self.all, "stribeck_velocity"), _FEW_STEPS)
+        near = _nearest(self.stepwise, starts)[:1]
+        names = (*self.main, "slip_force", "stribeck_velocity")
+        first = self.fit(near[0], names, _FEW_STEPS, self.stepwise)
+        return self.full(first.at, "stribeck_velocity")
 
     def stopping(self, full: PosteriorFit) -> PosteriorFit:
         """Fit a dead zone of the speed."""
         dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
-        return self.fit(_nearest(self.model, dead)[0], self.all, _FEW_STEPS)
+        return self.full(_nearest(self.model, dead)[0])
 
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
         starts = [{**self.base, **_split(self.sliding, share)} for share in _DRY_SHARES]
         plain = self.fit(_nearest(self.model, starts)[0], self.main, _FEW_STEPS)
-        best = self.fit(plain.at, self.all, _FEW_STEPS)
+        best = self.full(plain.at)
         branches = [self.stopping]
         if "slip_force" in self.all:
             branches = [self.slipping, self.falling, self.stopping]
