@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.figures import (
-    FORCE,
     Case,
     friction_figure,
     identification_figure,
@@ -16,7 +15,7 @@ from valve_friction_ros.figures import (
 )
 from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
+from valve_friction_ros.model import BENCH_VALVE, Drive, Recording, Valve
 
 NAN = math.nan
 LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
@@ -126,7 +125,8 @@ class TestPanels:
         assert low < found.estimate.coulomb_friction < high
 
     def test_force_of_a_machine_without_diaphragm(self, record, result):
-        found = panels(identification_figure(result, FORCE))
+        force = dataclasses.replace(record, driven_by=Drive.FORCE)
+        found = panels(identification_figure(dataclasses.replace(result, recording=force)))
         assert found["pressure"].get_ylabel() == "drive force [N]"
         assert found["signature"].get_xlabel() == "drive force [N]"
         np.testing.assert_array_equal(found["pressure"].lines[0].get_ydata(), record.pressure)
@@ -242,7 +242,7 @@ def test_case_of_a_result(result):
     assert case.threshold == result.estimate.threshold
     assert case.friction is result.parameters["coulomb_friction"]
     assert case.simulated is result.stem.simulated
-    assert math.isclose(case.drive.pascals, 1e3)
+    assert case.recording.driven_by is Drive.PRESSURE
 
 
 class TestPictures:

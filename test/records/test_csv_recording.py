@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE, Valve
+from valve_friction_ros.model import BENCH_VALVE, Drive, Valve
 from valve_friction_ros.records.csv_recording import (
     CsvColumns,
     CsvFormat,
@@ -113,6 +113,13 @@ class TestGoodFiles:
         path = write(["time_s,position_m,force_n", *rows(TIME, POSITION, force)])
         record = read_recording(path, Valve(0.5, pressure_reference=8.0))
         np.testing.assert_array_equal(record.pressure, 208.0 + 4 * np.arange(40))
+
+    def test_force_without_a_diaphragm_stays_a_force(self, write):
+        force = 100.0 + 2 * np.arange(40)
+        path = write(["time_s,position_m,force_n", *rows(TIME, POSITION, force)])
+        record = read_recording(path, Valve())
+        assert record.driven_by is Drive.FORCE
+        np.testing.assert_array_equal(record.drive, force)
 
     def test_pressure_goes_before_force(self, write):
         path = write([HEADER + ",force_n", *(row + ",1.0" for row in GOOD)])

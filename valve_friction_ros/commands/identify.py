@@ -137,4 +137,4 @@ def run(options: argparse.Namespace) -> int:
     finally:  # a closed output costs no picture, and a full disk no numbers
         for each, outcome, _ in results:
             if isinstance(outcome, Result):
-                files.write(each, description, outcome, baseline)
+                files.write(each, outcome, baseline)

@@ -1,6 +1,6 @@
 """Figures of records and identifications; no ROS."""
 
-from valve_friction_ros.figures.case import FORCE, PRESSURE, Case, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.friction_figure import friction_figure, identification_figure
 from valve_friction_ros.figures.picture import require_picture_file, save_picture
 from valve_friction_ros.figures.signature_figure import draw_breakaway_points, signature_figure
@@ -8,10 +8,7 @@ from valve_friction_ros.figures.trend_figure import trend_figure
 from valve_friction_ros.figures.validation_figure import validation_figure
 
 __all__ = [
-    "FORCE",
-    "PRESSURE",
     "Case",
-    "DriveScale",
     "draw_breakaway_points",
     "friction_figure",
     "identification_figure",

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,21 +9,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification import Parameter, Result
 from valve_friction_ros.model import Recording
 
-__all__ = ["FORCE", "PRESSURE", "Case", "DriveScale"]
-
-
-class DriveScale(NamedTuple):
-    """Unit of the pressure in a figure: the axis label, and the size of the unit in Pa."""
-
-    label: str
-    pascals: float
-
-
-PRESSURE = DriveScale("pressure [kPa]", 1e3)
-"""A valve's actuator pressure, in the paper's unit."""
-
-FORCE = DriveScale("drive force [N]", 1.0)
-"""A machine without a diaphragm, whose recording holds 1 Pa for 1 N."""
+__all__ = ["Case"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +21,7 @@ class Case:
     label : str
         Name in the legend.
     recording : Recording
-        Pressure and stem position.
+        Drive and stem position.
     thresholds : ndarray of float, shape (S,)
         δv(s), m/s.
     coulomb_friction : ndarray of float, shape (S,)
@@ -47,8 +32,6 @@ class Case:
         The chosen threshold, m/s.
     friction : Parameter
         The refined Coulomb friction with its interval and verdict.
-    drive : DriveScale
-        Unit of the pressure.
     simulated : ndarray of float, shape (m,), or None
         Position of the refined model's stem, m, at m times evenly spread over the record.
     """
@@ -60,7 +43,6 @@ class Case:
     sigma: NDArray[np.float64] = field(repr=False)
     threshold: float
     friction: Parameter
-    drive: DriveScale = PRESSURE
     simulated: NDArray[np.float64] | None = field(default=None, repr=False)
 
     @classmethod
@@ -68,7 +50,6 @@ class Case:
         cls,
         label: str,
         result: Result,
-        drive: DriveScale = PRESSURE,
     ) -> "Case":
         """Return the case of a result with a sweep."""
         estimate = result.estimate
@@ -82,12 +63,11 @@ class Case:
             estimate.sweep.sigma,
             estimate.threshold,
             result.parameters["coulomb_friction"],
-            drive,
             None if result.stem is None else result.stem.simulated,
         )
 
     @classmethod
-    def without_sweep(cls, label: str, result: Result, drive: DriveScale = PRESSURE) -> "Case":
+    def without_sweep(cls, label: str, result: Result) -> "Case":
         """Return the case of a result as a record with a simulated stem alone."""
         nothing = np.empty(0)
         return cls(
@@ -98,7 +78,6 @@ class Case:
             nothing,
             math.nan,
             result.parameters["coulomb_friction"],
-            drive,
             None if result.stem is None else result.stem.simulated,
         )
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.page import dress, titled_figure
 from valve_friction_ros.figures.panels import (
     COLOURS,
@@ -70,21 +70,21 @@ def friction_figure(cases: Sequence[Case], title: str) -> Figure:
     return figure
 
 
-def identification_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
+def identification_figure(result: Result) -> Figure:
     """Draw a recording and its identification, each number with its verdict."""
     title = _title(result, result.valve)
     if result.signature is not None:
-        return signature_figure(result, title, drive)
+        return signature_figure(result, title)
     if result.estimate is None:
-        return _figure_without_sweep(result, title, drive)
-    return friction_figure([Case.of("recording", result, drive)], title)
+        return _figure_without_sweep(result, title)
+    return friction_figure([Case.of("recording", result)], title)
 
 
-def _figure_without_sweep(result: Result, title: str, drive: DriveScale) -> Figure:
+def _figure_without_sweep(result: Result, title: str) -> Figure:
     figure = titled_figure(title)
     panels = figure.subplot_mosaic([["pressure", "signature"], ["stem", "signature"]])
     panels["stem"].sharex(panels["pressure"])
-    case = Case.without_sweep("recording", result, drive)
+    case = Case.without_sweep("recording", result)
     draw_record(panels["pressure"], panels["stem"], [case])
     draw_signature(panels["signature"], [case])
     dress(panels.values())

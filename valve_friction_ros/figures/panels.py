@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from valve_friction_ros.figures.case import Case, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.identification import Parameter
 from valve_friction_ros.model import Recording
 
 __all__ = [
     "COLOURS",
     "draw_coulomb_sweep",
-    "draw_pressure",
+    "draw_drive",
     "draw_record",
     "draw_sigma_sweep",
     "draw_signature",
@@ -35,14 +35,14 @@ def thinned(size: int) -> slice:
 
 
 def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw pressure and stem position over the time since the first record began."""
+    """Draw drive and stem position over the time since the first record began."""
     origin = cases[0].recording.start_time
     for case, colour in zip(cases, COLOURS, strict=False):
         recording = case.recording
         some = thinned(len(recording))
         time = (recording.time + recording.start_time - origin)[some]
         pressure_axes.plot(
-            time, recording.pressure[some] / case.drive.pascals, color=colour, lw=1.2
+            time, recording.drive[some] / recording.driven_by.size, color=colour, lw=1.2
         )
         stem_axes.plot(time, recording.position[some] * 1e3, color=colour, label=case.label, lw=1.2)
         if case.simulated is not None:
@@ -50,16 +50,16 @@ def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> 
             few = thinned(case.simulated.size)
             stem_axes.plot(spread[few], case.simulated[few] * 1e3, "k:", lw=1.0)
             stem_axes.set_title("stem (dotted: refined model)", loc="right", fontsize="small")
-    pressure_axes.set_ylabel(cases[0].drive.label)
+    pressure_axes.set_ylabel(cases[0].recording.driven_by.label)
     pressure_axes.tick_params(labelbottom=False)
     stem_axes.set_ylabel("stem [mm]")
     stem_axes.set_xlabel("time [s]")
 
 
-def draw_pressure(axes: Axes, recording: Recording, drive: DriveScale, colour: str) -> None:
-    """Draw the pressure over the time since the record began."""
-    some = thinned(len(recording))
-    axes.plot(recording.time[some], recording.pressure[some] / drive.pascals, color=colour, lw=1.2)
+def draw_drive(axes: Axes, recording: Recording, colour: str) -> None:
+    """Draw the drive over the time since the record began."""
+    some, drive = thinned(len(recording)), recording.driven_by
+    axes.plot(recording.time[some], recording.drive[some] / drive.size, color=colour, lw=1.2)
     axes.set_ylabel(drive.label)
 
 
@@ -74,17 +74,17 @@ def draw_stem(axes: Axes, recording: Recording, simulated: NDArray[np.float64]) 
 
 
 def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw the valve signature: stem position over pressure."""
+    """Draw the valve signature: stem position over the drive."""
     for case, colour in zip(cases, COLOURS, strict=False):
-        some = thinned(len(case.recording))
+        recording, some = case.recording, thinned(len(case.recording))
         axes.plot(
-            case.recording.pressure[some] / case.drive.pascals,
-            case.recording.position[some] * 1e3,
+            recording.drive[some] / recording.driven_by.size,
+            recording.position[some] * 1e3,
             color=colour,
             lw=1.2,
             label=case.label,
         )
-    axes.set_xlabel(cases[0].drive.label)
+    axes.set_xlabel(cases[0].recording.driven_by.label)
     axes.set_ylabel("stem [mm]")
     axes.set_title("valve signature")
 

@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from valve_friction_ros.figures.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.page import dress
 from valve_friction_ros.figures.panels import (
     COLOURS,
     draw_coulomb_sweep,
-    draw_pressure,
+    draw_drive,
     draw_sigma_sweep,
     thinned,
 )
@@ -52,12 +52,12 @@ def _paper_figure(height: float) -> Figure:
     return Figure(figsize=(_WIDTH, height), layout="constrained")
 
 
-def record_figure(recording: Recording, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw pressure and measured stem position over the time."""
+def record_figure(recording: Recording) -> Figure:
+    """Draw drive and measured stem position over the time."""
     figure = _paper_figure(2.9)
     pressure, stem = figure.subplots(2, 1, sharex=True)
     some = thinned(len(recording))
-    draw_pressure(pressure, recording, drive, COLOURS[0])
+    draw_drive(pressure, recording, COLOURS[0])
     stem.plot(recording.time[some], recording.position[some] * 1e3, color=COLOURS[0], lw=1.0)
     stem.set_ylabel("stem [mm]")
     stem.set_xlabel("time [s]")
@@ -65,16 +65,21 @@ def record_figure(recording: Recording, drive: DriveScale = PRESSURE) -> Figure:
     return figure
 
 
-def signature_loop_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw stem position over pressure; by the force balance with P1, P2 and the sliding lines."""
+def signature_loop_figure(result: Result) -> Figure:
+    """Draw stem position over the drive; by the force balance with P1, P2 and the sliding lines."""
     figure = _paper_figure(3.4)
     axes, recording = figure.subplots(), result.recording
     if result.signature is not None:
-        draw_signature_loop(axes, recording, result.valve, result.signature, drive)
+        draw_signature_loop(axes, recording, result.valve, result.signature)
     else:
         some = thinned(len(recording))
-        pressure = recording.pressure[some] / drive.pascals
-        axes.plot(pressure, recording.position[some] * 1e3, color=COLOURS[0], lw=1.0)
+        drive = recording.driven_by
+        axes.plot(
+            recording.drive[some] / drive.size,
+            recording.position[some] * 1e3,
+            color=COLOURS[0],
+            lw=1.0,
+        )
         axes.set_xlabel(drive.label)
         axes.set_ylabel("stem [mm]")
     dress((axes,))
@@ -93,11 +98,11 @@ def chosen_region(sweep: Sweep, threshold: float) -> tuple[float, float]:
     return float(sweep.thresholds[min(first, choice)]), float(sweep.thresholds[max(last, choice)])
 
 
-def sweep_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
+def sweep_figure(result: Result) -> Figure:
     """Draw F_c, σ_s and R²_s over the threshold δv, the chosen region shaded."""
     if result.estimate is None:
         raise ValueError(f"the method {result.method} has no sweep to draw")
-    case, sweep = Case.of("recording", result, drive), result.estimate.sweep
+    case, sweep = Case.of("recording", result), result.estimate.sweep
     figure = _paper_figure(4.5)
     coulomb, sigma, r_squared = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
     draw_coulomb_sweep(coulomb, [case])

@@ -4,27 +4,26 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures.case import PRESSURE, DriveScale
 from valve_friction_ros.figures.page import dress, titled_figure
-from valve_friction_ros.figures.panels import COLOURS, draw_pressure, draw_stem, thinned
+from valve_friction_ros.figures.panels import COLOURS, draw_drive, draw_stem, thinned
 from valve_friction_ros.identification import (
     Result,
     SignatureStroke,
     ValveSignature,
 )
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.model import Drive, Recording, Valve
 
 __all__ = ["draw_breakaway_points", "draw_signature_loop", "signature_figure"]
 
 
 def draw_breakaway_points(
-    axes: Axes, signature: ValveSignature, drive: DriveScale = PRESSURE, colour: str = "black"
+    axes: Axes, signature: ValveSignature, drive: Drive, colour: str = "black"
 ) -> None:
-    """Mark P1 and P2 of every stroke on axes of stem position over pressure."""
+    """Mark P1 and P2 of every stroke on axes of stem position over the drive."""
     ways = (("$P_1$", "^", signature.upward_points), ("$P_2$", "v", signature.downward_points))
     for label, marker, points in ways:
         axes.plot(
-            [point.pressure / drive.pascals for point in points],
+            [point.drive / drive.size for point in points],
             [point.position * 1e3 for point in points],
             marker,
             color=colour,
@@ -40,7 +39,6 @@ def draw_signature_loop(
     recording: Recording,
     valve: Valve,
     signature: ValveSignature,
-    drive: DriveScale = PRESSURE,
 ) -> None:
     """Draw the valve signature with P1 and P2, and the lines of the sliding stem.
 
@@ -49,37 +47,37 @@ def draw_signature_loop(
     axes : Axes
         To draw on.
     recording : Recording
-        Pressure and stem position.
+        Drive and stem position.
     valve : Valve
-        Converts forces into pressures.
+        Converts forces into the drive.
     signature : ValveSignature
         The signature of the recording.
-    drive : DriveScale
-        Unit of the pressure.
     """
     some = thinned(len(recording))
-    pressure = recording.pressure[some] / drive.pascals
-    axes.plot(pressure, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
+    drive = recording.driven_by
+    axes.plot(
+        recording.drive[some] / drive.size, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2
+    )
     for stroke, colour in zip(_first_of_each_way(signature), COLOURS[1:], strict=False):
         place = stroke.sliding.position[[0, -1]]
         level = float(
             np.mean(stroke.sliding.force - signature.spring_constant * stroke.sliding.position)
         )
-        line = valve.actuator_pressure(level + signature.spring_constant * place) / drive.pascals
+        line = valve.actuator_drive(level + signature.spring_constant * place) / drive.size
         label = f"slides {'up' if stroke.direction > 0 else 'down'}, slope $S_a$/k"
         axes.plot(line, place * 1e3, "--", color=colour, lw=1.6, label=label)
     draw_breakaway_points(axes, signature, drive)
     axes.set_xlabel(drive.label)
     axes.set_ylabel("stem [mm]")
-    width = signature.dead_zone / drive.pascals
-    unit = drive.label.partition("[")[2].rstrip("]")
+    width = signature.dead_zone / drive.size
     axes.set_title(
-        f"valve signature: dead zone {width:.4g} {unit}, x̄ {signature.position_bias * 1e3:.3g} mm"
+        f"valve signature: dead zone {width:.4g} {drive.unit}, "
+        f"x̄ {signature.position_bias * 1e3:.3g} mm"
     )
     axes.legend(loc="upper left", frameon=False)
 
 
-def signature_figure(result: Result, title: str, drive: DriveScale = PRESSURE) -> Figure:
+def signature_figure(result: Result, title: str) -> Figure:
     """Draw a recording, its valve signature with P1 and P2, and the lines of the sliding stem.
 
     Parameters
@@ -88,8 +86,6 @@ def signature_figure(result: Result, title: str, drive: DriveScale = PRESSURE) -
         A result with a valve signature.
     title : str
         Printed above the panels.
-    drive : DriveScale
-        Unit of the pressure.
 
     Returns
     -------
@@ -104,7 +100,7 @@ def signature_figure(result: Result, title: str, drive: DriveScale = PRESSURE) -
     recording, signature = result.recording, result.signature
     if signature is None or result.stem is None:
         raise ValueError(f"the method {result.method} has no valve signature to draw")
-    draw_pressure(panels["pressure"], recording, drive, COLOURS[0])
+    draw_drive(panels["pressure"], recording, COLOURS[0])
     panels["pressure"].tick_params(labelbottom=False)
     draw_stem(panels["stem"], recording, result.stem.simulated)
     points = [stroke.breakaway for stroke in signature.strokes if stroke.breakaway is not None]
@@ -117,7 +113,7 @@ def signature_figure(result: Result, title: str, drive: DriveScale = PRESSURE) -
         zorder=4,
     )
     panels["stem"].set_title("stem (dotted: model; ●: breakaway)", loc="right", fontsize="small")
-    draw_signature_loop(panels["signature"], recording, result.valve, signature, drive)
+    draw_signature_loop(panels["signature"], recording, result.valve, signature)
     dress(panels.values())
     return figure
 

@@ -4,9 +4,8 @@ import math
 
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures.case import PRESSURE, DriveScale
 from valve_friction_ros.figures.page import dress, titled_figure
-from valve_friction_ros.figures.panels import COLOURS, draw_pressure, draw_stem, thinned
+from valve_friction_ros.figures.panels import COLOURS, draw_drive, draw_stem, thinned
 from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import Validation
 from valve_friction_ros.model import Valve
@@ -14,8 +13,8 @@ from valve_friction_ros.model import Valve
 __all__ = ["validation_figure"]
 
 
-def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw measured and simulated stem over the time, the residual, and the pressure.
+def validation_figure(validation: Validation, valve: Valve) -> Figure:
+    """Draw measured and simulated stem over the time, the residual, and the drive.
 
     Parameters
     ----------
@@ -23,8 +22,6 @@ def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = 
         Record and simulated stem.
     valve : Valve
         Gives the travel, for the title.
-    drive : DriveScale
-        Unit of the pressure.
 
     Returns
     -------
@@ -47,7 +44,7 @@ def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = 
     panels["stem"].set_title("stem (dotted: simulated)", loc="right", fontsize="small")
     panels["residual"].plot(time, validation.residual[some] * 1e3, color=COLOURS[1], lw=0.9)
     panels["residual"].set_ylabel("simulated −\nmeasured [mm]")
-    draw_pressure(panels["pressure"], recording, drive, COLOURS[2])
+    draw_drive(panels["pressure"], recording, COLOURS[2])
     for name in ("stem", "residual"):
         panels[name].set_xlabel("")
     panels["pressure"].set_xlabel("time [s]")

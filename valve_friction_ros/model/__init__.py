@@ -8,6 +8,7 @@ from valve_friction_ros.model.bench import (
     LOW_FRICTION,
     PRESSURE_RANGE,
 )
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.excitations import (
     Excitation,
     IsaSteps,
@@ -38,6 +39,7 @@ __all__ = [
     "HIGH_FRICTION",
     "LOW_FRICTION",
     "PRESSURE_RANGE",
+    "Drive",
     "Excitation",
     "IsaSteps",
     "KarnoppParameters",

@@ -53,7 +53,7 @@ class StampedSignal:
 
 @dataclass(frozen=True, eq=False)
 class StampedRecord:
-    """Pressure (Pa) and stem position (m), their times counted from one origin."""
+    """Drive (Pa or N) and stem position (m), their times counted from one origin."""
 
-    pressure: StampedSignal
+    drive: StampedSignal
     position: StampedSignal

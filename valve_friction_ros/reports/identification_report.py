@@ -88,9 +88,9 @@ def _friction(record: IdentifiedRecord) -> Section:
 
 
 def _record(record: IdentifiedRecord) -> Section:
-    drive = record.drive.label.partition(" [")[0]
+    drive = record.recording.driven_by.words
     picture = Picture(
-        record_figure(record.recording, record.drive),
+        record_figure(record.recording),
         f"The record: {drive} and stem position over the time.",
         f"Two curves over {record.recording.duration:.3g} s: {drive} above, stem position below.",
     )
@@ -98,16 +98,16 @@ def _record(record: IdentifiedRecord) -> Section:
 
 
 def _signature(record: IdentifiedRecord) -> Section:
-    result, drive = record.result, record.drive.label.partition(" [")[0]
+    result, drive = record.result, record.recording.driven_by.words
     caption = f"Stem position over {drive}: the wider the loop, the more friction."
     if result.signature is not None:
         share = percentage(result.signature.dead_zone_share)
         caption += (
             f" The stem breaks away upwards at P₁ and downwards at P₂; on the dashed lines it "
-            f"slides. The dead zone, the loop's width, is {share} of the pressure's span."
+            f"slides. The dead zone, the loop's width, is {share} of the {drive}'s span."
         )
     picture = Picture(
-        signature_loop_figure(result, record.drive),
+        signature_loop_figure(result),
         caption,
         f"A loop of stem position over {drive}.",
     )
@@ -124,7 +124,7 @@ def _sweep(record: IdentifiedRecord, estimate: Estimate) -> Section:
         f"{100 * SETTLED_SHARE:.0f} % of that."
     )
     picture = Picture(
-        sweep_figure(record.result, record.drive),
+        sweep_figure(record.result),
         caption,
         "Coulomb friction, standard deviation and correlation over the velocity threshold, with "
         "the chosen threshold and the region around it marked.",
@@ -139,7 +139,7 @@ def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section
     picture = Picture(
         comparison_figure(comparison),
         f"The measured stem and, dotted, the stem of the identified model under the same "
-        f"{record.drive.label.partition(' [')[0]}. Fit {100 * result.fit:.2f} %, rms "
+        f"{record.recording.driven_by.words}. Fit {100 * result.fit:.2f} %, rms "
         f"{result.rms * 1e6:.3g} µm{of_travel}.",
         "Measured and simulated stem position over the time, in one panel.",
     )

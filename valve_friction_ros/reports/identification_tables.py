@@ -134,8 +134,8 @@ def friction_table(record: IdentifiedRecord) -> Table:
 
 def record_table(record: IdentifiedRecord) -> Table:
     """Return the source of the record, and its extent."""
-    recording, drive = record.recording, record.drive
-    pressure, position = recording.pressure / drive.pascals, recording.position * 1e3
+    recording, drive = record.recording, record.recording.driven_by
+    shown, position = recording.drive / drive.size, recording.position * 1e3
     rows = [("source", record.source)]
     if _DATED[0] < recording.start_time < _DATED[1]:
         began = datetime.fromtimestamp(recording.start_time, timezone.utc)
@@ -143,7 +143,7 @@ def record_table(record: IdentifiedRecord) -> Table:
     rows += [
         ("duration", f"{recording.duration:.4g} s"),
         ("samples", f"{len(recording)}, sampled every {recording.sample_period * 1e3:.4g} ms"),
-        (drive.label, f"{pressure.min():.5g} to {pressure.max():.5g}"),
+        (drive.label, f"{shown.min():.5g} to {shown.max():.5g}"),
         ("stem [mm]", f"{position.min():.4g} to {position.max():.4g}"),
     ]
     return _pairs(rows, "record", "extent")
@@ -176,8 +176,14 @@ def settings_table(record: IdentifiedRecord) -> Table:
         ("given parameters", fixed or "none"),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
         ("mass where the record does not determine it", f"{settings.assumed_mass:g} kg"),
-        ("diaphragm area S_a", f"{valve.diaphragm_area:g} m²"),
-        ("pressure reference P_ref", f"{valve.pressure_reference:g} Pa"),
+        *(
+            []
+            if valve.diaphragm_area is None
+            else [
+                ("diaphragm area S_a", f"{valve.diaphragm_area:g} m²"),
+                ("pressure reference P_ref", f"{valve.pressure_reference:g} Pa"),
+            ]
+        ),
         (
             "travel",
             f"{valve.travel * 1e3:g} mm" if math.isfinite(valve.travel) else "without stops",

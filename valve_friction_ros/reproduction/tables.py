@@ -223,7 +223,7 @@ def step_summary_table(results: Sequence[BenchResult]) -> Table:
     """Show dead band and resolution of the ISA test, and the dead band that friction predicts."""
     rows = []
     for one in results:
-        expected = 2 * one.bench.truth.static_friction / one.bench.valve.diaphragm_area
+        expected = 2 * one.bench.truth.static_friction / one.bench.valve.force_per_drive
         band, resolution = one.steps.dead_band, one.steps.resolution
         rows.append(
             (

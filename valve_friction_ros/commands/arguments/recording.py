@@ -23,7 +23,6 @@ from valve_friction_ros.records.units import (
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 
 __all__ = [
-    "DIRECT_DRIVE",
     "add_reading_arguments",
     "add_recording_arguments",
     "described_valve",
@@ -32,9 +31,6 @@ __all__ = [
     "require_one",
     "valve_of",
 ]
-
-DIRECT_DRIVE = ValveFile(Valve(diaphragm_area=1.0), MappingProxyType({}))
-"""A machine without a diaphragm: 1 Pa of "pressure" is 1 N of force."""
 
 _TABS = {"tab": "\t", "\\t": "\t"}
 """What people type for a tab, which a shell makes hard to type."""
@@ -153,7 +149,7 @@ def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) 
         return read_valve_file(valve_file)
     if not holds_force(recording, reading):
         raise ValueError("pressure needs the diaphragm_area: give a valve file by --valve")
-    return DIRECT_DRIVE
+    return ValveFile(Valve(), MappingProxyType({}))
 
 
 def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from valve_friction_ros.commands.arguments.recording import DIRECT_DRIVE, require_one
+from valve_friction_ros.commands.arguments.recording import require_one
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Result
 from valve_friction_ros.records.recorded_valve import RecordedValve
-from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["IdentificationFiles", "add_file_arguments", "baseline_from", "identification_files"]
 
@@ -71,7 +70,6 @@ class IdentificationFiles(NamedTuple):
     def write(
         self,
         recorded: RecordedValve,
-        description: ValveFile,
         result: Result,
         baseline: Baseline | None,
     ) -> None:
@@ -81,9 +79,8 @@ class IdentificationFiles(NamedTuple):
 
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
-        drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
         if self.plot is not None:
-            figures.save_picture(figures.identification_figure(result, drive), self.plot)
+            figures.save_picture(figures.identification_figure(result), self.plot)
         if self.report is not None:
             from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
 
@@ -92,7 +89,6 @@ class IdentificationFiles(NamedTuple):
                 source=recorded.label,
                 result=result,
                 baseline=baseline,
-                drive=drive,
                 notes=recorded.notes,
             )
             reports.write_report(reports.identification_report(record), self.report)

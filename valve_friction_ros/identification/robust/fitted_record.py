@@ -219,8 +219,8 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     RefusalError
         If the signals have too little time in common.
     """
-    begin = max(record.pressure.time[0], record.position.time[0])
-    end = min(record.pressure.time[-1], record.position.time[-1])
+    begin = max(record.drive.time[0], record.position.time[0])
+    end = min(record.drive.time[-1], record.position.time[-1])
     inside = (record.position.time >= begin) & (record.position.time <= end)
     if np.count_nonzero(inside) < _FEWEST:
         raise RefusalError(
@@ -228,7 +228,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
             f"the record is too short; at least {_FEWEST} are needed"
         )
     stem = StampedSignal(record.position.time[inside] - begin, record.position.value[inside])
-    drive = StampedSignal(record.pressure.time - begin, record.pressure.value)
+    drive = StampedSignal(record.drive.time - begin, record.drive.value)
     finest = min(stem.period, drive.period)
     grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
     raw = np.interp(grid, drive.time, drive.value)
@@ -272,7 +272,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
         np.asarray(time, dtype=np.float64),
         count.astype(np.float64),
         stem_noise,
-        np.interp(time, grid, leverage) * (valve.diaphragm_area * pressure_noise) ** 2,
+        np.interp(time, grid, leverage) * (valve.force_per_drive * pressure_noise) ** 2,
         max(window * finest / (_MEMORY * period), 1.0),
         _slow_view(grid, np.interp(grid, time, position), force, period),
         valve.travel,

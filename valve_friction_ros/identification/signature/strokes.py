@@ -65,8 +65,8 @@ class BreakawayPoint(NamedTuple):
         Since the first sample, s.
     position : float
         Stem position of the rest, m.
-    pressure : float
-        Pressure at that instant, Pa.
+    drive : float
+        Pressure, Pa, or force, N, at that instant.
     force : float
         Actuator force F_ext at that instant, N.
     speed : float
@@ -75,7 +75,7 @@ class BreakawayPoint(NamedTuple):
 
     time: float
     position: float
-    pressure: float
+    drive: float
     force: float
     speed: float
 
@@ -165,7 +165,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
 
     A stroke is a run at more than half the usual speed over at least a tenth of the stem's range.
     The breakaway is located by `fit_onset`, from the rest before the stroke and the first 5 % of
-    its way; a parabola through as many samples gives the pressure there.
+    its way; a parabola through as many samples gives the drive there.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
         In the order of time.
     """
     position, period = recording.position, recording.sample_period
-    force = valve.actuator_force(recording.pressure)
+    force = valve.actuator_force(recording.drive)
     if len(recording) < window:
         return ()
     velocity, _, margin = measured(recording).derivatives(window, _ORDER)
@@ -248,19 +248,19 @@ def _breakaway(
         return None
     around = slice(first, begin + length)
     time = recording.time[around]
-    pressure_then = Polynomial.fit(time, recording.pressure[around], 2)
-    rate = float(pressure_then.deriv()(begin * period))
-    growth = float(pressure_then.deriv(2)(begin * period)) / rate if rate else 0.0
+    drive_then = Polynomial.fit(time, recording.drive[around], 2)
+    rate = float(drive_then.deriv()(begin * period))
+    growth = float(drive_then.deriv(2)(begin * period)) / rate if rate else 0.0
     most = 1 / float(time[-1] - time[0])
     growth = min(max(growth, -most), most)
     onset = fit_onset(time, position[around], begin * period, growth)
     middle = round(onset.time / period)
     near = slice(max(middle - length // 2, first), middle + length // 2 + 1)
-    pressure = float(Polynomial.fit(recording.time[near], recording.pressure[near], 2)(onset.time))
+    drive = float(Polynomial.fit(recording.time[near], recording.drive[near], 2)(onset.time))
     return BreakawayPoint(
         onset.time,
         onset.level,
-        pressure,
-        valve.diaphragm_area * (pressure - valve.pressure_reference),
+        drive,
+        valve.actuator_force(drive),
         onset.jump_speed,
     )

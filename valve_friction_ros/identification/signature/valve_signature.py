@@ -13,6 +13,7 @@ from valve_friction_ros.identification.signature.strokes import (
     find_strokes,
     velocity_window,
 )
+from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -59,8 +60,8 @@ class ValveSignature:
     position_bias : float
         x̄ of (14), m, between the mean P1 and the mean P2.
     dead_zone : float
-        Width of the loop in pressure, Pa: the difference of the pressures at which the stem slides
-        up and down through one position, 2·(F_c + F_v·|ẋ|)/S_a.
+        Width of the loop, Pa or N: the difference of the drives at which the stem slides up and
+        down through one position, 2·(F_c + F_v·|ẋ|)/S_a.
     dead_zone_share : float
         The same as a share of the pressure's span in the record.
     standard_errors : mapping of str to float
@@ -173,6 +174,7 @@ def valve_signature(
     RefusalError
         If a direction has no such stroke, or the stem does not slide at a constant speed.
     """
+    require_drive(recording, valve)
     window = window or velocity_window(recording)
     strokes = find_strokes(recording, valve, window)
     ways = [[one for one in strokes if one.direction == way] for way in (1, -1)]
@@ -195,7 +197,7 @@ def valve_signature(
         return {
             "spring_constant": spring_constant,
             "position_bias": mean_position_bias(ways, spring_constant),
-            "dead_zone": 2 * sliding_friction(ways, spring_constant) / valve.diaphragm_area,
+            "dead_zone": 2 * sliding_friction(ways, spring_constant) / valve.force_per_drive,
         }
 
     pointed = [[stroke for stroke in way if stroke.breakaway is not None] for way in ways]
@@ -203,7 +205,7 @@ def valve_signature(
     return ValveSignature(
         strokes,
         **found.values,
-        dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.pressure)),
+        dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.drive)),
         standard_errors=MappingProxyType(dict(found.standard_errors)),
         window=window,
     )
