@@ -94,9 +94,8 @@ class TestPanels:
         assert set(upright.get_xdata()) == {published.threshold}
 
     def test_a_method_without_a_sweep_has_none_to_draw(self, result):
-        alone = dataclasses.replace(result, estimate=None)
-        with pytest.raises(ValueError, match="the method refined has no sweep to draw"):
-            Case.of("recording", alone)
+        alone = dataclasses.replace(result, exhibit=None)
+        assert Case.of("recording", alone).drawing.panels == ()
         assert {*panels(identification_figure(alone))} == {"pressure", "stem", "signature"}
 
     def test_the_refined_friction_with_its_band_and_verdict(self, with_parameters):
@@ -238,9 +237,10 @@ class TestSeveralCases:
 
 def test_case_of_a_result(result):
     case = Case.of("loose", result)
-    assert case.chosen_coulomb_friction == result.estimate.coulomb_friction
-    assert case.threshold == result.estimate.threshold
-    assert case.friction is result.parameters["coulomb_friction"]
+    coulomb, sigma, _ = case.drawing.panels
+    assert coulomb.curves[1].y == [result.estimate.coulomb_friction]
+    assert sigma.chosen == result.estimate.threshold
+    assert coulomb.level is result.parameters["coulomb_friction"]
     assert case.simulated is result.stem.simulated
     assert case.recording.driven_by is Drive.PRESSURE
 

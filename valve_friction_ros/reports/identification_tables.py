@@ -164,14 +164,7 @@ def settings_table(record: IdentifiedRecord) -> Table:
             + ("chosen from the noise of the record" if window is None else "as given"),
         ),
     ]
-    if result.estimate is not None:
-        rows.append(
-            (
-                "of the published method",
-                f"window {settings.published_window} samples, polynomial order "
-                f"{settings.order}, {settings.steps} thresholds",
-            )
-        )
+    rows += (result.drawing.settings or {}).items()
     rows += [
         ("given parameters", fixed or "none"),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),

@@ -8,7 +8,14 @@ from rich.table import Table
 
 from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
 from valve_friction_ros.figures import Case
-from valve_friction_ros.identification import UNITS, Parameter, Verdict, two_digits
+from valve_friction_ros.identification import (
+    UNITS,
+    Drawing,
+    Parameter,
+    Verdict,
+    sweep_panels,
+    two_digits,
+)
 from valve_friction_ros.model import KarnoppParameters
 
 __all__ = ["TOLERANCES", "Outcome", "identified", "table_of"]
@@ -71,16 +78,14 @@ def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Out
     sweep = client.sweep_columns()
     published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in TOLERANCES}
     refined = {name: _refined(name, values) for name in TOLERANCES}
-    case = Case(
-        label,
-        recording,
+    panels = sweep_panels(
         sweep["threshold"],
         sweep["coulomb_friction"],
         sweep["sigma"],
         float(values["threshold [m/s]"]),
         refined["coulomb_friction"],
     )
-    return Outcome(label, truth, published, refined, case)
+    return Outcome(label, truth, published, refined, Case(label, recording, Drawing(panels)))
 
 
 def _refined(name: str, values: Mapping[str, str]) -> Parameter:

@@ -170,7 +170,7 @@ def identify_signature(
         evidence=_evidence(signature, valve.driven_by),
         findings=_findings(signature, validation, valve),
         model=identified.parameters,
-        signature=signature,
+        exhibit=signature,
         stem=StemComparison(recording.sample_period, recording.position, validation.simulated),
     )
 

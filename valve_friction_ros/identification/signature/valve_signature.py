@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from valve_friction_ros.identification.drawing import Curve, Drawing
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.signature.strokes import (
     BreakawayPoint,
@@ -15,6 +16,8 @@ from valve_friction_ros.identification.signature.strokes import (
 )
 from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
+from valve_friction_ros.identification.trust.misfit import percentage
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
@@ -84,6 +87,38 @@ class ValveSignature:
         """The strokes up, and the strokes down."""
         upward = tuple(stroke for stroke in self.strokes if stroke.direction > 0)
         return upward, tuple(stroke for stroke in self.strokes if stroke.direction < 0)
+
+    def drawing(self, parameters: Mapping[str, Parameter], valve: Valve) -> Drawing:  # noqa: ARG002
+        """Return P1, P2 and the lines of the sliding stem, as figures and reports show them."""
+        drive, k = valve.driven_by, self.spring_constant
+        lines = []
+        for stroke in (way[0] for way in self.ways):
+            place = stroke.sliding.position[[0, -1]]
+            level = float(np.mean(stroke.sliding.force - k * stroke.sliding.position))
+            label = f"slides {'up' if stroke.direction > 0 else 'down'}, slope $S_a$/k"
+            lines.append(Curve(valve.actuator_drive(level + k * place), place, "--", label))
+        points = breakaway_points(self.strokes)
+        times, places = [one.time for one in points], [one.position for one in points]
+        return Drawing(
+            stem=(Curve(times, places, "o"),),
+            stem_title="stem (dotted: model; ●: breakaway)",
+            loop=(*lines, *self.breakaway_curves()),
+            loop_title=f"valve signature: dead zone {self.dead_zone / drive.size:.4g} "
+            f"{drive.unit}, x̄ {self.position_bias * 1e3:.3g} mm",
+            loop_caption=" The stem breaks away upwards at P₁ and downwards at P₂; on the dashed "
+            "lines it slides. The dead zone, the loop's width, is "
+            f"{percentage(self.dead_zone_share)} of the {drive.words}'s span.",
+        )
+
+    def breakaway_curves(self) -> tuple[Curve, ...]:
+        """Return P1 and P2 of every stroke: stem position, m, over the drive, Pa or N."""
+        return tuple(
+            Curve([one.drive for one in points], [one.position for one in points], style, label)
+            for label, style, points in (
+                ("$P_1$", "^", self.upward_points),
+                ("$P_2$", "v", self.downward_points),
+            )
+        )
 
     @property
     def upward_points(self) -> tuple[BreakawayPoint, ...]:
