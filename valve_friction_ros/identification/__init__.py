@@ -18,6 +18,7 @@ from valve_friction_ros.identification.published.sweep_drawing import sweep_pane
 from valve_friction_ros.identification.refined.method import identify_refined
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.rendering import (
+    parameter_cells,
     parameter_columns,
     parameter_mapping,
     plain,
@@ -82,6 +83,7 @@ __all__ = [
     "identify_robust",
     "identify_signature",
     "method_named",
+    "parameter_cells",
     "parameter_columns",
     "parameter_mapping",
     "percentage",

@@ -1,6 +1,5 @@
 """One identified state of the packing, as the topics of the identifier tell it."""
 
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -13,8 +12,9 @@ from valve_friction_ros.identification import (
     Drawing,
     Parameter,
     Verdict,
+    parameter_cells,
+    parameter_mapping,
     sweep_panels,
-    two_digits,
 )
 from valve_friction_ros.model import KarnoppParameters
 
@@ -110,17 +110,18 @@ def table_of(outcome: Outcome) -> Table:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     for name, error in outcome.errors().items():
-        refined = outcome.refined[name]
-        told = not math.isnan(refined.value)
+        _, value, width, unit, verdict, _ = parameter_cells(
+            name, parameter_mapping(outcome.refined[name])
+        )
         table.add_row(
             name,
-            UNITS[name],
+            unit,
             f"{getattr(outcome.truth, name):.6g}",
             f"{outcome.published[name]:.6g}",
             f"{100 * error:+.3f} %",
-            f"{refined.value:.6g}" if told else "–",
-            two_digits(refined.half_width) if refined.half_width > 0 else "",
-            refined.verdict.value,
+            value,
+            width,
+            verdict,
             style="red" if name in outcome.missed() else None,
         )
     return table
