@@ -11,9 +11,9 @@ from valve_friction_ros.commands.arguments.identification import (
 )
 from valve_friction_ros.commands.arguments.recording import (
     add_recording_arguments,
-    described_valve,
     reading_options,
     require_one,
+    valve_of,
 )
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.identification_files import (
@@ -117,7 +117,7 @@ def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
 def run(options: argparse.Namespace) -> int:
     """Identify the valves of the file, print what was found, and write the files asked for."""
     reading = reading_options(options)
-    description = described_valve(options, reading)
+    description = valve_of(options.file, options.valve, reading)
     valve = description.valve
     settings = identification_settings(options, description.known)
     baseline, files = baseline_from(options), identification_files(options)

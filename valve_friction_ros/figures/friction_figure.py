@@ -57,6 +57,7 @@ def friction_figure(cases: Sequence[Case], title: str) -> Figure:
     for name in names[1:]:
         panels[name].sharex(panels[names[0]])
     draw_record(panels["pressure"], panels["stem"], cases)
+    panels["pressure"].tick_params(labelbottom=False)
     draw_panels([panels[name] for name in names], own)
     draw_signature(panels["signature"], cases)
     dress(panels.values())

@@ -5,21 +5,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from valve_friction_ros.figures.case import Case
 from valve_friction_ros.identification import Curve, Panel, Parameter
-from valve_friction_ros.model import Recording
 
 __all__ = [
     "COLOURS",
     "SYMBOLS",
     "draw_curves",
-    "draw_drive",
     "draw_panels",
     "draw_record",
     "draw_signature",
-    "draw_stem",
     "thinned",
 ]
 
@@ -56,26 +52,8 @@ def draw_record(drive_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> Non
             stem_axes.set_title(case.drawing.stem_title, loc="right", fontsize="small")
         draw_curves(stem_axes, case.drawing.stem, 1.0)
     drive_axes.set_ylabel(cases[0].recording.driven_by.label)
-    drive_axes.tick_params(labelbottom=False)
     stem_axes.set_ylabel("stem [mm]")
     stem_axes.set_xlabel("time [s]")
-
-
-def draw_drive(axes: Axes, recording: Recording, colour: str) -> None:
-    """Draw the drive over the time since the record began."""
-    some, drive = thinned(len(recording)), recording.driven_by
-    axes.plot(recording.time[some], recording.drive[some] / drive.size, color=colour, lw=1.2)
-    axes.set_ylabel(drive.label)
-
-
-def draw_stem(axes: Axes, recording: Recording, simulated: NDArray[np.float64]) -> None:
-    """Draw the measured stem over the time, and the simulated stem as a dotted line on it."""
-    some = thinned(len(recording))
-    time = recording.time[some]
-    axes.plot(time, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
-    axes.plot(time, simulated[some] * 1e3, "k:", lw=1.2)
-    axes.set_ylabel("stem [mm]")
-    axes.set_xlabel("time [s]")
 
 
 def draw_curves(

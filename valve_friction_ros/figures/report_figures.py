@@ -11,8 +11,8 @@ from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.page import dress
 from valve_friction_ros.figures.panels import (
     COLOURS,
-    draw_drive,
     draw_panels,
+    draw_record,
     draw_signature,
     thinned,
 )
@@ -46,11 +46,7 @@ def record_figure(recording: Recording) -> Figure:
     """Draw drive and measured stem position over the time."""
     figure = _paper_figure(2.9)
     pressure, stem = figure.subplots(2, 1, sharex=True)
-    some = thinned(len(recording))
-    draw_drive(pressure, recording, COLOURS[0])
-    stem.plot(recording.time[some], recording.position[some] * 1e3, color=COLOURS[0], lw=1.0)
-    stem.set_ylabel("stem [mm]")
-    stem.set_xlabel("time [s]")
+    draw_record(pressure, stem, [Case("", recording, Drawing())])
     dress((pressure, stem))
     return figure
 

@@ -6,6 +6,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.model.drive import Drive
+
 __all__ = ["StampedRecord", "StampedSignal"]
 
 
@@ -57,3 +59,4 @@ class StampedRecord:
 
     drive: StampedSignal
     position: StampedSignal
+    driven_by: Drive = Drive.PRESSURE

@@ -30,10 +30,19 @@ from valve_friction_ros.records.units import (
 from valve_friction_ros.streams.samples import Samples
 from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
 
-__all__ = ["CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_recording"]
+__all__ = ["KNOWN_UNITS", "CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_recording"]
 
 _LATEST_TIME = 9e9
 """Latest time whose nanoseconds a signed 64-bit number holds, s, rounded down."""
+
+
+KNOWN_UNITS = {
+    "time": (*NANOSECONDS,),
+    "position": (*POSITION_UNITS, PERCENT),
+    "pressure": (*PRESSURE_UNITS,),
+    "force": (*FORCE_UNITS,),
+}
+"""Names of the units in which a column may be."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +72,7 @@ class CsvUnits:
 
     def __post_init__(self) -> None:
         """Refuse unknown units."""
-        for name, known in (
-            ("time", (*NANOSECONDS,)),
-            ("position", (*POSITION_UNITS, PERCENT)),
-            ("pressure", (*PRESSURE_UNITS,)),
-            ("force", (*FORCE_UNITS,)),
-        ):
+        for name, known in KNOWN_UNITS.items():
             unit = getattr(self, name)
             if unit not in known:
                 raise ValueError(f"unknown unit of {name} {unit!r}; known are {', '.join(known)}")

@@ -127,13 +127,13 @@ def uniform_recording(
         on_grid[0],
         on_grid[1],
         start_time=float(origin) / 1e9,
-        stamped=_at_own_stamps(drive, position, int(origin), period),
+        stamped=_at_own_stamps(drive, position, int(origin), period, driven_by),
         driven_by=driven_by,
     )
 
 
 def _at_own_stamps(
-    drive: Samples, position: Samples, origin: int, period: int
+    drive: Samples, position: Samples, origin: int, period: int, driven_by: Drive
 ) -> StampedRecord | None:
     """Return both signals at their own stamps; None where these are the grid, or too few."""
     signals = drive, position
@@ -142,12 +142,11 @@ def _at_own_stamps(
     same_size = drive.stamps.size == position.stamps.size
     if same_size and all(_is_on_grid(samples, origin, period) for samples in signals):
         return None
-    return StampedRecord(
-        *(
-            StampedSignal((samples.stamps - origin).astype(np.float64) / 1e9, samples.values)
-            for samples in signals
-        )
+    own = (
+        StampedSignal((samples.stamps - origin).astype(np.float64) / 1e9, samples.values)
+        for samples in signals
     )
+    return StampedRecord(next(own), next(own), driven_by)
 
 
 def _is_on_grid(samples: Samples, origin: int, period: int) -> bool:

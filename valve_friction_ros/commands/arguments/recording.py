@@ -8,24 +8,21 @@ from types import MappingProxyType
 
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice
-from valve_friction_ros.records.csv_recording import CsvColumns, CsvFormat, CsvUnits
+from valve_friction_ros.records.csv_recording import (
+    KNOWN_UNITS,
+    CsvColumns,
+    CsvFormat,
+    CsvUnits,
+)
 from valve_friction_ros.records.csv_table import CsvLayout
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, holds_force, read_recordings
 from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.units import (
-    FORCE_UNITS,
-    NANOSECONDS,
-    PERCENT,
-    POSITION_UNITS,
-    PRESSURE_UNITS,
-)
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 
 __all__ = [
     "add_reading_arguments",
     "add_recording_arguments",
-    "described_valve",
     "read_one",
     "reading_options",
     "require_one",
@@ -34,13 +31,6 @@ __all__ = [
 
 _TABS = {"tab": "\t", "\\t": "\t"}
 """What people type for a tab, which a shell makes hard to type."""
-
-_UNITS = {
-    "time": (*NANOSECONDS,),
-    "position": (*POSITION_UNITS, PERCENT),
-    "pressure": (*PRESSURE_UNITS,),
-    "force": (*FORCE_UNITS,),
-}
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,7 +72,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     bag.add_argument("--joint", help="joint that is the stem (the only one, or 'stem')")
     bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
     table = parser.add_argument_group("CSV")
-    for name, units in _UNITS.items():
+    for name, units in KNOWN_UNITS.items():
         header, unit = getattr(CsvColumns(), name), getattr(CsvUnits(), name)
         table.add_argument(
             f"--{name}-column", default=header, metavar="HEADER", help="column header (%(default)s)"
@@ -124,17 +114,6 @@ def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
         ),
         Stretch(arguments.begin, arguments.end, arguments.last),
     )
-
-
-def described_valve(arguments: argparse.Namespace, reading: ReadingOptions) -> ValveFile:
-    """Read the valve file; a recorded force needs none.
-
-    Raises
-    ------
-    ValueError
-        If the valve file cannot be read, or is needed and not given.
-    """
-    return valve_of(arguments.file, arguments.valve, reading)
 
 
 def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) -> ValveFile:

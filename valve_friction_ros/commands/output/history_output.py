@@ -2,7 +2,6 @@
 
 import csv
 import io
-import math
 import re
 from collections.abc import Sequence
 from datetime import datetime, timezone
@@ -13,7 +12,12 @@ from rich.table import Table
 
 from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
-from valve_friction_ros.identification import parameter_columns, two_digits
+from valve_friction_ros.identification import (
+    parameter_cells,
+    parameter_columns,
+    parameter_mapping,
+    two_digits,
+)
 from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["as_json", "print_table", "write_csv"]
@@ -151,12 +155,12 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             table.columns[column].no_wrap = True
         for entry in history.entries:
             one, ratio = entry.friction, entry.diagnosis.ratio
-            is_known = one is not None and math.isfinite(one.value)
+            cells: tuple[str, ...] = ("", "–", "", "", "refused")
+            if one is not None:
+                cells = parameter_cells(one.name, parameter_mapping(one))
             table.add_row(
                 time_text(entry.time, "seconds")[:-1].replace("T", " "),
-                f"{one.value:.6g}" if one is not None and is_known else "–",
-                two_digits(one.half_width) if one is not None and one.half_width > 0 else "",
-                "refused" if one is None else one.verdict.value,
+                *(cells[place] for place in (1, 2, 4)),
                 "" if ratio is None or entry.refusal else f"{ratio.value:.2f}",
                 entry.diagnosis.level.name,
                 _told(entry),

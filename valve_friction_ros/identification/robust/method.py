@@ -140,7 +140,9 @@ def _stamped(recording: Recording) -> StampedRecord:
         return recording.stamped
     time = recording.time
     return StampedRecord(
-        StampedSignal(time, recording.drive), StampedSignal(time, recording.position)
+        StampedSignal(time, recording.drive),
+        StampedSignal(time, recording.position),
+        recording.driven_by,
     )
 
 

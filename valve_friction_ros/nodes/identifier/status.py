@@ -126,9 +126,8 @@ def friction_status(
         values["baseline_coulomb_friction [N]"] = _number(monitor.baseline.coulomb_friction)
         values["baseline half width [N]"] = _number(monitor.baseline.half_width)
     if diagnosis.ratio is not None:
-        values["coulomb_friction_ratio"] = _number(diagnosis.ratio.value)
-        values["coulomb_friction_ratio low"] = _number(diagnosis.ratio.low)
-        values["coulomb_friction_ratio high"] = _number(diagnosis.ratio.high)
+        for bound, value in zip(("", " low", " high"), diagnosis.ratio, strict=True):
+            values[f"coulomb_friction_ratio{bound}"] = _number(value)
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
     return _status(
