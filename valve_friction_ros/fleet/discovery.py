@@ -39,10 +39,7 @@ class FoundRecording:
     def content(self) -> str:
         """Return a fingerprint of size and time of change of its file or files.
 
-        Raises
-        ------
-        OSError
-            If they cannot be looked at.
+        Raises OSError if they cannot be looked at.
         """
         folder = self.path.is_dir()
         files = sorted(self.path.iterdir()) if folder else [self.path]

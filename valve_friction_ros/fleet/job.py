@@ -76,11 +76,8 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
 def identify_job(job: Job) -> list[Mapping[str, Cell]]:
     """Read and identify a recording.
 
-    Returns
-    -------
-    list of mapping of str to str, float, int or None
-        The cells of a row for each valve, in the order of the file; a refusal has its reason
-        under ``error``. At least one.
+    Returns the cells of a row for each valve, at least one, in the order of the file; a refusal has
+    its reason under ``error``.
     """
     try:
         recorded = read_recordings(job.path, job.options.valve, job.options.reading)

@@ -65,10 +65,7 @@ _WRITERS = {".csv": _write_csv, ".jsonl": _write_json_lines}
 def writer_of(output: Path) -> Callable[[TextIO, Iterable[_Row]], None]:
     """Return what writes rows in the format that the name of the output ends in.
 
-    Raises
-    ------
-    ValueError
-        If it is not known; the message lists the known ones.
+    Raises ValueError if it is not known; the message lists the known ones.
     """
     known = _WRITERS.get(output.suffix.lower())
     if known is None:
@@ -186,4 +183,5 @@ class ResultsFile:
         marks = ", ".join("?" * len(COLUMNS))
         cells = [[row.get(column) for column in COLUMNS] for row in rows]
         with self._explained(), self._connection:
-            self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa: S608
+            self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa:
+            S608

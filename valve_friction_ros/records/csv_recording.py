@@ -49,10 +49,7 @@ class CsvColumns:
 class CsvUnits:
     """Units of those columns, by their names in `records.units`.
 
-    Raises
-    ------
-    ValueError
-        If a unit is unknown.
+    Raises ValueError if a unit is unknown.
     """
 
     time: str = "s"
@@ -122,10 +119,7 @@ def _position_unit(path: Path, unit: str, valve: Valve) -> Unit:
 def drive_column(path: Path, form: CsvFormat) -> str:
     """Return the header of the signal that drives the stem: the pressure, or else the force.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or has neither pressure nor force.
+    Raises ValueError if the file cannot be read or has neither pressure nor force.
     """
     header = read_header(path, form.layout)
     columns = form.columns

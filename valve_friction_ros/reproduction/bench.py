@@ -64,10 +64,7 @@ class Bench:
 def find_bench_folder() -> Path:
     """Find the folder of the configuration files, in the sources or where they are installed.
 
-    Raises
-    ------
-    ValueError
-        If it is not found.
+    Raises ValueError if it is not found.
     """
     package = Path(__file__).resolve().parents[1]
     for above in package.parents:
@@ -80,10 +77,7 @@ def find_bench_folder() -> Path:
 def read_bench(folder: Path, name: str) -> Bench:
     """Read a bench from ``bench_<name>.yaml``, the parameter file of its three nodes.
 
-    Raises
-    ------
-    ValueError
-        In one line: the file and the cause.
+    Raises ValueError, one line with the file and the cause.
     """
     path = folder / f"bench_{name}.yaml"
     try:

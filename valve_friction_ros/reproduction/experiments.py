@@ -78,19 +78,7 @@ class Experiments:
 
 
 def run(bench: Bench, excitation: Excitation, duration: float, number: int = 0) -> Experiment:
-    """Run one experiment.
-
-    Parameters
-    ----------
-    bench : Bench
-        Valve, converter and sensors.
-    excitation : Excitation
-        Commanded pressure.
-    duration : float
-        Length of the record, s.
-    number : int
-        Number of the experiment; it selects the noise.
-    """
+    """Run one experiment of `duration` seconds; its `number` selects the noise."""
     period = bench.sample_period
     command = excitation.sample(np.arange(round(duration / period) + 1) * period)
     pressure = converter_response(command, period, bench.converter_lag)

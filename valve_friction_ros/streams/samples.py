@@ -58,15 +58,10 @@ class _Chunk(NamedTuple):
 
 
 class SampleBuffer:
-    """The last seconds of one signal, in bounded memory.
+    """The last `window` seconds of one signal, in bounded memory.
 
     A sample takes 12 bytes, or 16 where 1024 samples last longer than the 4.29 s that 32 bits of
     nanoseconds hold; at most 1024 samples older than the window are still in memory.
-
-    Parameters
-    ----------
-    window : float
-        Time to keep, s.
     """
 
     def __init__(self, window: float) -> None:

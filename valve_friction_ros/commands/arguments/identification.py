@@ -81,10 +81,7 @@ def identification_settings(
 ) -> IdentificationSettings:
     """Build the settings from the parsed arguments, and from what the valve file names.
 
-    Raises
-    ------
-    ValueError
-        If they do not go together.
+    Raises ValueError if they do not go together.
     """
     defaults = IdentificationSettings()
     return IdentificationSettings(

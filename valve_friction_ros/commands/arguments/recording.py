@@ -109,10 +109,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
 def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
     """Build the options of reading from the parsed arguments.
 
-    Raises
-    ------
-    ValueError
-        If they do not go together.
+    Raises ValueError if they do not go together.
     """
     columns = {
         field.name: getattr(arguments, f"{field.name}_column") for field in fields(CsvColumns)
@@ -133,10 +130,7 @@ def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
 def described_valve(arguments: argparse.Namespace, reading: ReadingOptions) -> ValveFile:
     """Read the valve file; a recorded force needs none.
 
-    Raises
-    ------
-    ValueError
-        If the valve file cannot be read, or is needed and not given.
+    Raises ValueError if the valve file cannot be read, or is needed and not given.
     """
     return valve_of(arguments.file, arguments.valve, reading)
 
@@ -144,10 +138,7 @@ def described_valve(arguments: argparse.Namespace, reading: ReadingOptions) -> V
 def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) -> ValveFile:
     """Read the valve file of a recording; a recorded force needs none.
 
-    Raises
-    ------
-    ValueError
-        If the valve file cannot be read, or is needed and not given.
+    Raises ValueError if the valve file cannot be read, or is needed and not given.
     """
     if valve_file is not None:
         return read_valve_file(valve_file)
@@ -159,10 +150,7 @@ def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) 
 def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
     """Refuse several valves where `purpose` is for one.
 
-    Raises
-    ------
-    ValueError
-        Names the valves and the option that chooses one.
+    The ValueError names the valves and the option that chooses one.
     """
     if len(recorded) > 1:
         names = ", ".join(each.name for each in recorded)
@@ -172,10 +160,8 @@ def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
 def read_one(path: Path, valve: Valve, reading: ReadingOptions) -> RecordedValve:
     """Read the one valve that a file holds, or that was chosen.
 
-    Raises
-    ------
-    ValueError, RefusalError
-        If it cannot be read: one line that names the file, the cause and what to do.
+    Raises ValueError or RefusalError if it cannot be read: one line that names the file, the cause
+    and what to do.
     """
     recorded = read_recordings(path, valve, reading)
     require_one(recorded, f"{path} holds several, and this command takes")

@@ -146,10 +146,7 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
 def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     """Write a row for each identification, oldest first; a cell without a value is empty.
 
-    Raises
-    ------
-    OSError
-        If it cannot be written; it names `path`, and no part of the table stays.
+    Raises OSError if it cannot be written; it names `path`, and no part of the table stays.
     """
     entries = sorted(
         (entry for history in histories for entry in history.entries), key=lambda one: one.time

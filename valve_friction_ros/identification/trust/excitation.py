@@ -173,13 +173,9 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
 def _followed(recording: Recording) -> tuple[float, float]:
     """Fit the pressure of the moving stem by its position and its direction.
 
-    While the stem moves, pressure follows position, shifted up or down by the friction. While it
-    rests, any pressure within the dead band is possible, so rests are left out.
-
-    Returns
-    -------
-    slope, share : float
-        Pressure over position, Pa/m, and the share of the variance that is explained.
+    Returns the slope, Pa/m, and the share of the variance that is explained. While the stem moves,
+    pressure follows position, shifted up or down by the friction. While it rests, any pressure
+    within the dead band is possible, so rests are left out.
     """
     length = max(round(_FOLLOWED_BLOCK / recording.sample_period), 1)
     blocks = len(recording) // length

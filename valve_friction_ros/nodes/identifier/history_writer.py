@@ -35,15 +35,6 @@ class HistoryWriter:
     """Writes to the history in a thread of its own, so that no slow disk holds up the node.
 
     What could not be written waits, and is tried again with what comes next.
-
-    Parameters
-    ----------
-    node : Node
-        The identifier, with its parameters.
-    monitor : FrictionMonitor
-        What it knows.
-    tag : str
-        Tag of the valve.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor, tag: str) -> None:

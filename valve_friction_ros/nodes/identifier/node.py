@@ -188,12 +188,8 @@ class Identifier(PolledNode):
     async def _identified(self, record: IdentificationInput) -> None:
         """Identify a record in the worker, then take over and publish the result.
 
-        Raises
-        ------
-        RefusalError
-            If the record cannot be identified.
-        InternalError
-            If a bug is met; the monitor shows it until an identification succeeds.
+        Raises RefusalError if the record cannot be identified, and InternalError if a bug is met;
+        the monitor shows the bug until an identification succeeds.
         """
         self._identifying = True
         try:

@@ -22,13 +22,7 @@ _FIGURES = (
 
 
 class ResultTopics:
-    """Publishes each number of a result on a topic of its own, and the sweep.
-
-    Parameters
-    ----------
-    node : Node
-        The identifier.
-    """
+    """Publishes each number of a result on a topic of its own, and the sweep."""
 
     def __init__(self, node: Node) -> None:
         self._friction = {

@@ -37,14 +37,7 @@ class _Input:
 class ValveInputs:
     """Takes the samples of a valve from its topics and hands them on by the block.
 
-    Parameters
-    ----------
-    node : Node
-        The node that subscribes.
-    joint : str
-        Joint of the stem; empty: the first.
-    hand_on : callable
-        Called with the arrivals.
+    An empty `joint` means the first joint of a message.
     """
 
     def __init__(self, node: Node, joint: str, hand_on: Callable[[Arrivals], None]) -> None:

@@ -11,15 +11,7 @@ __all__ = ["InputWatch"]
 
 
 class InputWatch:
-    """Says what is wrong with one subscribed topic.
-
-    Parameters
-    ----------
-    node : Node
-        The node that subscribes.
-    subscription : Subscription
-        Its subscription.
-    """
+    """Says what is wrong with one subscribed topic."""
 
     def __init__(self, node: Node, subscription: Subscription) -> None:
         self._node = node

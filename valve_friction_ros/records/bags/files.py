@@ -59,10 +59,7 @@ def _named_files(folder: Path) -> list[str] | None:
 def storage_files(path: Path) -> tuple[list[Path], list[str]]:
     """Return the storage files of a bag in the order of time, and what was odd about them.
 
-    Raises
-    ------
-    ValueError
-        If there is none.
+    Raises ValueError if there is none.
     """
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder")

@@ -70,13 +70,7 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
 
 
 class SalvagedMcap:
-    """An MCAP file read from its beginning to its end or first damage, without its index.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """An MCAP file read from its beginning to its end or first damage, without its index."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -108,10 +108,7 @@ class ValveFeed:
     def recording(self) -> Recording:
         """Bring both signals onto one grid, as the node does.
 
-        Raises
-        ------
-        RefusalError
-            If the samples make no record; the remedies are those for a file.
+        Raises RefusalError if the samples make no record; the remedies are those for a file.
         """
         if self._refusal is not None:
             raise RefusalError(self._refusal)
