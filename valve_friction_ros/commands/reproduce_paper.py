@@ -13,19 +13,13 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import SensorNoise
 from valve_friction_ros.records.whole_file import write_whole
 from valve_friction_ros.reports import write_report
-from valve_friction_ros.reproduction import (
-    BENCH_NAMES,
-    Bench,
-    Plan,
-    all_checks,
-    draw_figures,
-    find_bench_folder,
-    progress_steps,
-    read_bench,
-    report_page,
-    run_programme,
-    summary,
-)
+from valve_friction_ros.reproduction.bench import BENCH_NAMES, Bench, find_bench_folder, read_bench
+from valve_friction_ros.reproduction.checks.check import summary
+from valve_friction_ros.reproduction.checks.checks import all_checks
+from valve_friction_ros.reproduction.experiments import Plan
+from valve_friction_ros.reproduction.figures.figures import draw_figures
+from valve_friction_ros.reproduction.programme import progress_steps, run_programme
+from valve_friction_ros.reproduction.report import report_page
 
 __all__ = ["REFUSALS", "declare", "run"]
 

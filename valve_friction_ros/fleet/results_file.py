@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import io
 import json
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from types import TracebackType
 from typing import TextIO
 
 from valve_friction_ros.fleet.row import COLUMNS, Cell
+from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["Entry", "ResultsFile", "database_of", "writer_of"]
 
@@ -159,11 +161,9 @@ class ResultsFile:
 
     def _write_output(self) -> None:
         """Replace the output as a whole."""
-        place = self.path.resolve()
-        draft = place.with_name(f".{place.name}.draft")
-        with draft.open("w", encoding="utf-8", newline="") as stream:
-            self._write(stream, self._rows())
-        draft.replace(place)
+        text = io.StringIO()
+        self._write(text, self._rows())
+        write_whole(self.path, text.getvalue().encode())
 
     def entries(self) -> Iterator[Entry]:
         """Go through the recordings."""
@@ -183,5 +183,4 @@ class ResultsFile:
         marks = ", ".join("?" * len(COLUMNS))
         cells = [[row.get(column) for column in COLUMNS] for row in rows]
         with self._explained(), self._connection:
-            self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa:
-            S608
+            self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa: S608

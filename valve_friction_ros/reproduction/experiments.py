@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from valve_friction_ros.model import (
     Excitation,
     IsaSteps,
+    KarnoppParameters,
     Recording,
     SineWave,
+    StemState,
     TriangleWave,
     converter_response,
     simulate,
@@ -17,7 +19,18 @@ from valve_friction_ros.model import (
 from valve_friction_ros.model.excitations import pressure_at
 from valve_friction_ros.reproduction.bench import Bench
 
-__all__ = ["ISA", "SINE", "TRIANGLE", "Experiment", "Experiments", "Plan", "run", "run_all"]
+__all__ = [
+    "ISA",
+    "SINE",
+    "TRIANGLE",
+    "Experiment",
+    "Experiments",
+    "Plan",
+    "rms",
+    "run",
+    "run_all",
+    "stem_error",
+]
 
 TRIANGLE = TriangleWave(pressure_at(0.1), pressure_at(0.8), 42.0)
 """Triangle of the signature: the slope of the whole range in 60 s a period, without travel
@@ -86,6 +99,21 @@ def run(bench: Bench, excitation: Excitation, duration: float, number: int = 0) 
     clean = Recording(period, pressure, stem.position)
     noise = replace(bench.noise, seed=bench.noise.seed + number)
     return Experiment(command, clean, noise.applied_to(clean))
+
+
+def stem_error(
+    bench: Bench, experiment: Experiment, model: KarnoppParameters
+) -> NDArray[np.float64]:
+    """Return the stem of a model minus the true stem, both under the true pressure, m."""
+    clean = experiment.clean
+    start = StemState(float(clean.position[0]))
+    stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
+    return stem.position - clean.position
+
+
+def rms(error: NDArray[np.float64]) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(error**2)))
 
 
 def run_all(bench: Bench, plan: Plan) -> Experiments:

@@ -23,10 +23,17 @@ from valve_friction_ros.identification import (
     step_test,
     validate,
 )
-from valve_friction_ros.model import KarnoppParameters, Recording, StemState, simulate
+from valve_friction_ros.model import KarnoppParameters, Recording
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.bench import Bench
-from valve_friction_ros.reproduction.experiments import Experiment, Experiments, Plan, run_all
+from valve_friction_ros.reproduction.experiments import (
+    Experiment,
+    Experiments,
+    Plan,
+    rms,
+    run_all,
+    stem_error,
+)
 from valve_friction_ros.reproduction.found import model_of, signature_of
 from valve_friction_ros.reproduction.free_sweep import FreeSweep, free_sweep
 from valve_friction_ros.reproduction.scatter import Scatter, measure_scatter
@@ -114,7 +121,7 @@ class Comparison:
     @property
     def true_rms(self) -> float:
         """Root mean square of `error`, m."""
-        return float(np.sqrt(np.mean(self.error**2)))
+        return rms(self.error)
 
     @property
     def true_maximum(self) -> float:
@@ -206,12 +213,8 @@ def identified(
 
 def compared(bench: Bench, experiment: Experiment, model: KarnoppParameters) -> Comparison:
     """Simulate an experiment with a model, and compare the stems."""
-    clean = experiment.clean
-    start = StemState(float(clean.position[0]))
-    stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
-    return Comparison(
-        validate(experiment.measured, bench.valve, model), stem.position - clean.position
-    )
+    validation = validate(experiment.measured, bench.valve, model)
+    return Comparison(validation, stem_error(bench, experiment, model))
 
 
 def _steps(bench: Bench, isa: Experiment) -> StepTest:

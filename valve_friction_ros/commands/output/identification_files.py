@@ -101,8 +101,7 @@ def identification_files(options: argparse.Namespace) -> IdentificationFiles:
     Raises ValueError, which names the file and the cause, for a file that cannot be written.
     """
     if options.plot is not None:
-        from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to
-        import
+        from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import
 
         require_picture_file(options.plot)
     if options.report is not None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.published.breakaway import runs_of
 from valve_friction_ros.identification.signature.onset import fit_onset
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -135,13 +136,6 @@ class SignatureStroke:
         return float(np.sum(self.sliding.force_rate) / np.sum(self.sliding.velocity))
 
 
-def _runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one-past-last index of each run of True."""
-    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return list(zip(starts.tolist(), ends.tolist(), strict=True))
-
-
 def _usual_speed(speed: NDArray[np.float64]) -> float:
     """Return the median speed, m/s, of the moving stem."""
     return float(np.median(speed[speed >= _LEAST_SPEED_SHARE * speed.max()]))
@@ -193,7 +187,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
     span = float(np.ptp(position))
     strokes = []
     last_end = 0
-    for begin, end in _runs(speed > _RUN_SHARE * usual):
+    for begin, end in runs_of(speed > _RUN_SHARE * usual):
         way = position[end - 1 + margin] - position[begin + margin]
         direction = 1 if way > 0 else -1
         run = velocity[begin:end]
@@ -207,7 +201,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
             velocity[steady],
             force_rate[steady],
         )
-        rests = [(a + last_end, b + last_end) for a, b in _runs(still[last_end:begin])]
+        rests = [(a + last_end, b + last_end) for a, b in runs_of(still[last_end:begin])]
         rest = max(rests, key=lambda one: one[1] - one[0], default=(begin, begin))
         strokes.append(
             SignatureStroke(
@@ -228,7 +222,7 @@ def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
     """
     pace = float(np.median(run))
     distance = np.abs(run - pace)
-    begin, end = max(_runs(distance <= 2 * _STEADY * abs(pace)), key=lambda one: one[1] - one[0])
+    begin, end = max(runs_of(distance <= 2 * _STEADY * abs(pace)), key=lambda one: one[1] - one[0])
     return begin + np.flatnonzero(distance[begin:end] <= _STEADY * abs(pace))
 
 
