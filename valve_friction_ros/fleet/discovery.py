@@ -18,14 +18,9 @@ _ENDINGS = (".csv", ".tsv", ".bag", *_STORAGE)
 
 @dataclass(frozen=True)
 class FoundRecording:
-    """A recording, not yet read.
+    """A recording, not yet read: a file or the folder of a bag.
 
-    Attributes
-    ----------
-    path : Path
-        The file, or the folder of a bag.
-    name : str
-        Its path from the searched folder, with slashes.
+    Its name is its path from the searched folder, with slashes.
     """
 
     path: Path
@@ -54,15 +49,7 @@ class FoundRecording:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a folder holds.
-
-    Attributes
-    ----------
-    recordings : tuple of FoundRecording
-        In the order of their names.
-    skipped : tuple of str
-        Names of what is no recording, likewise.
-    """
+    """The recordings of a folder, and the names of what is none, each in the order of names."""
 
     recordings: tuple[FoundRecording, ...]
     skipped: tuple[str, ...]

@@ -17,19 +17,7 @@ __all__ = ["Job", "Options", "identify_job"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a recording is read and identified.
-
-    Attributes
-    ----------
-    valve : Valve
-        The valve, or each valve of a bag.
-    reading : ReadingOptions
-        What the file does not say itself.
-    method : str
-        Name of the method, as in `METHODS`.
-    settings : IdentificationSettings
-        Its settings.
-    """
+    """Valve, options of reading, method and settings with which a recording is identified."""
 
     valve: Valve
     reading: ReadingOptions

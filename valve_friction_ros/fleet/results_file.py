@@ -22,16 +22,9 @@ _Row = Mapping[str, Cell]
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """All rows of one recording.
+    """All rows of one recording, one for each valve.
 
-    Attributes
-    ----------
-    recording : str
-        Its name.
-    content, settings : str
-        Fingerprints of its files and of the options it was identified with.
-    rows : tuple of mapping
-        A row for each valve.
+    `content` and `settings` are fingerprints of its files and of the options of its identification.
     """
 
     recording: str

@@ -34,13 +34,7 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class DeadWorker:
-    """In place of an answer: how the process that worked on it ended.
-
-    Attributes
-    ----------
-    exit_code : int
-        Its exit code; negative: the signal that killed it.
-    """
+    """In place of an answer: the exit code of its process, negative for the signal that ended it."""
 
     exit_code: int
 

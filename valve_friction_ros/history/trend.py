@@ -48,16 +48,10 @@ class Limit(Enum):
 
 @dataclass(frozen=True)
 class Crossing:
-    """When a limit is expected to be crossed.
+    """When the next limit on the way is expected to be crossed.
 
-    Attributes
-    ----------
-    limit : Limit
-        The next limit on the way.
-    level : float
-        Its Coulomb friction, N.
-    time, earliest, latest : int
-        Expected time and the 95 % interval of it, ns since 1970 (UTC).
+    `level` is its Coulomb friction, N; `earliest` and `latest` are the ends of the 95 % interval of
+    the expected time, ns since 1970 (UTC).
     """
 
     limit: Limit

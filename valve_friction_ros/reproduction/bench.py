@@ -20,26 +20,11 @@ _PARAMETERS = tuple(field.name for field in fields(KarnoppParameters))
 
 @dataclass(frozen=True)
 class Bench:
-    """A simulated valve with its converter and its sensors.
+    """A simulated valve with its converter and its sensors, in SI units.
 
-    Attributes
-    ----------
-    name : str
-        Name of the packing: low, high, graphite.
-    valve : Valve
-        Geometry.
-    truth : KarnoppParameters
-        True parameters, which the identification should find.
-    square : SquareWave
-        The identification signal.
-    converter_lag : float
-        Time constant of the V/P converter, s.
-    sample_period : float
-        Time between two samples of both sensors, s.
-    noise : SensorNoise
-        Noise of both sensors; the pressure without noise acts on the stem.
-    assumed_mass : float
-        The nominal mass of the moving parts, kg.
+    The `truth` is what the identification should find. The pressure without noise acts on the stem.
+    `converter_lag` is the time constant of the V/P converter, `assumed_mass` the nominal mass of
+    the moving parts.
     """
 
     name: str

@@ -45,15 +45,7 @@ ISA = IsaSteps()
 
 @dataclass(frozen=True)
 class Plan:
-    """Length of the record of each excitation.
-
-    Attributes
-    ----------
-    square_periods, triangle_periods, sine_periods : float
-        Periods of each wave.
-    isa : IsaSteps
-        The step sequence, recorded completely.
-    """
+    """Periods of each wave, and the step sequence, which is recorded completely."""
 
     square_periods: float = 6.0
     triangle_periods: float = 3.5
@@ -63,17 +55,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """The command, the true motion, and the measured motion.
-
-    Attributes
-    ----------
-    command : ndarray of float, shape (n,)
-        Commanded pressure, Pa.
-    clean : Recording
-        True pressure behind the converter, and true stem position.
-    measured : Recording
-        The same with the noise of the sensors.
-    """
+    """Commanded pressure (Pa, shape (n,)), the true motion, and the motion with sensor noise."""
 
     command: NDArray[np.float64] = field(repr=False)
     clean: Recording

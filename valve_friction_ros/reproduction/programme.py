@@ -59,20 +59,10 @@ _ROUNDING = 5e-6
 class Identified:
     """The result of each method on the records of one bench.
 
-    Attributes
-    ----------
-    position_bias : float
-        x̄ in model 1, m.
-    published : Estimate
-        Model 1, the sweep, from the square wave.
-    free : FreeSweep
-        The same with the mass as it is regressed, for Figs. 3 and 4.
-    force_balance : Result
-        Model 2, from the triangle.
-    refined : Result
-        Model 1 refined by simulation, from the square wave.
-    own_preload : Result
-        The same with F_0 as a parameter in place of x̄, and with the nominal mass fixed.
+    Model 1 is the sweep of the square wave with x̄ = `position_bias` (m): `published`, and `free`
+    with the mass as it is regressed, for Figs. 3 and 4. Model 2 is the `force_balance` of the
+    triangle. `refined` is model 1 refined by simulation; `own_preload` has F_0 as a parameter in
+    place of x̄, and the nominal mass fixed.
     """
 
     position_bias: float
@@ -105,14 +95,10 @@ class Identified:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A model compared with a record, and with the stem without sensor noise.
+    """A model compared with the measured stem, and with the stem without sensor noise.
 
-    Attributes
-    ----------
-    validation : Validation
-        Comparison with the measured stem.
-    error : ndarray of float, shape (n,)
-        Stem of the model minus the true stem, both under the true pressure, m.
+    `error` is the stem of the model minus the true stem, both under the true pressure, m, shape
+    (n,).
     """
 
     validation: Validation
@@ -133,19 +119,9 @@ class Comparison:
 class BenchResult:
     """All results on one bench.
 
-    Attributes
-    ----------
-    bench : Bench
-        The simulated valve.
-    experiments : Experiments
-        Its records.
-    identified : Identified
-        Its models.
-    sine, isa : mapping of str to Comparison
-        Validations by model: those of `Identified.models`, and of the paper's packings also
-        "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1.
-    steps : StepTest
-        Metrics of the ISA test, input and position in percent of their spans.
+    `sine` and `isa` are validations by model: those of `Identified.models`, and of the paper's
+    packings also "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1. `steps` has input
+    and position in percent of their spans.
     """
 
     bench: Bench
@@ -165,19 +141,11 @@ class MassByBias(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """All results of the programme.
+    """All results of the programme, by bench.
 
-    Attributes
-    ----------
-    results : mapping of str to BenchResult
-        By bench.
-    without_noise : mapping of str to Estimate
-        Model 1 of the paper's packings without any noise.
-    mass_by_bias : tuple of MassByBias
-        The mass of the packing "low" without noise, with x̄ at either end and in the middle of
-        what rounds to the same 0.01 mm.
-    scatter : Scatter
-        How noise scatters the estimates.
+    `without_noise` is model 1 of the paper's packings without any noise, `mass_by_bias` the mass of
+    the packing "low" without noise, with x̄ at either end and in the middle of what rounds to the
+    same 0.01 mm.
     """
 
     results: Mapping[str, BenchResult]
@@ -275,11 +243,6 @@ def run_programme(
         Repetitions with other noise, to estimate the scatter.
     progress : callable
         Called with the name of the next step.
-
-    Returns
-    -------
-    Programme
-        All results.
 
     Raises
     ------

@@ -20,15 +20,7 @@ def nanoseconds(seconds: float) -> int:
 
 
 class Samples(NamedTuple):
-    """Part of a stamped signal.
-
-    Attributes
-    ----------
-    stamps : ndarray of int64, shape (n,)
-        Times, ns, increasing.
-    values : ndarray of float, shape (n,)
-        Values at those times, SI units.
-    """
+    """Part of a stamped signal: times, ns, increasing, and values, SI units, shape (n,) each."""
 
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]

@@ -60,18 +60,9 @@ Chosen: five strokes each way hold two windows each."""
 class BreakawayPoint(NamedTuple):
     """Where a resting stem begins to slide: P1 of the valve signature on the way up, P2 down.
 
-    Attributes
-    ----------
-    time : float
-        Since the first sample, s.
-    position : float
-        Stem position of the rest, m.
-    pressure : float
-        Pressure at that instant, Pa.
-    force : float
-        Actuator force F_ext at that instant, N.
-    speed : float
-        Speed at which the stem leaves, m/s: above zero after a slip jump that shows.
+    Time since the first sample, s; stem position of the rest, m; pressure, Pa, and actuator force
+    F_ext, N, at that instant; and the speed at which the stem leaves, m/s: above zero after a slip
+    jump that shows.
     """
 
     time: float
@@ -84,18 +75,8 @@ class BreakawayPoint(NamedTuple):
 class Sliding(NamedTuple):
     """The instants of a stroke at which the stem slides at a constant speed, shape (n,) each.
 
-    Attributes
-    ----------
-    time : ndarray of float
-        Since the first sample, s.
-    position : ndarray of float
-        Stem position, m.
-    force : ndarray of float
-        Actuator force F_ext, N.
-    velocity : ndarray of float
-        Stem velocity, m/s.
-    force_rate : ndarray of float
-        Its derivative with time, N/s.
+    Time since the first sample, s; stem position, m; actuator force F_ext, N; stem velocity, m/s;
+    and the derivative of the force with time, N/s.
     """
 
     time: NDArray[np.float64]
@@ -107,18 +88,10 @@ class Sliding(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SignatureStroke:
-    """One stroke of the stem.
+    """One stroke of the stem: its direction, +1 up or −1 down, and its instants at constant speed.
 
-    Attributes
-    ----------
-    direction : int
-        +1 up, −1 down.
-    breakaway : BreakawayPoint or None
-        Where it begins; None without a recorded rest before it.
-    steadiness : float
-        Share of the stroke's way at constant speed.
-    sliding : Sliding
-        The instants at constant speed.
+    `breakaway` is None without a recorded rest before it; `steadiness` is the share of the stroke's
+    way at constant speed.
     """
 
     direction: int

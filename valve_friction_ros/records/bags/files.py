@@ -117,21 +117,11 @@ def _is_mcap(path: Path, start: bytes) -> bool:
 
 @contextlib.contextmanager
 def opened(path: Path, salvage: bool) -> Iterator[Storage]:
-    """Open a storage file, compressed or not.
+    """Open a storage file, compressed or not; its first bytes tell its format.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its first bytes tell its format.
-    salvage : bool
-        True to read it without its index as far as it goes.
-
-    Raises
-    ------
-    ValueError
-        If it is no storage file of ROS 2.
-    DamagedFileError
-        If it cannot be read without salvage, now or while its messages are gone through.
+    With `salvage` it is read without its index as far as it goes. Raises ValueError if it is no
+    storage file of ROS 2, and DamagedFileError if it cannot be read without salvage, now or while
+    its messages are gone through.
     """
     with _unpacked(path) as file:
         is_mcap = _is_mcap(path, _first_bytes(file))

@@ -52,19 +52,10 @@ def decoded(body: bytes, kind: str, little_endian: bool) -> Any:
 
 
 class McapFile:
-    """An undamaged MCAP file.
+    """An undamaged MCAP file: `file`, which is `path` or what was unpacked of it.
 
-    Parameters
-    ----------
-    path : Path
-        The file that messages name.
-    file : Path
-        The file to read: `path`, or what was unpacked of it.
-
-    Raises
-    ------
-    DamagedFileError
-        If it is damaged, now or while its messages are gone through.
+    Raises DamagedFileError, which names `path`, if it is damaged, now or while its messages are
+    gone through.
     """
 
     def __init__(self, path: Path, file: Path) -> None:

@@ -145,27 +145,11 @@ def _is_a_valve(valve: ValveTopics) -> bool:
 
 
 def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopics]:
-    """Find the valves of a bag.
+    """Find the valves of a bag, by namespace; one of this package's own topics may be missing.
 
     A valve is a namespace with a topic of each type; where there is one of each in all the bag,
-    or one of each is named, they are a valve wherever they are.
-
-    Parameters
-    ----------
-    topics : collection of Topic
-        What the bag holds.
-    choice : TopicChoice
-        What is asked for.
-
-    Returns
-    -------
-    list of ValveTopics
-        By namespace; of a valve with this package's topic names one may be missing.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or it cannot be told which topics are meant; with what there is.
+    or one of each is named, they are a valve wherever they are. Raises ValueError, with what the
+    bag holds, if there is none, or if the topics cannot be told apart.
     """
     pressures = _candidates(topics, PRESSURE_TYPE, choice.pressure)
     stems = _candidates(topics, STEM_TYPE, choice.stem)

@@ -19,18 +19,9 @@ _ALL = 1e9
 
 
 class ValveFeed:
-    """Fills a `RecordBuffer` from recorded messages.
+    """Fills a `RecordBuffer` from recorded messages of a valve whose topics are both there.
 
-    Parameters
-    ----------
-    topics : ValveTopics
-        The valve's topics; both are there.
-    valve : Valve
-        Tells the range of the pressure sensor.
-    joint : str or None
-        Name of the stem's joint; None: the only one, or the one called `stem`.
-    stretch : Stretch
-        Which part to take.
+    Without a `joint`, the stem is the only joint, or the joint called `stem`.
     """
 
     def __init__(
