@@ -35,8 +35,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
         "Run the paper's experiments, identification and validation on the simulated bench, and "
-        f"write {_PAGE} and every figure, beside the paper's numbers. The last line says what "
-        "matched."
+        f"write {_PAGE} and every figure, beside the paper's numbers. The last line counts the "
+        "matches, and names what does not match."
     )
     parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
     parser.add_argument(
@@ -65,7 +65,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
         metavar="PA",
         help="standard deviation of the pressure sensor, Pa, instead of the configured one",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the noise (%(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the noise (%(default)s)"
+    )
 
 
 def _noise(bench: Bench, options: argparse.Namespace) -> SensorNoise:

@@ -56,7 +56,7 @@ class Findings:
 
 
 def is_valve_file(name: str) -> bool:
-    """Tell whether a file describes a valve: ``valve.yaml`` or ``NAME.valve.yaml``."""
+    """Return whether a file describes a valve: ``valve.yaml`` or ``NAME.valve.yaml``."""
     return name == _VALVE_ENDING or name.endswith(f".{_VALVE_ENDING}")
 
 
@@ -80,7 +80,7 @@ def _is_storage(name: str) -> bool:
 
 
 def _is_bag_folder(folder: Path, files: list[str]) -> bool:
-    """Tell a bag's folder by its metadata beside its storage, or by what they say."""
+    """Return whether a folder is a bag: metadata beside storage files, or metadata of rosbag2."""
     if _METADATA not in files:
         return False
     if any(_is_storage(name) for name in files):
@@ -92,7 +92,7 @@ def _is_bag_folder(folder: Path, files: list[str]) -> bool:
 
 
 def _can_be_written(name: str) -> bool:
-    """Tell whether a name fits on a line of UTF-8."""
+    """Return whether a name can be written on one line of UTF-8."""
     try:
         name.encode()
     except UnicodeEncodeError:
@@ -104,7 +104,7 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and in those below it.
 
     A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
-    each CSV or TSV file, gzipped or not, and each storage file of a bag is one, told by its
+    each CSV or TSV file, gzipped or not, and each storage file of a bag is one, found by its
     ending. Hidden files and folders and links to folders are skipped; so is a name that cannot
     be written on a line.
 

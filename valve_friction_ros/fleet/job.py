@@ -1,4 +1,4 @@
-"""One recording to identify, and the rows that come of it."""
+"""One recording to identify, and the rows of its results."""
 
 import hashlib
 from collections.abc import Mapping

@@ -2,7 +2,6 @@
 
 import contextlib
 import csv
-import io
 import json
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,7 +12,6 @@ from types import TracebackType
 from typing import TextIO
 
 from valve_friction_ros.fleet.row import COLUMNS, Cell
-from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["Entry", "ResultsFile", "database_of", "writer_of"]
 
@@ -109,7 +107,7 @@ class ResultsFile:
                 raise
 
     def _open(self) -> None:
-        """Take the database for this process alone, and see that it is one."""
+        """Lock the database for this process, and check that it holds results of this version."""
         self._connection.execute("PRAGMA locking_mode = EXCLUSIVE")
         self._connection.execute("PRAGMA journal_mode = WAL")  # one flush of the disk a recording
         self._connection.execute("PRAGMA synchronous = FULL")
@@ -154,9 +152,11 @@ class ResultsFile:
 
     def _write_output(self) -> None:
         """Replace the output as a whole."""
-        text = io.StringIO()
-        self._write(text, self._rows())
-        write_whole(self.path, text.getvalue().encode())
+        place = self.path.resolve()
+        draft = place.with_name(f".{place.name}.draft")
+        with draft.open("w", encoding="utf-8", newline="") as stream:
+            self._write(stream, self._rows())
+        draft.replace(place)
 
     def entries(self) -> Iterator[Entry]:
         """Go through the recordings."""

@@ -53,7 +53,7 @@ def result_cells(
 
 
 def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
-    """Fill the cells of a valve that was refused; `path`, which the row names, leaves `reason`."""
+    """Fill the cells of a refused valve; `path`, which the row names, is removed from `reason`."""
     for start in (f"{path}, {valve}: ", f"{path}: "):
         while reason.startswith(start):
             reason = reason.removeprefix(start)

@@ -1,4 +1,4 @@
-"""What came of many recordings, counted."""
+"""Counts of the results of many recordings."""
 
 import re
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Work shared out to processes, of which any may die.
+"""Tasks for several processes, each of which may die.
 
 No library's pool does that. `concurrent.futures` gives up all tasks when one process dies. Pebble
 (5.2.3), which names the task that killed its process, shares one pipe and one lock among all of
@@ -34,12 +34,12 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class DeadWorker:
-    """In place of an answer: the exit code of its process, negative for the signal that ended it."""
+    """In place of an answer: the exit code of its process, negative: the signal that ended it."""
 
     exit_code: int
 
     def __str__(self) -> str:
-        """Say it to people."""
+        """Describe the end of the process."""
         if self.exit_code >= 0:
             return f"its process ended with exit code {self.exit_code}"
         number = -self.exit_code
@@ -57,7 +57,7 @@ def usable_cores() -> int:
 
 
 def _work(tasks: "Connection[_Answer, _Task]", work: Callable[[_Task], _Answer]) -> None:
-    """Answer one task after the other until the other end is closed, or its process dead."""
+    """Answer the tasks one by one, until the other end of the pipe is closed."""
     with contextlib.suppress(EOFError, OSError):
         while True:
             tasks.send(work(tasks.recv()))
@@ -85,7 +85,7 @@ def _surroundings(folder: str) -> Iterator[None]:
 
 
 class _Worker(Generic[_Task, _Answer]):
-    """A process, this end of its pipe, and the task that it is at."""
+    """A process, this end of its pipe, and its present task."""
 
     def __init__(self, work: Callable[[_Task], _Answer], folder: str) -> None:
         context = multiprocessing.get_context("spawn")

@@ -56,7 +56,7 @@ class Arrivals(NamedTuple):
 
 
 def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
-    """Take a table of samples apart.
+    """Split a table into samples of both signals.
 
     Parameters
     ----------

@@ -69,21 +69,25 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what a file does not say itself."""
     stretch = parser.add_argument_group("part of the recording")
     for name, help_text in (
-        ("begin", "leave out what is earlier, S seconds after the first sample"),
-        ("end", "leave out what is later, S seconds after the first sample"),
+        ("begin", "leave out what lies before S seconds after the first sample"),
+        ("end", "leave out what lies after S seconds after the first sample"),
         ("last", "only the last S seconds, as a node with `window` S takes them"),
     ):
         stretch.add_argument(
             f"--{name}", type=float, default=getattr(Stretch(), name), metavar="S", help=help_text
         )
-    bag = parser.add_argument_group("bags", "found by their types where nothing is said")
+    bag = parser.add_argument_group(
+        "bags", "topics are found by their types, unless these options name them"
+    )
     bag.add_argument(
         "--pressure-topic",
         metavar="TOPIC",
         help="topic of the pressure; without a leading slash: in the namespace of each valve",
     )
     bag.add_argument("--stem-topic", metavar="TOPIC", help="topic of the stem, likewise")
-    bag.add_argument("--joint", help="joint that is the stem (the only one, or 'stem')")
+    bag.add_argument(
+        "--joint", metavar="NAME", help="joint that is the stem (the only one, or 'stem')"
+    )
     bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
     table = parser.add_argument_group("CSV")
     for name, units in _UNITS.items():
@@ -99,7 +103,10 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
             help=f"{', '.join(units)} (%(default)s)",
         )
     table.add_argument(
-        "--delimiter", default=",", help="between the entries of a row: , ; tab … (%(default)s)"
+        "--delimiter",
+        default=",",
+        metavar="MARK",
+        help="between the entries of a row: , ; tab … (%(default)s)",
     )
     table.add_argument(
         "--decimal", default=".", metavar="MARK", help="decimal mark, . or , (%(default)s)"

@@ -69,10 +69,10 @@ def _is_current(entry: Entry, plan: Plan) -> bool:
 def forget_stale(
     results: ResultsFile, plans: Mapping[str, Plan], options: argparse.Namespace
 ) -> tuple[list[Plan], int]:
-    """Drop the rows that do not hold any more; return what is left to do, and how many were dropped.
+    """Drop the rows that do not hold any more; return what is left, and how many were dropped.
 
-    Of the options, ``redo`` tells whether good rows of other options may go, and ``retry_failed``
-    whether refused ones are tried again. Raises ValueError if good rows were made with other
+    With ``redo`` good rows of other options may go; with ``retry_failed`` refused recordings are
+    tried again. Raises ValueError if good rows were made with other
     options and may not go.
     """
     done, others = set(), 0

@@ -38,7 +38,7 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     """Return the trend; the numbers only where the drift is significant."""
     if trend is None:
         return None
-    told: dict[str, Any] = {
+    shown: dict[str, Any] = {
         "begin": time_text(trend.begin),
         "end": time_text(trend.end),
         "days": trend.days,
@@ -49,19 +49,19 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
         "crossing": None,
     }
     if trend.is_significant:
-        told |= {
+        shown |= {
             "drift_n_per_month": trend.drift,
             "half_width_n_per_month": trend.half_width,
         }
     if trend.crossing is not None:
-        told["crossing"] = {
+        shown["crossing"] = {
             "limit": trend.crossing.limit.value,
             "level_n": trend.crossing.level,
             "expected": time_text(trend.crossing.time),
             "earliest": time_text(trend.crossing.earliest),
             "latest": time_text(trend.crossing.latest),
         }
-    return told
+    return shown
 
 
 def _stored(parameter: Parameter) -> dict[str, Any]:
@@ -161,8 +161,8 @@ def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     write_whole(path, text.getvalue().encode())
 
 
-def _told(entry: HistoryEntry) -> str:
-    """Return the reason of a refusal, or the verdict without its figures."""
+def _outcome(entry: HistoryEntry) -> str:
+    """Return the reason of a refusal, or the diagnosis without its figures."""
     return entry.refusal or re.split("[:;]", entry.diagnosis.message)[0]
 
 
@@ -198,7 +198,7 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
                 "refused" if one is None else one.verdict.value,
                 "" if ratio is None or entry.refusal else f"{ratio.value:.2f}",
                 _LEVELS[entry.diagnosis.level],
-                _told(entry),
+                _outcome(entry),
             )
         console.print(table)
         for line in _trend_lines(history.trend):

@@ -21,13 +21,13 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=Path,
         metavar="FILE.html",
-        help="write a page for people: verdict, parameters, pictures, settings; one file",
+        help="write a page for people, one file: diagnosis, parameters, pictures, settings",
     )
     parser.add_argument(
         "--baseline-coulomb-friction",
         type=float,
         metavar="N",
-        help="F_c of this valve when it was healthy, to tell its excess friction",
+        help="F_c of this valve when it was healthy; its diagnosis compares with it",
     )
     parser.add_argument(
         "--baseline-half-width",

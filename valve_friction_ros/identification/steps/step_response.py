@@ -43,7 +43,8 @@ _LEAST_VISIBLE = 1e-3
 Chosen: about the movement of a stem that still settles after a hold of 10 s."""
 
 _LONGEST_SMOOTHING = 0.2
-"""Longest window that smooths the position, s. Chosen: it bounds the error of a dead time."""
+"""Longest window that smooths the position, s. Chosen: it bounds the error of a dead time. It is
+absolute, and does not follow the speed of the valve."""
 
 _NO_CORNERS = np.empty(0, dtype=np.intp)
 """A position has inertia: its slope does not jump."""

@@ -1,4 +1,4 @@
-"""The history of the plant: what the identifier writes to it, and reads from it at the start."""
+"""The history of the plant, as the identifier writes it, and reads it at the start."""
 
 import contextlib
 from collections import deque
@@ -65,7 +65,7 @@ class HistoryWriter:
 
     @property
     def reservation(self) -> str:
-        """What to add to the news that something was kept."""
+        """Addition to the answer that something was kept; empty if it is in the file."""
         return "".join(f", but it is lost with this node: {one}" for one in self.problems)
 
     @property

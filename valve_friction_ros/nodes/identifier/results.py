@@ -1,4 +1,4 @@
-"""The latched topics that an identifier's results go out on."""
+"""The latched topics of an identifier's results."""
 
 from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray

@@ -1,4 +1,4 @@
-"""Identification every so many seconds, and what came of it when nothing could be identified."""
+"""Periodic identification, and the reason of the last one that was skipped."""
 
 from collections.abc import Awaitable, Callable
 

@@ -1,4 +1,4 @@
-"""Work in another thread, awaited by a callback, and what becomes of a bug."""
+"""Work in another thread, awaited by a callback, and the report of a bug in it."""
 
 import contextlib
 import traceback
@@ -19,7 +19,7 @@ _Result = TypeVar("_Result")
 
 
 class InternalError(Exception):
-    """A bug of this package, described for who asked; its traceback is in the log."""
+    """A bug of this package, in one line for the caller; its traceback is in the log."""
 
 
 def _internal_error(bug: Exception) -> InternalError:

@@ -1,4 +1,4 @@
-"""Watching that the input topics arrive, and saying why where they do not."""
+"""Watch over an input topic: whether it arrives, and if not, why."""
 
 from collections.abc import Sequence
 

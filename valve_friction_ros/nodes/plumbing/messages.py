@@ -1,4 +1,4 @@
-"""Between messages and plain numbers."""
+"""Conversion between messages and plain numbers."""
 
 import math
 from collections.abc import Mapping

@@ -34,7 +34,7 @@ def _valves(
 
 
 def _pass_on(storages: Sequence[Storage], feeds: Sequence[ValveFeed]) -> None:
-    """Give every message to the valve whose it is, in one pass."""
+    """Hand each message to its valve, in one pass."""
     takers = {topic: take for feed in feeds for topic, take in feed.inputs.items()}
     for storage in storages:
         for topic, data in storage.messages(takers.keys() & set(storage.topics)):
@@ -58,7 +58,7 @@ def _read(
     choice: TopicChoice,
     stretch: Stretch,
 ) -> list[tuple[ValveTopics, ValveFeed]]:
-    """Read all valves from a bag, of its damaged files what can be salvaged."""
+    """Read all valves from a bag; of damaged files, the part that can be salvaged."""
     with contextlib.ExitStack() as stack:
         storages = [stack.enter_context(opened(file, file in damaged)) for file in files]
         topics = {topic for storage in storages for topic in storage.topics}
@@ -87,9 +87,9 @@ def read_bag(
         Folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. Without its
         metadata or index, or cut off, it is read as far as it goes.
     valve : Valve
-        Tells the range of the pressure sensors.
+        Gives the range of the pressure sensors.
     choice : TopicChoice, optional
-        Topics, joint and valve, where the bag does not tell them.
+        Topics, joint and valve, where the bag leaves them open.
     stretch : Stretch, optional
         Which part to read.
 

@@ -1,4 +1,4 @@
-"""The messages of one valve in a bag, on their way through the buffer that the node has."""
+"""The messages of one valve in a bag, taken by the same buffer as in the node."""
 
 from collections.abc import Callable, Mapping
 
@@ -86,7 +86,7 @@ class ValveFeed:
         self._undecodable[str(topic)] = self._undecodable.get(str(topic), 0) + 1
 
     def notes(self) -> list[str]:
-        """Tell what of the messages was left out."""
+        """Return which messages were left out, and why."""
         notes = [
             f"{count} messages of {topic} cannot be decoded as its type, and were left out"
             for topic, count in self._undecodable.items()

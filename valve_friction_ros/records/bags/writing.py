@@ -123,7 +123,7 @@ def write_bag(
     valve : Valve
         Geometry and sensor range, for the valve file.
     assumed_mass : float
-        Mass where the record does not tell it, kg, for the valve file.
+        Mass where the record does not determine it, kg, for the valve file.
 
     Returns
     -------
