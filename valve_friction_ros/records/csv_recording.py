@@ -29,7 +29,7 @@ from valve_friction_ros.records.units import (
 from valve_friction_ros.streams.samples import Samples
 from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
 
-__all__ = ["CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_recording"]
+__all__ = ["CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_csv"]
 
 _LATEST_TIME = 9e9
 """Latest time whose nanoseconds a signed 64-bit number holds, s, rounded down."""
@@ -150,7 +150,7 @@ def _pressure(table: CsvTable, drive: str, valve: Valve, form: CsvFormat) -> NDA
     return pressure
 
 
-def read_recording(
+def read_csv(
     path: Path,
     valve: Valve,
     form: CsvFormat | None = None,
