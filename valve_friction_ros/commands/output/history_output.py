@@ -38,7 +38,7 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     """Return the trend; the numbers only where the drift is significant."""
     if trend is None:
         return None
-    shown: dict[str, Any] = {
+    told: dict[str, Any] = {
         "begin": time_text(trend.begin),
         "end": time_text(trend.end),
         "days": trend.days,
@@ -49,19 +49,19 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
         "crossing": None,
     }
     if trend.is_significant:
-        shown |= {
+        told |= {
             "drift_n_per_month": trend.drift,
             "half_width_n_per_month": trend.half_width,
         }
     if trend.crossing is not None:
-        shown["crossing"] = {
+        told["crossing"] = {
             "limit": trend.crossing.limit.value,
             "level_n": trend.crossing.level,
             "expected": time_text(trend.crossing.time),
             "earliest": time_text(trend.crossing.earliest),
             "latest": time_text(trend.crossing.latest),
         }
-    return shown
+    return told
 
 
 def _stored(parameter: Parameter) -> dict[str, Any]:
@@ -146,7 +146,10 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
 def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     """Write a row for each identification, oldest first; a cell without a value is empty.
 
-    Raises OSError if it cannot be written; it names `path`, and no part of the table stays.
+    Raises
+    ------
+    OSError
+        If it cannot be written; it names `path`, and no part of the table stays.
     """
     entries = sorted(
         (entry for history in histories for entry in history.entries), key=lambda one: one.time
@@ -161,8 +164,8 @@ def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     write_whole(path, text.getvalue().encode())
 
 
-def _outcome(entry: HistoryEntry) -> str:
-    """Return the reason of a refusal, or the diagnosis without its figures."""
+def _told(entry: HistoryEntry) -> str:
+    """Return the reason of a refusal, or the verdict without its figures."""
     return entry.refusal or re.split("[:;]", entry.diagnosis.message)[0]
 
 
@@ -198,7 +201,7 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
                 "refused" if one is None else one.verdict.value,
                 "" if ratio is None or entry.refusal else f"{ratio.value:.2f}",
                 _LEVELS[entry.diagnosis.level],
-                _outcome(entry),
+                _told(entry),
             )
         console.print(table)
         for line in _trend_lines(history.trend):
