@@ -106,19 +106,10 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
     A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
     each CSV or TSV file, gzipped or not, and each storage file of a bag is one, found by its
     ending. Hidden files and folders and links to folders are skipped; so is a name that cannot
-    be written on a line.
+    be written on a line. The files of `left_out`, such as the output, are neither recordings nor
+    skipped.
 
-    Parameters
-    ----------
-    folder : Path
-        Where to search.
-    *left_out : Path
-        Files that are neither recordings nor listed as skipped: the output.
-
-    Raises
-    ------
-    ValueError
-        If it is no folder, or cannot be read.
+    Raises ValueError if the folder is none, or cannot be read.
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder")

@@ -76,17 +76,11 @@ class ResultsFile:
     """Rows that are on the disk when `append` returns; leaving the context writes the output.
 
     They are kept in the table ``result`` of `database_of` the output, in its columns and in the
-    order in which they were appended. Only one process at a time can open it.
+    order in which they were appended. Only one process at a time can open it. The ending of the
+    output's name is its format.
 
-    Parameters
-    ----------
-    path : Path
-        The output; the ending of its name is the format.
-
-    Raises
-    ------
-    ValueError
-        If the output or its database is another program's, or the database cannot be opened.
+    Raises ValueError if the output or its database is another program's, or the database cannot be
+    opened.
     """
 
     def __init__(self, path: Path) -> None:

@@ -126,26 +126,12 @@ def in_processes(
     processes: int,
     stopped: Callable[[], bool],
 ) -> Iterator[tuple[_Task, _Answer | DeadWorker]]:
-    """Yield tasks with their answers as they finish, worked on by several processes.
+    """Yield tasks with their answers, or a `DeadWorker`, as they finish in several processes.
 
     Each process has one task at a time, so that of one that dies it is known what it died of; a
-    new one takes its place. Compiled libraries get one thread a process.
-
-    Parameters
-    ----------
-    work : callable
-        What is done to a task; a function of a module, since the processes are started anew.
-    tasks : iterable
-        The tasks, taken one by one.
-    processes : int
-        Most processes at a time, at least 1.
-    stopped : callable
-        True to stop: nothing more is handed out, and what is being done is given up.
-
-    Yields
-    ------
-    tuple
-        A task and its answer, or a `DeadWorker`.
+    new one takes its place. Compiled libraries get one thread a process. `work` is a function of a
+    module, since the processes are started anew. Once `stopped` returns True nothing more is handed
+    out, and what is being done is given up.
     """
     waiting = iter(tasks)
     drafts = TemporaryDirectory()  # what a killed worker leaves behind goes with it

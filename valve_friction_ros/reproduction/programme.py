@@ -231,23 +231,11 @@ def run_programme(
     seeds: int,
     progress: Callable[[str], object] = lambda _: None,
 ) -> Programme:
-    """Run the whole programme.
+    """Run the whole programme on the benches by name, the paper's two packings among them.
 
-    Parameters
-    ----------
-    benches : mapping of str to Bench
-        By name, the paper's two packings among them; x̄ is shared between these, as in the paper.
-    plan : Plan
-        Length of the records.
-    seeds : int
-        Repetitions with other noise, to estimate the scatter.
-    progress : callable
-        Called with the name of the next step.
-
-    Raises
-    ------
-    RefusalError, ValueError
-        If the noise hides what a method needs; the message names it.
+    x̄ is shared between these two, as in the paper. With `seeds` repetitions of other noise the
+    scatter is estimated. `progress` is called with the name of the next step. Raises RefusalError
+    or ValueError, which names the method, if the noise hides what a method needs.
     """
     experiments, balances = {}, {}
     for name, bench in benches.items():

@@ -36,15 +36,8 @@ def bugs_reported(
     """Turn a bug into an InternalError, and log its traceback.
 
     An exception that leaves a callback would end the node, with all valves of its process.
-
-    Parameters
-    ----------
-    node : Node
-        Logs the traceback.
-    *expected : type
-        Exceptions that are not bugs, beside RefusalError; they pass unchanged.
-    known : str, optional
-        An internal error that is in the log already: the same is not logged again.
+    RefusalError and the `expected` exceptions are no bugs, and pass unchanged. An internal error
+    that is `known`, in the log already, is not logged again.
     """
     passed: tuple[type[Exception], ...] = (RefusalError, InternalError, *expected)
     try:

@@ -73,17 +73,9 @@ def run_nodes(
     """Run nodes in one process until Ctrl-C, SIGTERM or shutdown; return the exit code.
 
     It is 0 after a clean stop, and 2 if arguments or parameters do not let the nodes start: what
-    they or rclpy refuse is written to stderr in one line.
-
-    Parameters
-    ----------
-    create : callable
-        Builds the nodes.
-    arguments : sequence of str, optional
-        ROS arguments, by default those of the process.
-    pause : float
-        Time between two turns, s, while no service is in use: for so long messages gather, and
-        a first request waits.
+    they or rclpy refuse is written to stderr in one line. The ROS arguments are those of the
+    process by default. The `pause` is the time between two turns, s, while no service is in use:
+    for so long messages gather, and a first request waits.
     """
     stop = _StopRequest()
     nodes: list[Node] = []

@@ -76,32 +76,14 @@ def read_bag(
     choice: TopicChoice | None = None,
     stretch: Stretch | None = None,
 ) -> tuple[RecordedValve, ...]:
-    """Read the recordings of all valves in a bag, in one pass through its messages.
+    """Read the recordings of all valves in a bag, by namespace, in one pass through its messages.
 
     The messages go through the node's own buffer by their header stamps, in the order in which
     each topic was recorded, so that they give the numbers that the node gave.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. Without its
-        metadata or index, or cut off, it is read as far as it goes.
-    valve : Valve
-        Gives the range of the pressure sensors.
-    choice : TopicChoice, optional
-        Topics, joint and valve, where the bag leaves them open.
-    stretch : Stretch, optional
-        Which part to read.
-
-    Returns
-    -------
-    tuple of RecordedValve
-        By namespace; at least one.
-
-    Raises
-    ------
-    ValueError
-        If the file is no bag of ROS 2, or holds no valve: one line with what to do.
+    `path` is the folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. Without
+    its metadata or index, or cut off, it is read as far as it goes. Raises ValueError, one line
+    with the remedy, if the file is no bag of ROS 2, or holds no valve.
     """
     choice, stretch = choice or TopicChoice(), stretch or Stretch()
     files, notes = storage_files(path)
