@@ -5,10 +5,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from valve_friction_ros.model import KarnoppParameters, SensorNoise, SquareWave, Valve
 from valve_friction_ros.model.checks import require_finite, require_positive
+from valve_friction_ros.records.valve_file import read_yaml
 
 __all__ = ["BENCH_NAMES", "Bench", "find_bench_folder", "read_bench"]
 
@@ -65,13 +64,7 @@ def read_bench(folder: Path, name: str) -> Bench:
     Raises ValueError, one line with the file and the cause.
     """
     path = folder / f"bench_{name}.yaml"
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
-        raise ValueError(f"{path}: cannot be read: {cause}") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    content = read_yaml(path)
     try:
         source, simulator, identifier = (
             _Section(content, node) for node in ("pressure_source", "simulator", "identifier")
