@@ -51,8 +51,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
     parser.epilog = (
-        "All results are in SI units. Exit code 1: some valves of a bag were refused; 2: the file, "
-        "the record or all valves were refused, or a file could not be written."
+        "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
+        "were refused, or a file could not be written; 1: some valves were refused."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
