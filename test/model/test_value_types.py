@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.model import (
-    ATMOSPHERIC_PRESSURE,
     BENCH_VALVE,
     GRAPHITE_PACKING,
     HIGH_FRICTION,
@@ -138,8 +137,8 @@ class TestValve:
         assert math.isnan(valve.share_of_travel(0.01))
 
     def test_force_counts_from_the_reference(self):
-        valve = Valve(0.05, pressure_reference=ATMOSPHERIC_PRESSURE)
-        pressure = ATMOSPHERIC_PRESSURE + np.array([-2e4, 0.0, 1e5])
+        valve = Valve(0.05, pressure_reference=101325.0)
+        pressure = 101325.0 + np.array([-2e4, 0.0, 1e5])
         # 0.05 m² · (−20, 0, 100) kPa
         np.testing.assert_allclose(valve.actuator_force(pressure), [-1000.0, 0.0, 5000.0])
 

@@ -40,7 +40,7 @@ REFUSALS = (RefusalError,)
 
 
 class _Answer(NamedTuple):
-    """A valve of the file, what came of it, and its diagnosis where it has a baseline."""
+    """A valve of the file, its result or refusal, and its diagnosis where it has a baseline."""
 
     recorded: RecordedValve
     outcome: Result | RefusalError
@@ -51,8 +51,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
     parser.epilog = (
-        "All results are in SI units. Exit code 2: the file or the record was refused (of several "
-        "valves in a bag all were), or a file could not be written; 1: some valves were refused."
+        "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
+        "were refused, or a file could not be written; 1: some valves were refused."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)

@@ -31,7 +31,7 @@ REFUSALS = (RefusalError,)
 
 
 class _Result(NamedTuple):
-    """What came of it."""
+    """A validation, and what it was made from."""
 
     validation: Validation
     model: IdentifiedModel

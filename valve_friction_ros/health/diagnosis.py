@@ -58,6 +58,12 @@ class FrictionLimits:
     ------
     ValueError
         Unless 0 < low_ratio < 1 < warn_ratio < error_ratio.
+
+    Notes
+    -----
+    No standard gives such ratios; the defaults are chosen. 2 doubles the dead band (F_c + F_s)/k,
+    0.5 halves it, and 1.25 is five times the half width that an identified friction may have
+    (`WEAK_SHARE`). A plant may know better: the ratios are parameters.
     """
 
     warn_ratio: float = 1.25

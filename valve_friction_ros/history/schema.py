@@ -189,10 +189,7 @@ def _make_tables(connection: sqlite3.Connection) -> None:
 def writing(path: Path) -> Iterator[sqlite3.Connection]:
     """Open a history for one transaction, and create it if it is missing.
 
-    Raises
-    ------
-    HistoryError
-        If it cannot be written; then no part of the transaction is.
+    Raises HistoryError if it cannot be written; then no part of the transaction is.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -234,10 +231,7 @@ def _reading_mode(path: Path) -> str:
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
     """Open an existing history, to read one state of it.
 
-    Raises
-    ------
-    HistoryError
-        If it is missing, or cannot be read.
+    Raises HistoryError if it is missing, or cannot be read.
     """
     try:
         is_there = path.is_file()

@@ -27,17 +27,7 @@ __all__ = ["Result", "StemComparison"]
 
 
 class StemComparison(NamedTuple):
-    """Measured and simulated stem at the same times.
-
-    Attributes
-    ----------
-    sample_period : float
-        Time between two samples, s.
-    measured : ndarray of float, shape (m,)
-        Measured position as the identification took it, m.
-    simulated : ndarray of float, shape (m,)
-        Position of the model's stem, m.
-    """
+    """Measured position, as the identification took it, and the model's, m, shape (m,) each."""
 
     sample_period: float
     measured: NDArray[np.float64]

@@ -28,10 +28,9 @@ from valve_friction_ros.model.simulation import (
     compile_kernels,
     simulate,
 )
-from valve_friction_ros.model.valve import ATMOSPHERIC_PRESSURE, Valve
+from valve_friction_ros.model.valve import Valve
 
 __all__ = [
-    "ATMOSPHERIC_PRESSURE",
     "BENCH_VALVE",
     "DEFAULT_LAG",
     "GRAPHITE_PACKING",

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.checks import require_finite, require_positive
 from valve_friction_ros.model.drive import Drive
 
-__all__ = ["ATMOSPHERIC_PRESSURE", "Valve"]
-
-ATMOSPHERIC_PRESSURE = 101325.0
-"""Standard atmosphere in Pa: the `pressure_reference` of an absolute pressure sensor."""
+__all__ = ["Valve"]
 
 _Samples = TypeVar("_Samples", float, NDArray[np.float64])
 

@@ -30,7 +30,7 @@ from valve_friction_ros.records.units import (
 from valve_friction_ros.streams.samples import Samples
 from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
 
-__all__ = ["KNOWN_UNITS", "CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_recording"]
+__all__ = ["KNOWN_UNITS", "CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_csv"]
 
 _LATEST_TIME = 9e9
 """Latest time whose nanoseconds a signed 64-bit number holds, s, rounded down."""
@@ -59,10 +59,7 @@ class CsvColumns:
 class CsvUnits:
     """Units of those columns, by their names in `records.units`.
 
-    Raises
-    ------
-    ValueError
-        If a unit is unknown.
+    Raises ValueError if a unit is unknown.
     """
 
     time: str = "s"
@@ -127,10 +124,7 @@ def _position_unit(path: Path, unit: str, valve: Valve) -> Unit:
 def drive_column(path: Path, form: CsvFormat) -> str:
     """Return the header of the signal that drives the stem: the pressure, or else the force.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or has neither pressure nor force.
+    Raises ValueError if the file cannot be read or has neither pressure nor force.
     """
     header = read_header(path, form.layout)
     columns = form.columns
@@ -164,7 +158,7 @@ def _drive(
     return drive, driven_by
 
 
-def read_recording(
+def read_csv(
     path: Path,
     valve: Valve,
     form: CsvFormat | None = None,

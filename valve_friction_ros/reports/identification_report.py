@@ -39,18 +39,9 @@ _NO_STEM = (
 def identification_report(record: IdentifiedRecord) -> Page:
     """Return the page on an identified record: its parameters and the evidence for them.
 
-    Parameters
-    ----------
-    record : IdentifiedRecord
-        Record, result, baseline and limits.
-
-    Returns
-    -------
-    Page
-        The diagnosis in one sentence, then parameters, friction against its baseline, the record,
-        the valve signature, the evidence of the method, the measured against the simulated
-        position, the residual, notes, settings and versions. Parts that a method does not have
-        are left out.
+    The diagnosis in one sentence, then parameters, friction against its baseline, the record, the
+    valve signature, the evidence of the method, the measured against the simulated position, the
+    residual, notes, settings and versions. Parts that a method does not have are left out.
     """
     return Page(f"Friction of {record.name}", diagnosis_sentence(record), tuple(_sections(record)))
 

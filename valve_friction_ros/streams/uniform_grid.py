@@ -22,26 +22,7 @@ Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, bel
 
 
 class GapError(RefusalError):
-    """A signal has a gap.
-
-    Parameters
-    ----------
-    name : str
-        Name of the signal in the message.
-    samples : Samples
-        The signal.
-    sample : int
-        Number of the first sample after the gap.
-
-    Attributes
-    ----------
-    sample : int
-        As above.
-    seconds : float
-        Length of the gap, s.
-    what : str
-        The refusal without its remedy.
-    """
+    """A gap of `seconds` before a `sample`; `what` is the refusal without its remedy."""
 
     def __init__(self, name: str, samples: Samples, sample: int) -> None:
         self.sample = sample

@@ -55,21 +55,25 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what a file does not say itself."""
     stretch = parser.add_argument_group("part of the recording")
     for name, help_text in (
-        ("begin", "leave out what is earlier, S seconds after the first sample"),
-        ("end", "leave out what is later, S seconds after the first sample"),
+        ("begin", "leave out what lies before S seconds after the first sample"),
+        ("end", "leave out what lies after S seconds after the first sample"),
         ("last", "only the last S seconds, as a node with `window` S takes them"),
     ):
         stretch.add_argument(
             f"--{name}", type=float, default=getattr(Stretch(), name), metavar="S", help=help_text
         )
-    bag = parser.add_argument_group("bags", "found by their types where nothing is said")
+    bag = parser.add_argument_group(
+        "bags", "topics are found by their types, unless these options name them"
+    )
     bag.add_argument(
         "--pressure-topic",
         metavar="TOPIC",
         help="topic of the pressure; without a leading slash: in the namespace of each valve",
     )
     bag.add_argument("--stem-topic", metavar="TOPIC", help="topic of the stem, likewise")
-    bag.add_argument("--joint", help="joint that is the stem (the only one, or 'stem')")
+    bag.add_argument(
+        "--joint", metavar="NAME", help="joint that is the stem (the only one, or 'stem')"
+    )
     bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
     table = parser.add_argument_group("CSV")
     for name, units in KNOWN_UNITS.items():
@@ -85,7 +89,10 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
             help=f"{', '.join(units)} (%(default)s)",
         )
     table.add_argument(
-        "--delimiter", default=",", help="between the entries of a row: , ; tab … (%(default)s)"
+        "--delimiter",
+        default=",",
+        metavar="MARK",
+        help="between the entries of a row: , ; tab … (%(default)s)",
     )
     table.add_argument(
         "--decimal", default=".", metavar="MARK", help="decimal mark, . or , (%(default)s)"
@@ -95,10 +102,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
 def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
     """Build the options of reading from the parsed arguments.
 
-    Raises
-    ------
-    ValueError
-        If they do not go together.
+    Raises ValueError if they do not go together.
     """
     columns = {
         field.name: getattr(arguments, f"{field.name}_column") for field in fields(CsvColumns)
@@ -119,10 +123,7 @@ def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
 def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) -> ValveFile:
     """Read the valve file of a recording; a recorded force needs none.
 
-    Raises
-    ------
-    ValueError
-        If the valve file cannot be read, or is needed and not given.
+    Raises ValueError if the valve file cannot be read, or is needed and not given.
     """
     if valve_file is not None:
         return read_valve_file(valve_file)
@@ -134,10 +135,7 @@ def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) 
 def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
     """Refuse several valves where `purpose` is for one.
 
-    Raises
-    ------
-    ValueError
-        Names the valves and the option that chooses one.
+    The ValueError names the valves and the option that chooses one.
     """
     if len(recorded) > 1:
         names = ", ".join(each.name for each in recorded)
@@ -147,10 +145,8 @@ def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
 def read_one(path: Path, valve: Valve, reading: ReadingOptions) -> RecordedValve:
     """Read the one valve that a file holds, or that was chosen.
 
-    Raises
-    ------
-    ValueError, RefusalError
-        If it cannot be read: one line that names the file, the cause and what to do.
+    Raises ValueError or RefusalError if it cannot be read: one line that names the file, the cause
+    and what to do.
     """
     recorded = read_recordings(path, valve, reading)
     require_one(recorded, f"{path} holds several, and this command takes")

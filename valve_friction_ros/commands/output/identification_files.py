@@ -20,13 +20,13 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=Path,
         metavar="FILE.html",
-        help="write a page for people: verdict, parameters, pictures, settings; one file",
+        help="write a page for people, one file: diagnosis, parameters, pictures, settings",
     )
     parser.add_argument(
         "--baseline-coulomb-friction",
         type=float,
         metavar="N",
-        help="F_c of this valve when it was healthy, to tell its excess friction",
+        help="F_c of this valve when it was healthy; its diagnosis compares with it",
     )
     parser.add_argument(
         "--baseline-half-width",
@@ -39,10 +39,7 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
 def baseline_from(options: argparse.Namespace) -> Baseline | None:
     """Build the baseline from the parsed arguments.
 
-    Raises
-    ------
-    ValueError
-        If it is impossible, or its interval is given without it.
+    Raises ValueError if it is impossible, or its interval is given without it.
     """
     friction, width = options.baseline_coulomb_friction, options.baseline_half_width
     if friction is None:
@@ -95,12 +92,9 @@ class IdentificationFiles(NamedTuple):
 
 
 def identification_files(options: argparse.Namespace) -> IdentificationFiles:
-    """Return the files that were asked for, and refuse those that cannot be written.
+    """Return the files that were asked for.
 
-    Raises
-    ------
-    ValueError
-        One line that names the file and the cause.
+    Raises ValueError, which names the file and the cause, for a file that cannot be written.
     """
     if options.plot is not None:
         from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import

@@ -100,10 +100,7 @@ class Estimate:
     def parameters(self) -> KarnoppParameters:
         """Return the parameters as a model to simulate.
 
-        Raises
-        ------
-        ValueError
-            If an identified value is impossible; the message names it.
+        Raises ValueError if an identified value is impossible; the message names it.
         """
         return KarnoppParameters(**self.values)
 

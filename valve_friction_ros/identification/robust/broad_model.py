@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
 from valve_friction_ros.identification.robust.imperfections import BOUNDS, IMPERFECTIONS
-from valve_friction_ros.model.graded_run import run_graded_stem
 from valve_friction_ros.model.stem_motion import Dynamics
+from valve_friction_ros.model.stem_run import run_stem
 
 __all__ = ["ABSENT", "MAIN", "BroadModel", "Coordinates", "Simulated"]
 
@@ -154,16 +154,16 @@ class BroadModel:
         start = at["start_position"]
         position[0] = min(max(start, 0.0), record.travel) if math.isfinite(record.travel) else start
         velocity[0] = record.leaving[0]
-        run_graded_stem(
+        run_stem(
             force,
-            self.grip(at),
-            record.anew,
-            record.leaving,
             record.period,
             upward,
             downward,
             position,
             velocity,
+            self.grip(at),
+            record.anew,
+            record.leaving,
         )
         return Simulated(position, velocity)
 

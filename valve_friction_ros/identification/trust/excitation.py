@@ -45,6 +45,13 @@ _LEAST_TRAVEL = 0.01
 _MOST_AT_A_STOP = 0.5
 """Share of the time at a travel stop: 0.18 at most in simulated records. Chosen."""
 
+_AT_A_STOP_NOISE = 5.0
+_AT_A_STOP_SHARE = 1e-3
+"""Distance within which the stem is at a stop: in standard deviations of the position's noise,
+which chance exceeds in 6 of 10⁷ samples, and at least this share of the travel.
+
+Chosen: the share of a noiseless record, far below the dead band of a stem."""
+
 _OUTSIDE = 0.05
 """Distance beyond a travel stop over the travel.
 
@@ -63,7 +70,8 @@ inverted record; a small share has a slope by chance."""
 _FOLLOWED_BLOCK = 0.1
 """Time, s, over which pressure and position are averaged before that test.
 
-Chosen: 100 samples at 1 kHz average noise; an absolute time, a tenth of a converter's lag."""
+Chosen: 100 samples at 1 kHz average noise. It is absolute, a tenth of the bench's lag; a share of
+the time of a stroke would suit other valves."""
 
 _MOVING_SHARE = 0.05
 """Speed over the top speed from which the stem counts as moving in that test. Chosen: leaves the
@@ -174,7 +182,7 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
     travel = valve.travel
     if not np.isfinite(travel):
         return
-    reach = max(5 * measured(recording).white_noise, 1e-3 * travel)
+    reach = max(_AT_A_STOP_NOISE * measured(recording).white_noise, _AT_A_STOP_SHARE * travel)
     for name, distance in (
         ("lower", np.abs(recording.position)),
         ("upper", np.abs(recording.position - travel)),
@@ -191,13 +199,9 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
 def _followed(recording: Recording) -> tuple[float, float]:
     """Fit the drive of the moving stem by its position and its direction.
 
-    While the stem moves, its drive follows position, shifted up or down by the friction. While it
-    rests, any drive within the dead band is possible, so rests are left out.
-
-    Returns
-    -------
-    slope, share : float
-        Drive over position, Pa/m or N/m, and the share of the variance that is explained.
+    Returns the slope, Pa/m or N/m, and the share of the variance that is explained. While the stem
+    moves, its drive follows position, shifted up or down by the friction. While it rests, any drive
+    within the dead band is possible, so rests are left out.
     """
     length = max(round(_FOLLOWED_BLOCK / recording.sample_period), 1)
     blocks = len(recording) // length
