@@ -14,7 +14,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmark.alarms import GROWTH, AlarmCounts, Judged, judge
+from benchmark.alarms import GROWTH, AlarmCounts, Diagnosed, diagnosed
 from benchmark.bounds import Bound, alarm_bounds, by_case, case_bounds, coverage_bounds
 from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, Case
 from benchmark.emps import emps_bounds
@@ -96,8 +96,8 @@ def _run(task: tuple[Case, int]) -> Outcome:
     return run(*task)
 
 
-def _judge(task: tuple[float, int]) -> Judged:
-    return judge(*task)
+def _diagnosed(task: tuple[float, int]) -> Diagnosed:
+    return diagnosed(*task)
 
 
 def _in_parallel(
@@ -140,8 +140,8 @@ def _coverage(results: Results, options: argparse.Namespace, console: Console) -
 def _alarms(results: Results, options: argparse.Namespace, console: Console) -> None:
     unchanged = [(1.0, seed) for seed in range(options.alarms)]
     grown = [(GROWTH, _FIRST_GROWN_SEED + seed) for seed in range(2 * options.grown)]
-    judged = _in_parallel("alarms", _judge, [*unchanged, *grown], options.jobs, console)
-    healthy, tight = judged[: len(unchanged)], judged[len(unchanged) :]
+    found = _in_parallel("alarms", _diagnosed, [*unchanged, *grown], options.jobs, console)
+    healthy, tight = found[: len(unchanged)], found[len(unchanged) :]
     declared = ["high" in (tight[i].side, tight[i + 1].side) for i in range(0, len(tight), 2)]
     ratios = [one.ratio for one in healthy], [one.ratio for one in tight]
     results.alarms = AlarmCounts([one.side for one in healthy], declared, ratios)
@@ -197,7 +197,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _information(results, console)
     console.print(bounds_table(results.bounds))
     for name, seconds in results.seconds.items():
-        console.print(f"{name}: {seconds:.2f} s to identify and assess 52 s at 1 kHz")
+        console.print(f"{name}: {seconds:.2f} s to identify 52 s at 1 kHz")
     output = options.output
     output.with_suffix(".json").write_text(
         json.dumps(asdict(results), indent=1, ensure_ascii=False), encoding="utf-8"

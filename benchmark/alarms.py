@@ -18,7 +18,7 @@ from valve_friction_ros.model import (
     simulate,
 )
 
-__all__ = ["GROWTH", "AlarmCounts", "Judged", "judge"]
+__all__ = ["GROWTH", "AlarmCounts", "Diagnosed", "diagnosed"]
 
 GROWTH = 1.5
 """Friction of the valve whose packing was tightened, over that of the unchanged one."""
@@ -27,8 +27,8 @@ _BASELINE_SEED = 1_000_000
 
 
 @dataclass(frozen=True)
-class Judged:
-    """One identification, judged by the monitor.
+class Diagnosed:
+    """The diagnosis of one identification.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ def _clean(growth: float) -> Recording:
     return Recording(PERIOD, pressure, simulate(BENCH_VALVE, valve, pressure, PERIOD).position)
 
 
-def _assessed(growth: float, seed: int) -> Result:
+def _identified(growth: float, seed: int) -> Result:
     noise = NOISES["28.6 µm"]
     recording = SensorNoise(noise.position, noise.pressure, seed).applied_to(_clean(growth))
     return identify_refined(recording, BENCH_VALVE, SETTINGS)
@@ -78,20 +78,20 @@ def _assessed(growth: float, seed: int) -> Result:
 
 @cache
 def _baseline() -> Baseline:
-    friction = _assessed(1.0, _BASELINE_SEED).parameters["coulomb_friction"]
+    friction = _identified(1.0, _BASELINE_SEED).parameters["coulomb_friction"]
     return Baseline(friction.value, friction.half_width)
 
 
-def judge(growth: float, seed: int) -> Judged:
-    """Identify a valve with its friction grown, and let the monitor judge it."""
+def diagnosed(growth: float, seed: int) -> Diagnosed:
+    """Identify a valve with its friction grown, and diagnose it by the unchanged one."""
     try:
-        result = _assessed(growth, seed)
+        result = _identified(growth, seed)
     except RefusalError:
-        return Judged("", float("nan"))
+        return Diagnosed("", float("nan"))
     limits = FrictionLimits()
     ratio = diagnose(result, BENCH_VALVE, _baseline(), limits).ratio
     if ratio is None:
-        return Judged("", float("nan"))
+        return Diagnosed("", float("nan"))
     if ratio.low >= limits.warn_ratio:
-        return Judged("high", ratio.value)
-    return Judged("low" if ratio.high <= limits.low_ratio else "", ratio.value)
+        return Diagnosed("high", ratio.value)
+    return Diagnosed("low" if ratio.high <= limits.low_ratio else "", ratio.value)

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmark.bounds import Bound
 from valve_friction_ros.identification import IdentificationSettings, Verdict, identify_refined
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.model import Drive, Recording, Valve
 
 __all__ = ["PUBLISHED", "RECORD", "emps_bounds"]
 
@@ -28,9 +28,9 @@ def emps_bounds() -> list[Bound] | None:
     if not RECORD.is_file():
         return None
     time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
-    record = Recording(float(np.median(np.diff(time))), force, position)
+    record = Recording(float(np.median(np.diff(time))), force, position, driven_by=Drive.FORCE)
     settings = IdentificationSettings(fixed={"spring_constant": 0.0})
-    result = identify_refined(record, Valve(1.0), settings)
+    result = identify_refined(record, Valve(), settings)
     bounds = []
     for name, published in PUBLISHED.items():
         one = result.parameters[name]

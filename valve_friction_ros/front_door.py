@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.identification.result import Result
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
@@ -19,8 +20,7 @@ from valve_friction_ros.streams.uniform_grid import uniform_recording
 
 __all__ = ["compare", "read_recording"]
 
-_COLUMNS = ("time_s", "pressure_pa", "position_m")
-_ANY_SENSOR = Valve(diaphragm_area=1.0)
+_ANY_SENSOR = Valve()
 """The default valve: its sensors have no range, its stem has no stops."""
 
 
@@ -36,10 +36,11 @@ def read_recording(
     ----------
     source : path, or mapping of str to array_like
         CSV file (may be gzipped) or bag (MCAP or SQLite3, folder or file); or a pandas frame or
-        a mapping with the columns ``time_s``, ``pressure_pa`` and ``position_m``.
+        a mapping with the columns ``time_s``, ``position_m`` and ``pressure_pa``, or ``force_n``
+        for a machine without a diaphragm (`Valve()`).
     valve : Valve, optional
-        Range of the pressure sensor, and the travel for positions in percent. A file with
-        ``force_n`` needs it to convert the force into a pressure.
+        Range of the pressure sensor, and the travel for positions in percent. With a diaphragm
+        it converts ``force_n`` of a file into the pressure that exerts this force.
     name : str, optional
         Valve of a bag, by its namespace; needed for a bag of several valves.
     options : ReadingOptions, optional
@@ -48,7 +49,7 @@ def read_recording(
     Returns
     -------
     Recording
-        Pressure and stem position on one uniform time grid.
+        Pressure, or force, and stem position on one uniform time grid.
 
     Raises
     ------
@@ -95,14 +96,16 @@ def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
 
 
 def _from_columns(columns: Mapping[str, Any]) -> Recording:
-    time, pressure, position = (_column(columns, name) for name in _COLUMNS)
+    is_force = "force_n" in columns and "pressure_pa" not in columns
+    names = ("force_n" if is_force else "pressure_pa", "position_m")
+    time, drive, position = (_column(columns, name) for name in ("time_s", *names))
     stamps = np.rint(time * 1e9).astype(np.int64)
     later = np.diff(stamps) > 0
     if not later.all():
         sample = int(np.argmin(later)) + 1
         raise ValueError(f"time_s does not increase at sample {sample}: sort the rows")
-    names = (_COLUMNS[1], _COLUMNS[2])
-    return uniform_recording(Samples(stamps, pressure), Samples(stamps, position), names)
+    driven_by = Drive.FORCE if is_force else Drive.PRESSURE
+    return uniform_recording(Samples(stamps, drive), Samples(stamps, position), names, driven_by)
 
 
 def compare(

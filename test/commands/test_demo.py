@@ -216,8 +216,9 @@ class TestIdentify:
         assert (friction.verdict, friction.reason) == (Verdict.WEAK, "2 strokes only")
         assert found.refined["mass"].verdict is Verdict.NOT_IDENTIFIABLE
         assert math.isnan(found.refined["mass"].value)
-        assert found.case.friction == friction
-        assert found.case.threshold == 0.002
+        coulomb, sigma = found.case.drawing.panels
+        assert coulomb.level == friction
+        assert sigma.chosen == 0.002
 
     def test_a_friction_that_is_not_identifiable_is_an_outcome_too(self, quick_record, values):
         """It is judged with the rest, not waited for."""

@@ -116,9 +116,10 @@ class TestJson:
             "unit": "N",
             "verdict": "identified",
             "reason": "",
+            "published": None,
         }
         assert entry["parameters"]["static_friction"]["value"] is None
-        assert entry["ratio"][0] == pytest.approx(150 / 141)
+        assert entry["diagnosis"]["ratio"] == pytest.approx(150 / 141)
         assert (entry["baseline"], entry["baseline_half_width"]) == (141.0, 1.0)
         assert entry["limits"] == vars(FrictionLimits())
         assert entry["settings"]["valve"]["diaphragm_area"] == 0.0445

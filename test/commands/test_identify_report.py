@@ -162,6 +162,7 @@ def test_a_machine_without_a_spring_has_no_residual(reported, write_csv, quick_r
     assert "Residual" not in page.said("h2")
     assert len(page.images) == 3
     assert "drive force [N]" in page.table("record")
+    assert not {"diaphragm area S_a", "pressure reference P_ref"} & {*page.table("setting")}
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.figures import (
-    FORCE,
     Case,
     friction_figure,
     identification_figure,
@@ -16,7 +15,7 @@ from valve_friction_ros.figures import (
 )
 from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.identification import Verdict
-from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
+from valve_friction_ros.model import BENCH_VALVE, Drive, Recording, Valve
 
 NAN = math.nan
 LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
@@ -95,9 +94,8 @@ class TestPanels:
         assert set(upright.get_xdata()) == {published.threshold}
 
     def test_a_method_without_a_sweep_has_none_to_draw(self, result):
-        alone = dataclasses.replace(result, estimate=None)
-        with pytest.raises(ValueError, match="the method refined has no sweep to draw"):
-            Case.of("recording", alone)
+        alone = dataclasses.replace(result, exhibit=None)
+        assert Case.of("recording", alone).drawing.panels == ()
         assert {*panels(identification_figure(alone))} == {"pressure", "stem", "signature"}
 
     def test_the_refined_friction_with_its_band_and_verdict(self, with_parameters):
@@ -126,7 +124,8 @@ class TestPanels:
         assert low < found.estimate.coulomb_friction < high
 
     def test_force_of_a_machine_without_diaphragm(self, record, result):
-        found = panels(identification_figure(result, FORCE))
+        force = dataclasses.replace(record, driven_by=Drive.FORCE)
+        found = panels(identification_figure(dataclasses.replace(result, recording=force)))
         assert found["pressure"].get_ylabel() == "drive force [N]"
         assert found["signature"].get_xlabel() == "drive force [N]"
         np.testing.assert_array_equal(found["pressure"].lines[0].get_ydata(), record.pressure)
@@ -238,11 +237,12 @@ class TestSeveralCases:
 
 def test_case_of_a_result(result):
     case = Case.of("loose", result)
-    assert case.chosen_coulomb_friction == result.estimate.coulomb_friction
-    assert case.threshold == result.estimate.threshold
-    assert case.friction is result.parameters["coulomb_friction"]
+    coulomb, sigma, _ = case.drawing.panels
+    assert coulomb.curves[1].y == [result.estimate.coulomb_friction]
+    assert sigma.chosen == result.estimate.threshold
+    assert coulomb.level is result.parameters["coulomb_friction"]
     assert case.simulated is result.stem.simulated
-    assert math.isclose(case.drive.pascals, 1e3)
+    assert case.recording.driven_by is Drive.PRESSURE
 
 
 class TestPictures:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.figures.report_figures import (
-    chosen_region,
     comparison_figure,
+    evidence_figure,
     record_figure,
     residual_figure,
     signature_loop_figure,
-    sweep_figure,
 )
+from valve_friction_ros.identification.published.sweep_drawing import chosen_region
 
 MILLIMETRE = 1 / 25.4
 PRINTABLE = 180.0  # mm between the margins of an A4 page
@@ -22,7 +22,7 @@ def figures(record, result):
     return {
         "record": record_figure(record),
         "loop": signature_loop_figure(result),
-        "sweep": sweep_figure(result),
+        "sweep": evidence_figure(result.drawing),
         "comparison": comparison_figure(comparison),
         "residual": residual_figure(comparison),
     }

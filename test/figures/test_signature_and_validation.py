@@ -41,7 +41,7 @@ class TestSignature:
             ("$P_1$", found.signature.upward_points),
             ("$P_2$", found.signature.downward_points),
         ):
-            expected = [[1e-3 * one.pressure, 1e3 * one.position] for one in points]
+            expected = [[1e-3 * one.drive, 1e3 * one.position] for one in points]
             np.testing.assert_allclose(drawn[label].get_xydata(), expected, rtol=1e-12)
 
     def test_lines_lie_on_the_sliding_stem(self, figure, found):
@@ -50,7 +50,7 @@ class TestSignature:
         for way, label in zip(found.signature.ways, ("up", "down"), strict=True):
             line = drawn[f"slides {label}, slope $S_a$/k"].get_xydata()
             sliding = way[0].sliding
-            pressure = 1e-3 * BENCH_VALVE.actuator_pressure(sliding.force[[0, -1]])
+            pressure = 1e-3 * BENCH_VALVE.actuator_drive(sliding.force[[0, -1]])
             np.testing.assert_allclose(line[:, 0], pressure, atol=0.1)
             np.testing.assert_allclose(line[:, 1], 1e3 * sliding.position[[0, -1]])
 

@@ -1,6 +1,7 @@
 """The history's file: what goes in comes out, and what plain SQL finds in it."""
 
 import sqlite3
+from dataclasses import replace
 
 import pytest
 from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, success
@@ -42,6 +43,23 @@ def test_what_goes_in_comes_out(history):
     assert len(found) == 3
     for one, other in zip(found, entries, strict=True):
         assert same(one, other)
+
+
+def test_a_file_of_version_1_is_read_and_extended(history):
+    """Version 1 had no published values; a file that is only read stays as it is."""
+    history.add(success())
+    connection = sqlite3.connect(history.path)
+    connection.execute("ALTER TABLE parameter DROP COLUMN published")
+    connection.execute("PRAGMA user_version = 1")
+    connection.close()
+    (old,) = history.entries()
+    assert same(old, success())
+    assert select(history, "PRAGMA user_version") == [(1,)]
+    friction = replace(parameter("coulomb_friction", 150.0), published=151.0)
+    new = success(START + 1, parameters={"coulomb_friction": friction})
+    history.add(new)
+    assert all(map(same, history.entries(), (old, new)))
+    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
 
 
 @given(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification import IdentificationSettings, published_estimate
-from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.model import Drive, Recording, Valve
 
 RECORD = (
     Path(__file__).resolve().parents[3] / "shared" / "data" / "emps" / "emps_identification.csv"
@@ -28,10 +28,9 @@ def estimate():
     time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
     period = float(np.median(np.diff(time)))
     assert period == pytest.approx(1e-3, rel=1e-9)
-    # No diaphragm and no spring: 1 Pa on 1 m² is 1 N.
-    record = Recording(period, force, position)
+    record = Recording(period, force, position, driven_by=Drive.FORCE)
     return published_estimate(
-        record, Valve(1.0), IdentificationSettings(fixed={"spring_constant": 0.0})
+        record, Valve(), IdentificationSettings(fixed={"spring_constant": 0.0})
     )
 
 

@@ -5,13 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify_refined
+from valve_friction_ros.identification import (
+    METHODS,
+    IdentificationSettings,
+    RefusalError,
+    identify_refined,
+)
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,
+    Drive,
     Recording,
     SensorNoise,
     SquareWave,
+    Valve,
     converter_response,
     simulate,
 )
@@ -84,6 +91,21 @@ def test_pressure_of_a_dead_sensor(healthy):
     still = Recording(PERIOD, np.full(len(healthy), 1e5), healthy.position)
     refused(still, "^the pressure did not change.*check the pressure sensor", SensorNoise(10e-6))
     refused(still, r"^pressure and stem do not move together .*: check that both signals belong to")
+
+
+def test_a_force_is_named_a_force(healthy):
+    rest = Recording(PERIOD, np.full(26_000, 700.0), healthy.position, driven_by=Drive.FORCE)
+    with pytest.raises(RefusalError, match=r"^the drive force did not change"):
+        identify_refined(rest, Valve(travel=BENCH_VALVE.travel), SETTINGS)
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "refined"])
+def test_a_force_on_a_diaphragm(healthy, method):
+    """The valve of a force has no diaphragm, and that of a pressure has one."""
+    force = replace(healthy, driven_by=Drive.FORCE)
+    for recording, valve in ((force, BENCH_VALVE), (healthy, Valve(travel=BENCH_VALVE.travel))):
+        with pytest.raises(ValueError, match="leave the diaphragm_area of the valve out"):
+            METHODS[method](recording, valve)
 
 
 def test_signals_that_are_swapped():

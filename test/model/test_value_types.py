@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.model import (
-    ATMOSPHERIC_PRESSURE,
     BENCH_VALVE,
     GRAPHITE_PACKING,
     HIGH_FRICTION,
     LOW_FRICTION,
+    Drive,
     KarnoppParameters,
     Recording,
     SensorNoise,
@@ -63,7 +63,9 @@ def test_signs():
 
 VALVE = {"diaphragm_area": 0.0445, "travel": 0.03}
 PARAMETERS = dataclasses.asdict(LOW_FRICTION)
-RECORDING = {"sample_period": 1e-3, "pressure": [1.0, 2.0, 3.0], "position": [0.0, 0.1, 0.2]}
+RECORDING = {"sample_period": 1e-3, "drive": [1.0, 2.0, 3.0], "position": [0.0, 0.1, 0.2]}
+
+WORDS = {"drive": "pressure", "position": "position"}
 
 NO_NUMBER = ["text", math.nan, math.inf]
 RULES = [
@@ -135,8 +137,8 @@ class TestValve:
         assert math.isnan(valve.share_of_travel(0.01))
 
     def test_force_counts_from_the_reference(self):
-        valve = Valve(0.05, pressure_reference=ATMOSPHERIC_PRESSURE)
-        pressure = ATMOSPHERIC_PRESSURE + np.array([-2e4, 0.0, 1e5])
+        valve = Valve(0.05, pressure_reference=101325.0)
+        pressure = 101325.0 + np.array([-2e4, 0.0, 1e5])
         # 0.05 m² · (−20, 0, 100) kPa
         np.testing.assert_allclose(valve.actuator_force(pressure), [-1000.0, 0.0, 5000.0])
 
@@ -145,7 +147,7 @@ class TestValve:
         force = BENCH_VALVE.actuator_force(pressure)
         # A difference, a product, a quotient and a sum, each rounded once, of up to 250 kPa.
         np.testing.assert_allclose(
-            BENCH_VALVE.actuator_pressure(force), pressure, rtol=0, atol=4 * np.spacing(2.5e5)
+            BENCH_VALVE.actuator_drive(force), pressure, rtol=0, atol=4 * np.spacing(2.5e5)
         )
 
     def test_share_of_travel(self):
@@ -167,7 +169,7 @@ def test_paper_values():
 
 
 class TestRecording:
-    @pytest.mark.parametrize("name", ["pressure", "position"])
+    @pytest.mark.parametrize("name", [*WORDS])
     def test_arrays_are_read_only_copies(self, name):
         samples = np.array([1.0, 2.0, 3.0])
         recording = Recording(**RECORDING | {name: samples})
@@ -178,21 +180,29 @@ class TestRecording:
             kept[0] = 7.0
         assert samples.flags.writeable
 
-    @pytest.mark.parametrize("name", ["pressure", "position"])
+    @pytest.mark.parametrize("name", [*WORDS])
     @pytest.mark.parametrize("samples", [[], 1.0, [[1.0, 2.0, 3.0]]])
     def test_refuses_what_is_no_row(self, name, samples):
-        with pytest.raises(ValueError, match=rf"^{name} must be a row of samples"):
+        with pytest.raises(ValueError, match=rf"^{WORDS[name]} must be a row of samples"):
             Recording(**RECORDING | {name: samples})
 
-    @pytest.mark.parametrize("name", ["pressure", "position"])
+    @pytest.mark.parametrize("name", [*WORDS])
     @pytest.mark.parametrize("value", NOT_FINITE)
     def test_names_the_first_sample_that_is_not_finite(self, name, value):
-        with pytest.raises(ValueError, match=rf"^{name} is not finite at sample 1$"):
+        with pytest.raises(ValueError, match=rf"^{WORDS[name]} is not finite at sample 1$"):
             Recording(**RECORDING | {name: [0.0, value, value]})
 
     def test_refuses_unequal_lengths(self):
         with pytest.raises(ValueError, match="pressure has 3 samples, position 2"):
             Recording(**RECORDING | {"position": [0.0, 0.1]})
+
+    def test_force_is_no_pressure(self):
+        force = Recording(**RECORDING, driven_by=Drive.FORCE)
+        np.testing.assert_array_equal(force.drive, [1.0, 2.0, 3.0])
+        with pytest.raises(ValueError, match="holds a force and no pressure"):
+            _ = force.pressure
+        with pytest.raises(ValueError, match="drive force has 3 samples, position 2"):
+            Recording(**RECORDING | {"position": [0.0, 0.1]}, driven_by=Drive.FORCE)
 
     def test_time_begins_at_zero(self):
         recording = Recording(0.25, np.zeros(5), np.zeros(5), start_time=1e9)

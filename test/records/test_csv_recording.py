@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import BENCH_VALVE, Valve
+from valve_friction_ros.model import BENCH_VALVE, Drive, Valve
 from valve_friction_ros.records.csv_recording import (
     CsvColumns,
     CsvFormat,
     CsvUnits,
     drive_column,
-    read_recording,
+    read_csv,
 )
 from valve_friction_ros.records.csv_table import CsvLayout, read_columns
 from valve_friction_ros.records.stretch import Stretch
@@ -52,7 +52,7 @@ def write(tmp_path):
 def refused(path, valve=BENCH_VALVE, form=None, stretch=None):
     """Message of the refusal: one line that begins with the file."""
     with pytest.raises((ValueError, RefusalError)) as refusal:
-        read_recording(path, valve, form, stretch)
+        read_csv(path, valve, form, stretch)
     file, _, message = str(refusal.value).partition(": ")
     assert file == str(path)
     assert "\n" not in message
@@ -68,29 +68,29 @@ def assert_good(record):
 
 class TestGoodFiles:
     def test_to_the_last_bit(self, write):
-        assert_good(read_recording(write([HEADER, *GOOD]), BENCH_VALVE))
+        assert_good(read_csv(write([HEADER, *GOOD]), BENCH_VALVE))
 
     def test_gzipped(self, write):
         path = write([HEADER, *GOOD])
         packed = path.with_suffix(".csv.gz")
         packed.write_bytes(gzip.compress(path.read_bytes()))
-        assert_good(read_recording(packed, BENCH_VALVE))
+        assert_good(read_csv(packed, BENCH_VALVE))
 
     def test_gzipped_or_not_whatever_its_name(self, write):
         """Told by the first bytes: names lie after a download or a decompression."""
-        assert_good(read_recording(write([HEADER, *GOOD], "record.csv.gz"), BENCH_VALVE))
+        assert_good(read_csv(write([HEADER, *GOOD], "record.csv.gz"), BENCH_VALVE))
         path = write([HEADER, *GOOD])
         path.write_bytes(gzip.compress(path.read_bytes()))
-        assert_good(read_recording(path, BENCH_VALVE))
+        assert_good(read_csv(path, BENCH_VALVE))
 
     def test_line_ends_and_mark_of_a_spreadsheet(self, write):
-        assert_good(read_recording(write(["\ufeff" + HEADER, *GOOD], newline="\r\n"), BENCH_VALVE))
+        assert_good(read_csv(write(["\ufeff" + HEADER, *GOOD], newline="\r\n"), BENCH_VALVE))
 
     def test_spaces_blank_rows_and_quotes(self, write):
         lines = [" time_s , position_m,pressure_pa", *GOOD[:5], "", *GOOD[5:]]
         lines[3] = ",".join(f' "{entry}"'.strip() for entry in lines[3].split(","))
         lines[4] = lines[4].replace(",", " ,  ")
-        assert_good(read_recording(write(lines), BENCH_VALVE))
+        assert_good(read_csv(write(lines), BENCH_VALVE))
 
     def test_further_columns_and_any_order(self, write):
         lines = ["note,pressure_pa,tag,position_m,time_s,force_n"]
@@ -100,35 +100,42 @@ class TestGoodFiles:
                 TIME.tolist(), POSITION.tolist(), PRESSURE.tolist(), strict=True
             )
         ]
-        assert_good(read_recording(write(lines), BENCH_VALVE))
+        assert_good(read_csv(write(lines), BENCH_VALVE))
 
     def test_other_headers(self, write):
         form = CsvFormat(CsvColumns(time="t", position="Weg [m]", pressure="Druck, Pa"))
         path = write(['t,Weg [m],"Druck, Pa"', *GOOD])
-        assert_good(read_recording(path, BENCH_VALVE, form))
+        assert_good(read_csv(path, BENCH_VALVE, form))
 
     def test_force_stands_for_pressure(self, write):
         """(100 N + 2 N·i)/0.5 m² + 8 Pa: exact."""
         force = 100.0 + 2 * np.arange(40)
         path = write(["time_s,position_m,force_n", *rows(TIME, POSITION, force)])
-        record = read_recording(path, Valve(0.5, pressure_reference=8.0))
+        record = read_csv(path, Valve(0.5, pressure_reference=8.0))
         np.testing.assert_array_equal(record.pressure, 208.0 + 4 * np.arange(40))
+
+    def test_force_without_a_diaphragm_stays_a_force(self, write):
+        force = 100.0 + 2 * np.arange(40)
+        path = write(["time_s,position_m,force_n", *rows(TIME, POSITION, force)])
+        record = read_csv(path, Valve())
+        assert record.driven_by is Drive.FORCE
+        np.testing.assert_array_equal(record.drive, force)
 
     def test_pressure_goes_before_force(self, write):
         path = write([HEADER + ",force_n", *(row + ",1.0" for row in GOOD)])
         assert drive_column(path, CsvFormat()) == "pressure_pa"
-        assert_good(read_recording(path, BENCH_VALVE))
+        assert_good(read_csv(path, BENCH_VALVE))
 
     def test_times_of_a_clock(self, write):
         """Float seconds of this century are 238 ns apart: so far may a stamp be off."""
         path = write([HEADER, *rows(1.7e9 + TIME, POSITION, PRESSURE)])
-        record = read_recording(path, BENCH_VALVE)
+        record = read_csv(path, BENCH_VALVE)
         assert record.start_time == 1.7e9
         assert record.sample_period == pytest.approx(1e-3, abs=2.4e-7)
 
     def test_times_rounded_to_nanoseconds(self, write):
         lines = [HEADER, *rows(TIME + 1e-12 * (-1.0) ** np.arange(40), POSITION, PRESSURE)]
-        assert_good(read_recording(write(lines), BENCH_VALVE))
+        assert_good(read_csv(write(lines), BENCH_VALVE))
 
     def test_columns_alone(self, write):
         found = read_columns(write([HEADER, *GOOD]), ("pressure_pa", "time_s"))
@@ -146,7 +153,7 @@ class TestUnitsAndLayout:
             for row in (line.replace(",", ";") for line in rows(time, position, pressure))
         ]
         path = write([HEADER.replace(",", delimiter), *lines])
-        return read_recording(path, BENCH_VALVE, form)
+        return read_csv(path, BENCH_VALVE, form)
 
     @pytest.mark.parametrize(
         "layout",
@@ -202,7 +209,7 @@ class TestUnitsAndLayout:
             ["time_s,position_m,force_n", *rows(TIME, POSITION, 100.0 + 2 * np.arange(40))]
         )
         form = CsvFormat(units=CsvUnits(force="kN"))
-        record = read_recording(path, Valve(0.5, pressure_reference=8.0), form)
+        record = read_csv(path, Valve(0.5, pressure_reference=8.0), form)
         np.testing.assert_array_equal(record.pressure, 200_008.0 + 4000 * np.arange(40))
 
     def test_range_of_the_sensor_in_another_unit(self, write):
@@ -244,7 +251,7 @@ class TestStretch:
     )
     def test_both_ends_belong_to_it(self, write, stretch, first, last):
         path = write([HEADER, *rows(5.0 + TIME, POSITION, PRESSURE)])
-        record = read_recording(path, BENCH_VALVE, stretch=stretch)
+        record = read_csv(path, BENCH_VALVE, stretch=stretch)
         np.testing.assert_array_equal(record.position, POSITION[first : last + 1])
 
     @pytest.mark.parametrize("bad", ["0.01,nan,1e5", "0.01,0.003,3e5", "0.0001,0.003,1e5"])
@@ -252,7 +259,7 @@ class TestStretch:
         path = write(with_row(12, bad))
         assert refused(path).startswith("row 12, column ")
         for stretch, size in ((Stretch(begin=0.0105), 29), (Stretch(begin=0.0005, end=0.0095), 9)):
-            assert len(read_recording(path, BENCH_VALVE, stretch=stretch)) == size
+            assert len(read_csv(path, BENCH_VALVE, stretch=stretch)) == size
 
     def test_rows_are_counted_from_the_top(self, write):
         path = write(with_row(22, "0.02,nan,1e5"))
@@ -352,7 +359,7 @@ class TestEntries:
     def test_range_of_the_sensor(self, write, pressure, inside):
         path = write(with_row(12, f"0.01,0.003,{pressure!r}"))
         if inside:
-            assert read_recording(path, BENCH_VALVE).pressure[10] == pressure
+            assert read_csv(path, BENCH_VALVE).pressure[10] == pressure
         else:
             assert refused(path) == (
                 f"row 12, column 'pressure_pa': {pressure:g} Pa is outside the sensor's range 0 "
@@ -383,12 +390,12 @@ class TestTimes:
     def test_a_gap_is_a_refusal_of_the_record(self, write):
         late = TIME + 0.02 * (np.arange(40) >= 10)
         with pytest.raises(RefusalError):
-            read_recording(write([HEADER, *rows(late, POSITION, PRESSURE)]), BENCH_VALVE)
+            read_csv(write([HEADER, *rows(late, POSITION, PRESSURE)]), BENCH_VALVE)
 
     def test_ten_periods_are_no_gap(self, write):
         late = TIME + 0.009 * (np.arange(40) >= 10)
         path = write([HEADER, *rows(late, POSITION, PRESSURE)])
-        assert len(read_recording(path, BENCH_VALVE)) == 49
+        assert len(read_csv(path, BENCH_VALVE)) == 49
 
     def test_nanoseconds_taken_for_seconds(self, write):
         stamps = 1_700_000_000_000_000_000 + 1e9 * TIME

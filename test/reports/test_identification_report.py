@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from valve_friction_ros.figures.report_figures import chosen_region
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import StemComparison, Verdict
+from valve_friction_ros.identification.published.sweep_drawing import chosen_region
 from valve_friction_ros.reports import (
     Page,
     identification_report,

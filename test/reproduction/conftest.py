@@ -9,7 +9,8 @@ import pytest
 
 from valve_friction_ros.commands import main, reproduce_paper
 from valve_friction_ros.model import IsaSteps
-from valve_friction_ros.reproduction import Plan, Programme
+from valve_friction_ros.reproduction.experiments import Plan
+from valve_friction_ros.reproduction.programme import Programme
 
 SHORT = Plan(
     square_periods=2, triangle_periods=2.5, sine_periods=1, isa=IsaSteps(sizes=(0.02, 0.2))

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pytest
 
 from valve_friction_ros.commands.main import run
-from valve_friction_ros.reproduction import all_checks
+from valve_friction_ros.reproduction.checks.checks import all_checks
 
 PICTURES = {
     "excitations",

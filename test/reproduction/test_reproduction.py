@@ -20,20 +20,12 @@ from valve_friction_ros.model import (
     SensorNoise,
     SquareWave,
 )
-from valve_friction_ros.reproduction import (
-    BENCH_NAMES,
-    Check,
-    all_checks,
-    find_bench_folder,
-    progress_steps,
-    read_bench,
-    run,
-    summary,
-)
-from valve_friction_ros.reproduction.checks.check import within, written
-from valve_friction_ros.reproduction.experiments import TRIANGLE
+from valve_friction_ros.reproduction.bench import BENCH_NAMES, find_bench_folder, read_bench
+from valve_friction_ros.reproduction.checks.check import Check, summary, within, written
+from valve_friction_ros.reproduction.checks.checks import all_checks
+from valve_friction_ros.reproduction.experiments import TRIANGLE, run
 from valve_friction_ros.reproduction.force_terms import force_terms
-from valve_friction_ros.reproduction.programme import rounded_bias
+from valve_friction_ros.reproduction.programme import progress_steps, rounded_bias
 
 KNOWN = {
     "low": (BENCH_VALVE, LOW_FRICTION),

@@ -1,6 +1,7 @@
 """Entries of a history, made up."""
 
 import math
+from dataclasses import replace
 
 from valve_friction_ros.health import (
     Diagnosis,
@@ -24,10 +25,8 @@ _SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
 
 
 def as_kept(one):
-    """The parameter as the history gives it back: without published value and bound."""
-    return Parameter(
-        one.name, one.value, one.standard_error, one.half_width, one.verdict, one.reason
-    )
+    """The parameter as the history gives it back: without its bound."""
+    return replace(one, magnitude_bound=math.nan)
 
 
 def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""):

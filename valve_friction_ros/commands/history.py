@@ -50,7 +50,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = "List what the identifiers have kept: identifications, refusals and trend."
     parser.epilog = (
-        "Times are in UTC. Exit code 2: the file or the choice was refused, or the table or the "
+        "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
         "picture could not be written."
     )
     parser.add_argument(
@@ -76,9 +76,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
         type=_until,
         default=_LAST,
         metavar="TIME",
-        help="only before this time; a date counts as a whole",
+        help="only before this time; a date stands for its whole day",
     )
-    parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write them as a table")
+    parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 

@@ -11,9 +11,9 @@ from valve_friction_ros.commands.arguments.identification import (
 )
 from valve_friction_ros.commands.arguments.recording import (
     add_recording_arguments,
-    described_valve,
     reading_options,
     require_one,
+    valve_of,
 )
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.identification_files import (
@@ -40,7 +40,7 @@ REFUSALS = (RefusalError,)
 
 
 class _Answer(NamedTuple):
-    """A valve of the file, what came of it, and its diagnosis where it has a baseline."""
+    """A valve of the file, its result or refusal, and its diagnosis where it has a baseline."""
 
     recorded: RecordedValve
     outcome: Result | RefusalError
@@ -51,8 +51,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
     parser.epilog = (
-        "All results are in SI units. Exit code 2: the file or the record was refused (of several "
-        "valves in a bag all were), or a file could not be written; 1: some valves were refused."
+        "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
+        "were refused, or a file could not be written; 1: some valves were refused."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
@@ -117,7 +117,7 @@ def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
 def run(options: argparse.Namespace) -> int:
     """Identify the valves of the file, print what was found, and write the files asked for."""
     reading = reading_options(options)
-    description = described_valve(options, reading)
+    description = valve_of(options.file, options.valve, reading)
     valve = description.valve
     settings = identification_settings(options, description.known)
     baseline, files = baseline_from(options), identification_files(options)
@@ -137,4 +137,4 @@ def run(options: argparse.Namespace) -> int:
     finally:  # a closed output costs no picture, and a full disk no numbers
         for each, outcome, _ in results:
             if isinstance(outcome, Result):
-                files.write(each, description, outcome, baseline)
+                files.write(each, outcome, baseline)

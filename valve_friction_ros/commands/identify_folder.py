@@ -49,12 +49,13 @@ _Rows = list[Mapping[str, Cell]]
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
-        "Identify all recordings in a folder and those below it, on all cores, a row a valve in "
-        "one file. The same command goes on where it was interrupted."
+        "Identify all recordings in a folder and in the folders below it, on all cores. The "
+        "results are one file with a row for each valve. After an interruption the same command "
+        "goes on."
     )
     parser.epilog = (
-        "Exit code 0: all were identified; 1: some were refused; 2: all were, or nothing was done; "
-        "130, 143: interrupted."
+        "Exit code 0: all were identified; 1: some were refused; 2: all recordings or an option "
+        "were refused; 130, 143: interrupted."
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="where the recordings are")
     parser.add_argument(
@@ -77,7 +78,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=usable_cores(),
         metavar="N",
-        help="recordings at a time, a process each (%(default)s)",
+        help="recordings identified at the same time, each by its own process (%(default)s)",
     )
     parser.add_argument(
         "--retry-failed", action="store_true", help="identify again what was refused before"
@@ -132,7 +133,7 @@ def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[t
 
 
 def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: StopSignals) -> None:
-    """Identify and write, and show how far it is."""
+    """Identify the recordings, write their rows, and show the progress."""
     console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
     columns = (
         TextColumn("identifying"),

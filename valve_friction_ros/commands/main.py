@@ -47,7 +47,10 @@ class SubCommand(Protocol):
         """Declare the arguments, and what the help says around them."""
 
     def run(self, options: argparse.Namespace) -> int:
-        """Run, print the result, and return the exit code."""
+        """Run the sub-command that `arguments` name; return the exit code.
+
+        What went wrong stands on one line of stderr.
+        """
 
 
 def _imported(name: str) -> SubCommand:
@@ -91,12 +94,9 @@ def _run(name: str, arguments: Sequence[str]) -> int:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run the sub-command that `arguments` name.
+    """Run the sub-command that `arguments` name; return the exit code.
 
-    Returns
-    -------
-    int
-        Exit code; what went wrong stands on one line of stderr.
+    What went wrong stands on one line of stderr.
     """
     name = ""
     try:

@@ -13,19 +13,13 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import SensorNoise
 from valve_friction_ros.records.whole_file import write_whole
 from valve_friction_ros.reports import write_report
-from valve_friction_ros.reproduction import (
-    BENCH_NAMES,
-    Bench,
-    Plan,
-    all_checks,
-    draw_figures,
-    find_bench_folder,
-    progress_steps,
-    read_bench,
-    report_page,
-    run_programme,
-    summary,
-)
+from valve_friction_ros.reproduction.bench import BENCH_NAMES, Bench, find_bench_folder, read_bench
+from valve_friction_ros.reproduction.checks.check import summary
+from valve_friction_ros.reproduction.checks.checks import all_checks
+from valve_friction_ros.reproduction.experiments import Plan
+from valve_friction_ros.reproduction.figures.figures import draw_figures
+from valve_friction_ros.reproduction.programme import progress_steps, run_programme
+from valve_friction_ros.reproduction.report import report_page
 
 __all__ = ["REFUSALS", "declare", "run"]
 
@@ -41,8 +35,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
         "Run the paper's experiments, identification and validation on the simulated bench, and "
-        f"write {_PAGE} and every figure, beside the paper's numbers. The last line says what "
-        "matched."
+        f"write {_PAGE} and every figure, beside the paper's numbers. The last line counts the "
+        "matches, and names what does not match."
     )
     parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
     parser.add_argument(
@@ -71,7 +65,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
         metavar="PA",
         help="standard deviation of the pressure sensor, Pa, instead of the configured one",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the noise (%(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the noise (%(default)s)"
+    )
 
 
 def _noise(bench: Bench, options: argparse.Namespace) -> SensorNoise:

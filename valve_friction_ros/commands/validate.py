@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 
 from valve_friction_ros.commands.arguments.estimate_file import read_estimate
 from valve_friction_ros.commands.arguments.recording import (
-    DIRECT_DRIVE,
     add_recording_arguments,
-    described_valve,
     read_one,
     reading_options,
+    valve_of,
 )
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.health import percentage
@@ -32,12 +31,11 @@ REFUSALS = (RefusalError,)
 
 
 class _Result(NamedTuple):
-    """What came of it."""
+    """A validation, and what it was made from."""
 
     validation: Validation
     model: IdentifiedModel
     valve: Valve
-    is_force: bool
     notes: tuple[str, ...]
 
 
@@ -66,7 +64,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def _validated(options: argparse.Namespace) -> _Result:
     """Read the files and simulate."""
     reading = reading_options(options)
-    description = described_valve(options, reading)
+    description = valve_of(options.file, options.valve, reading)
     valve = description.valve
     estimate = read_estimate(options.estimate)
     try:
@@ -83,13 +81,11 @@ def _validated(options: argparse.Namespace) -> _Result:
         validation = validate(recording, valve, model.parameters)
     except RefusalError as refusal:
         raise recorded.refused(refusal) from None
-    return _Result(
-        validation, model, valve, description is DIRECT_DRIVE, (*recorded.notes, *model.notes)
-    )
+    return _Result(validation, model, valve, (*recorded.notes, *model.notes))
 
 
 def _as_json(result: _Result) -> dict[str, Any]:
-    validation, model, valve, _, notes = result
+    validation, model, valve, notes = result
     return {
         "fit": validation.fit,
         "rms": validation.rms,
@@ -103,7 +99,7 @@ def _as_json(result: _Result) -> dict[str, Any]:
 
 
 def _print(result: _Result) -> None:
-    validation, _, valve, _, notes = result
+    validation, _, valve, notes = result
     share = valve.share_of_travel(validation.rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
     print(f"fit {100 * validation.fit:.2f} %  (1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
@@ -116,8 +112,7 @@ def _print(result: _Result) -> None:
 def _draw(result: _Result, path: Path) -> None:
     from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
-    drive = figures.FORCE if result.is_force else figures.PRESSURE
-    figures.save_picture(figures.validation_figure(result.validation, result.valve, drive), path)
+    figures.save_picture(figures.validation_figure(result.validation, result.valve), path)
 
 
 def run(options: argparse.Namespace) -> int:

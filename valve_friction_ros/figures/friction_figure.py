@@ -1,27 +1,22 @@
 """The figure of an identification: record, sweep, signature and verdicts on one page."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.page import dress, titled_figure
 from valve_friction_ros.figures.panels import (
     COLOURS,
-    draw_coulomb_sweep,
+    SYMBOLS,
+    draw_panels,
     draw_record,
-    draw_sigma_sweep,
     draw_signature,
 )
-from valve_friction_ros.figures.signature_figure import signature_figure
 from valve_friction_ros.health import dead_band, percentage
-from valve_friction_ros.identification import (
-    PARAMETER_UNITS,
-    Parameter,
-    Result,
-)
-from valve_friction_ros.model import Valve
+from valve_friction_ros.identification import Result
 
 __all__ = ["friction_figure", "identification_figure"]
 
@@ -48,67 +43,45 @@ def friction_figure(cases: Sequence[Case], title: str) -> Figure:
     """
     if not 0 < len(cases) <= len(COLOURS):
         raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
+    own = [[one for one in case.drawing.panels if not one.is_detail] for case in cases]
+    names = [panel.name for panel in own[0]]
     figure = titled_figure(title)
-    panels = figure.subplot_mosaic(
-        [
-            ["pressure", "pressure"],
-            ["stem", "stem"],
-            ["coulomb", "signature"],
-            ["sigma", "signature"],
-        ],
-        height_ratios=[1, 1.2, 1.8, 1],
-    )
+    rows: list[Any]
+    if names:
+        rows = [["pressure"] * 2, ["stem"] * 2, *([name, "signature"] for name in names)]
+        heights = [1, 1.2, 1.8, *[1] * (len(names) - 1)]
+    else:
+        rows, heights = [["pressure"], ["stem"], ["signature"]], [1, 1.2, 2.8]
+    panels = figure.subplot_mosaic(rows, height_ratios=heights)
     panels["stem"].sharex(panels["pressure"])
-    panels["sigma"].sharex(panels["coulomb"])
+    for name in names[1:]:
+        panels[name].sharex(panels[names[0]])
     draw_record(panels["pressure"], panels["stem"], cases)
-    draw_coulomb_sweep(panels["coulomb"], cases)
-    draw_sigma_sweep(panels["sigma"], cases)
+    panels["pressure"].tick_params(labelbottom=False)
+    draw_panels([panels[name] for name in names], own)
     draw_signature(panels["signature"], cases)
-    if len(cases) > 1:
-        panels["signature"].legend(loc="upper left", frameon=False)
     dress(panels.values())
     return figure
 
 
-def identification_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
+def identification_figure(result: Result) -> Figure:
     """Draw a recording and its identification, each number with its verdict."""
-    title = _title(result, result.valve)
-    if result.signature is not None:
-        return signature_figure(result, title, drive)
-    if result.estimate is None:
-        return _figure_without_sweep(result, title, drive)
-    return friction_figure([Case.of("recording", result, drive)], title)
+    return friction_figure([Case.of("recording", result)], _title(result))
 
 
-def _figure_without_sweep(result: Result, title: str, drive: DriveScale) -> Figure:
-    figure = titled_figure(title)
-    panels = figure.subplot_mosaic([["pressure", "signature"], ["stem", "signature"]])
-    panels["stem"].sharex(panels["pressure"])
-    case = Case.without_sweep("recording", result, drive)
-    draw_record(panels["pressure"], panels["stem"], [case])
-    draw_signature(panels["signature"], [case])
-    dress(panels.values())
-    return figure
-
-
-def _title(result: Result, valve: Valve) -> str:
-    parts = [
-        _with_verdict(symbol, result.parameters[name], PARAMETER_UNITS[name])
-        for symbol, name in (
-            ("F_c", "coulomb_friction"),
-            ("F_v", "viscous_friction"),
-            ("k", "spring_constant"),
-        )
-    ]
-    share = dead_band(result, valve)
+def _title(result: Result) -> str:
+    shown = result.to_dict()
+    parts = [_with_verdict(symbol, shown["parameters"][name]) for name, symbol in SYMBOLS.items()]
+    share = dead_band(result, result.valve)
     if math.isfinite(share):
         parts.append(f"dead band {percentage(share)} of travel")
-    if math.isfinite(result.rms):
-        parts.append(f"fit {100 * result.fit:.2f} %")
-    return "; ".join((*parts, *result.warnings))
+    if shown["rms"] is not None:
+        parts.append(f"fit {100 * shown['fit']:.2f} %")
+    return "; ".join((*parts, *shown["warnings"]))
 
 
-def _with_verdict(symbol: str, parameter: Parameter, unit: str) -> str:
-    if math.isnan(parameter.value):
-        return f"{symbol} {parameter.verdict.value}"
-    return f"{symbol} {parameter.value:.4g} {unit} ({parameter.verdict.value})"
+def _with_verdict(symbol: str, parameter: Mapping[str, Any]) -> str:
+    value, verdict = parameter["value"], parameter["verdict"]
+    if value is None:
+        return f"{symbol} {verdict}"
+    return f"{symbol} {value:.4g} {parameter['unit']} ({verdict})"

@@ -5,25 +5,25 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from valve_friction_ros.figures.case import Case, DriveScale
-from valve_friction_ros.identification import Parameter
-from valve_friction_ros.model import Recording
+from valve_friction_ros.figures.case import Case
+from valve_friction_ros.identification import Curve, Panel, Parameter
 
 __all__ = [
     "COLOURS",
-    "draw_coulomb_sweep",
-    "draw_pressure",
+    "SYMBOLS",
+    "draw_curves",
+    "draw_panels",
     "draw_record",
-    "draw_sigma_sweep",
     "draw_signature",
-    "draw_stem",
     "thinned",
 ]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Colours of Okabe and Ito: colour-blind readers can distinguish them."""
+
+SYMBOLS = {"coulomb_friction": "F_c", "viscous_friction": "F_v", "spring_constant": "k"}
+"""The parameters that figures name, by their symbols."""
 
 _MOST_POINTS = 20_000
 """Most points drawn of a record. Chosen: ten for each pixel of the width, so that peaks stay."""
@@ -34,102 +34,127 @@ def thinned(size: int) -> slice:
     return slice(None, None, max(1, size // _MOST_POINTS))
 
 
-def draw_record(pressure_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw pressure and stem position over the time since the first record began."""
+def draw_record(drive_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> None:
+    """Draw drive and stem position over the time since the first record began."""
     origin = cases[0].recording.start_time
     for case, colour in zip(cases, COLOURS, strict=False):
         recording = case.recording
         some = thinned(len(recording))
         time = (recording.time + recording.start_time - origin)[some]
-        pressure_axes.plot(
-            time, recording.pressure[some] / case.drive.pascals, color=colour, lw=1.2
+        drive_axes.plot(
+            time, recording.drive[some] / recording.driven_by.size, color=colour, lw=1.2
         )
         stem_axes.plot(time, recording.position[some] * 1e3, color=colour, label=case.label, lw=1.2)
         if case.simulated is not None:
             spread = np.linspace(time[0], recording.time[-1] + time[0], case.simulated.size)
             few = thinned(case.simulated.size)
             stem_axes.plot(spread[few], case.simulated[few] * 1e3, "k:", lw=1.0)
-            stem_axes.set_title("stem (dotted: refined model)", loc="right", fontsize="small")
-    pressure_axes.set_ylabel(cases[0].drive.label)
-    pressure_axes.tick_params(labelbottom=False)
+            stem_axes.set_title(case.drawing.stem_title, loc="right", fontsize="small")
+        draw_curves(stem_axes, case.drawing.stem, 1.0)
+    drive_axes.set_ylabel(cases[0].recording.driven_by.label)
     stem_axes.set_ylabel("stem [mm]")
     stem_axes.set_xlabel("time [s]")
 
 
-def draw_pressure(axes: Axes, recording: Recording, drive: DriveScale, colour: str) -> None:
-    """Draw the pressure over the time since the record began."""
-    some = thinned(len(recording))
-    axes.plot(recording.time[some], recording.pressure[some] / drive.pascals, color=colour, lw=1.2)
-    axes.set_ylabel(drive.label)
-
-
-def draw_stem(axes: Axes, recording: Recording, simulated: NDArray[np.float64]) -> None:
-    """Draw the measured stem over the time, and the simulated stem as a dotted line on it."""
-    some = thinned(len(recording))
-    time = recording.time[some]
-    axes.plot(time, recording.position[some] * 1e3, color=COLOURS[0], lw=1.2)
-    axes.plot(time, simulated[some] * 1e3, "k:", lw=1.2)
-    axes.set_ylabel("stem [mm]")
-    axes.set_xlabel("time [s]")
+def draw_curves(
+    axes: Axes, curves: Sequence[Curve], x_unit: float, marker_colour: str = "black"
+) -> None:
+    """Draw curves of a method on the stem position, in mm, over what has this unit."""
+    colours = iter(COLOURS[1:] * len(curves))
+    for curve in curves:
+        x, y = curve.scaled(x_unit, 1e-3)
+        if curve.is_line:
+            axes.plot(x, y, curve.style, color=next(colours), lw=1.6, label=curve.label)
+        else:
+            axes.plot(
+                x,
+                y,
+                curve.style,
+                color=marker_colour,
+                mec="white",
+                ms=9,
+                zorder=4,
+                label=curve.label,
+            )
 
 
 def draw_signature(axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw the valve signature: stem position over pressure."""
+    """Draw the valve signature: stem position over the drive, with what the method adds."""
     for case, colour in zip(cases, COLOURS, strict=False):
-        some = thinned(len(case.recording))
+        recording, some = case.recording, thinned(len(case.recording))
+        label = case.label if len(cases) > 1 else None
+        drive = recording.driven_by
         axes.plot(
-            case.recording.pressure[some] / case.drive.pascals,
-            case.recording.position[some] * 1e3,
+            recording.drive[some] / drive.size,
+            recording.position[some] * 1e3,
             color=colour,
             lw=1.2,
-            label=case.label,
+            label=label,
         )
-    axes.set_xlabel(cases[0].drive.label)
+        draw_curves(axes, case.drawing.loop, drive.size)
+    axes.set_xlabel(cases[0].recording.driven_by.label)
     axes.set_ylabel("stem [mm]")
-    axes.set_title("valve signature")
+    axes.set_title(cases[0].drawing.loop_title)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="upper left", frameon=False)
 
 
-def _told(friction: Parameter) -> str:
-    """Return the refined Coulomb friction and its verdict as text."""
-    if math.isnan(friction.value):
-        return f"$F_c$ {friction.verdict.value}"
-    interval = f" ± {friction.half_width:.2g}" if friction.half_width > 0 else ""
-    return f"$F_c$ = {friction.value:.4g}{interval} N: {friction.verdict.value}"
+def _told(parameter: Parameter) -> str:
+    """Return a parameter and its verdict as text."""
+    symbol = SYMBOLS.get(parameter.name, parameter.name)
+    if math.isnan(parameter.value):
+        return f"${symbol}$ {parameter.verdict.value}"
+    interval = f" ± {parameter.half_width:.2g}" if parameter.half_width > 0 else ""
+    value = f"{parameter.value:.4g}{interval} {parameter.unit}"
+    return f"${symbol}$ = {value}: {parameter.verdict.value}"
 
 
-def draw_coulomb_sweep(axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw F_c over the threshold δv, the chosen threshold, and the refined F_c as a band."""
+def _draw_level(axes: Axes, level: Parameter, otherwise: float, colour: str) -> float:
+    """Draw a parameter with its interval as a band, and its verdict; return its place."""
+    shown = otherwise if math.isnan(level.value) else level.value
+    if not math.isnan(level.value):
+        axes.axhline(level.value, color=colour, ls="--", lw=1.0)
+        axes.axhspan(*level.interval, color=colour, alpha=0.2, lw=0)
+    axes.annotate(
+        _told(level),
+        (0.98, shown),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 5),
+        textcoords="offset points",
+        ha="right",
+        bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1},
+    )
+    return shown
+
+
+def draw_panel(axes: Axes, panels: Sequence[Panel]) -> None:
+    """Draw the same panel of one or several cases."""
     levels = [0.0]
-    for case, colour in zip(cases, COLOURS, strict=False):
-        chosen, refined = case.chosen_coulomb_friction, case.friction
-        axes.plot(case.thresholds, case.coulomb_friction, color=colour, lw=1.2)
-        axes.plot(case.threshold, chosen, "o", color=colour, mec="black", ms=7, zorder=3)
-        shown = chosen if math.isnan(refined.value) else refined.value
-        if not math.isnan(refined.value):
-            axes.axhline(refined.value, color=colour, ls="--", lw=1.0)
-            axes.axhspan(*refined.interval, color=colour, alpha=0.2, lw=0)
-        axes.annotate(
-            _told(refined),
-            (0.98, shown),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, 5),
-            textcoords="offset points",
-            ha="right",
-            bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1},
-        )
-        levels += [chosen, shown]
-    if max(levels) > 0:
+    for panel, colour in zip(panels, COLOURS, strict=False):
+        for curve in panel.curves:
+            x, y = curve.scaled(1.0, 1.0)
+            if curve.is_line:
+                axes.plot(x, y, curve.style, color=colour, lw=1.2)
+            else:
+                axes.plot(x, y, curve.style, color=colour, mec="black", ms=7, zorder=3)
+                levels += y.tolist()
+        if panel.chosen is not None:
+            axes.axvline(panel.chosen, color=colour, ls=":", lw=1.2)
+        if panel.level is not None:
+            levels.append(_draw_level(axes, panel.level, levels[-1], colour))
+    if panels[0].level is not None and max(levels) > 0:
         axes.set_ylim(0, 1.5 * max(levels))
-    axes.set_ylabel("coulomb friction $F_c$ [N]")
-    axes.tick_params(labelbottom=False)
-    axes.set_title("δv sweep (● published choice, dashed: refined, with 95 % band)")
+    if panels[0].is_logarithmic:
+        axes.set_yscale("log")
+    axes.set_ylabel(panels[0].y_label)
+    axes.set_title(panels[0].title)
 
 
-def draw_sigma_sweep(axes: Axes, cases: Sequence[Case]) -> None:
-    """Draw σ_s over the threshold δv, with the chosen threshold marked."""
-    for case, colour in zip(cases, COLOURS, strict=False):
-        resolved = np.maximum(case.sigma, 1e-9 * np.nanmax(case.sigma))
-        axes.semilogy(case.thresholds, resolved, color=colour, lw=1.2)
-        axes.axvline(case.threshold, color=colour, ls=":", lw=1.2)
-    axes.set_ylabel("$\\sigma_s$ [N]")
-    axes.set_xlabel("threshold δv [m/s]")
+def draw_panels(axes: Sequence[Axes], cases: Sequence[Sequence[Panel]]) -> None:
+    """Draw the panels of one or several cases below one another; the lowest has the x label."""
+    for place, panels in zip(axes, zip(*cases, strict=True), strict=True):
+        draw_panel(place, panels)
+        place.tick_params(labelbottom=False)
+    if axes:
+        axes[-1].set_xlabel(cases[0][-1].x_label)
+        axes[-1].tick_params(labelbottom=True)

@@ -7,38 +7,28 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from valve_friction_ros.figures.case import PRESSURE, Case, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.page import dress
 from valve_friction_ros.figures.panels import (
     COLOURS,
-    draw_coulomb_sweep,
-    draw_pressure,
-    draw_sigma_sweep,
+    draw_panels,
+    draw_record,
+    draw_signature,
     thinned,
 )
-from valve_friction_ros.figures.signature_figure import draw_signature_loop
-from valve_friction_ros.identification import (
-    Result,
-    StemComparison,
-    Sweep,
-)
+from valve_friction_ros.identification import Drawing, Result, StemComparison
 from valve_friction_ros.model import Recording
 
 __all__ = [
-    "SETTLED_SHARE",
-    "chosen_region",
     "comparison_figure",
+    "evidence_figure",
     "record_figure",
     "residual_figure",
     "signature_loop_figure",
-    "sweep_figure",
 ]
 
 _WIDTH = 7.1
 """Between the margins of an A4 page, inches."""
-
-SETTLED_SHARE = 0.1
-"""Largest difference of σ_s in the chosen region, over σ_s at the chosen threshold. Chosen."""
 
 _PALE = "#8CC5E8"
 """Pale, so that curves on it stay visible."""
@@ -52,69 +42,40 @@ def _paper_figure(height: float) -> Figure:
     return Figure(figsize=(_WIDTH, height), layout="constrained")
 
 
-def record_figure(recording: Recording, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw pressure and measured stem position over the time."""
+def record_figure(recording: Recording) -> Figure:
+    """Draw drive and measured stem position over the time."""
     figure = _paper_figure(2.9)
     pressure, stem = figure.subplots(2, 1, sharex=True)
-    some = thinned(len(recording))
-    draw_pressure(pressure, recording, drive, COLOURS[0])
-    stem.plot(recording.time[some], recording.position[some] * 1e3, color=COLOURS[0], lw=1.0)
-    stem.set_ylabel("stem [mm]")
-    stem.set_xlabel("time [s]")
+    draw_record(pressure, stem, [Case("", recording, Drawing())])
     dress((pressure, stem))
     return figure
 
 
-def signature_loop_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw stem position over pressure; by the force balance with P1, P2 and the sliding lines."""
+def signature_loop_figure(result: Result) -> Figure:
+    """Draw stem position over the drive, with what the method adds."""
     figure = _paper_figure(3.4)
-    axes, recording = figure.subplots(), result.recording
-    if result.signature is not None:
-        draw_signature_loop(axes, recording, result.valve, result.signature, drive)
-    else:
-        some = thinned(len(recording))
-        pressure = recording.pressure[some] / drive.pascals
-        axes.plot(pressure, recording.position[some] * 1e3, color=COLOURS[0], lw=1.0)
-        axes.set_xlabel(drive.label)
-        axes.set_ylabel("stem [mm]")
+    axes = figure.subplots()
+    draw_signature(axes, [Case.of("recording", result)])
     dress((axes,))
     return figure
 
 
-def chosen_region(sweep: Sweep, threshold: float) -> tuple[float, float]:
-    """Return the lowest and highest threshold, m/s, of the region around the chosen threshold."""
-    choice = int(np.argmin(np.abs(sweep.thresholds - threshold)))
-    level = sweep.sigma[choice]
-    settled = np.abs(sweep.sigma - level) <= SETTLED_SHARE * level
-    others = np.flatnonzero(~settled)
-    below, above = others[others < choice], others[others > choice]
-    first = int(below[-1]) + 1 if below.size else 0
-    last = int(above[0]) - 1 if above.size else sweep.thresholds.size - 1
-    return float(sweep.thresholds[min(first, choice)]), float(sweep.thresholds[max(last, choice)])
-
-
-def sweep_figure(result: Result, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw F_c, σ_s and R²_s over the threshold δv, the chosen region shaded."""
-    if result.estimate is None:
-        raise ValueError(f"the method {result.method} has no sweep to draw")
-    case, sweep = Case.of("recording", result, drive), result.estimate.sweep
-    figure = _paper_figure(4.5)
-    coulomb, sigma, r_squared = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
-    draw_coulomb_sweep(coulomb, [case])
-    coulomb.set_title("● published choice, dashed: refined, with its 95 % band", fontsize="medium")
-    draw_sigma_sweep(sigma, [case])
-    sigma.set_xlabel("")
-    sigma.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    sigma.yaxis.set_major_formatter("{x:g}")
-    sigma.yaxis.set_minor_formatter(NullFormatter())
-    r_squared.plot(case.thresholds, sweep.r_squared, color=COLOURS[0], lw=1.2)
-    r_squared.axvline(case.threshold, color=COLOURS[0], ls=":", lw=1.2)
-    r_squared.set_ylabel("$R^2_s$ [-]")
-    r_squared.set_xlabel("threshold δv [m/s]")
-    low, high = chosen_region(sweep, case.threshold)
-    for axes in (coulomb, sigma, r_squared):
-        axes.axvspan(low, high, color="black", alpha=0.12, lw=0, zorder=0)
-    dress((coulomb, sigma, r_squared))
+def evidence_figure(drawing: Drawing) -> Figure:
+    """Draw the panels of a method, with the region that it chose shaded."""
+    count = len(drawing.panels)
+    figure = _paper_figure(1.5 * count)
+    ratios = [2, *[1] * (count - 1)]
+    panels = figure.subplots(count, 1, sharex=True, height_ratios=ratios, squeeze=False)[:, 0]
+    draw_panels(panels.tolist(), [drawing.panels])
+    for axes, panel in zip(panels, drawing.panels, strict=True):
+        axes.set_title(panel.title, fontsize="medium")
+        if panel.is_logarithmic:
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_major_formatter("{x:g}")
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        if drawing.region is not None:
+            axes.axvspan(*drawing.region, color="black", alpha=0.12, lw=0, zorder=0)
+    dress(panels)
     return figure
 
 

@@ -4,18 +4,18 @@ import math
 
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures.case import PRESSURE, DriveScale
+from valve_friction_ros.figures.case import Case
 from valve_friction_ros.figures.page import dress, titled_figure
-from valve_friction_ros.figures.panels import COLOURS, draw_pressure, draw_stem, thinned
+from valve_friction_ros.figures.panels import COLOURS, draw_record, thinned
 from valve_friction_ros.health import percentage
-from valve_friction_ros.identification import Validation
+from valve_friction_ros.identification import Drawing, Validation
 from valve_friction_ros.model import Valve
 
 __all__ = ["validation_figure"]
 
 
-def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = PRESSURE) -> Figure:
-    """Draw measured and simulated stem over the time, the residual, and the pressure.
+def validation_figure(validation: Validation, valve: Valve) -> Figure:
+    """Draw measured and simulated stem over the time, the residual, and the drive.
 
     Parameters
     ----------
@@ -23,8 +23,6 @@ def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = 
         Record and simulated stem.
     valve : Valve
         Gives the travel, for the title.
-    drive : DriveScale
-        Unit of the pressure.
 
     Returns
     -------
@@ -43,13 +41,12 @@ def validation_figure(validation: Validation, valve: Valve, drive: DriveScale = 
     recording = validation.recording
     some = thinned(len(recording))
     time = recording.time[some]
-    draw_stem(panels["stem"], recording, validation.simulated)
-    panels["stem"].set_title("stem (dotted: simulated)", loc="right", fontsize="small")
+    drawing = Drawing(stem_title="stem (dotted: simulated)")
+    case = Case("", recording, drawing, validation.simulated)
+    draw_record(panels["pressure"], panels["stem"], [case])
     panels["residual"].plot(time, validation.residual[some] * 1e3, color=COLOURS[1], lw=0.9)
     panels["residual"].set_ylabel("simulated −\nmeasured [mm]")
-    draw_pressure(panels["pressure"], recording, drive, COLOURS[2])
-    for name in ("stem", "residual"):
-        panels[name].set_xlabel("")
+    panels["stem"].set_xlabel("")
     panels["pressure"].set_xlabel("time [s]")
     dress(panels.values())
     return figure

@@ -18,14 +18,9 @@ _ENDINGS = (".csv", ".tsv", ".bag", *_STORAGE)
 
 @dataclass(frozen=True)
 class FoundRecording:
-    """A recording, not yet read.
+    """A recording, not yet read: a file or the folder of a bag.
 
-    Attributes
-    ----------
-    path : Path
-        The file, or the folder of a bag.
-    name : str
-        Its path from the searched folder, with slashes.
+    Its name is its path from the searched folder, with slashes.
     """
 
     path: Path
@@ -39,10 +34,7 @@ class FoundRecording:
     def content(self) -> str:
         """Return a fingerprint of size and time of change of its file or files.
 
-        Raises
-        ------
-        OSError
-            If they cannot be looked at.
+        Raises OSError if they cannot be looked at.
         """
         folder = self.path.is_dir()
         files = sorted(self.path.iterdir()) if folder else [self.path]
@@ -57,22 +49,14 @@ class FoundRecording:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a folder holds.
-
-    Attributes
-    ----------
-    recordings : tuple of FoundRecording
-        In the order of their names.
-    skipped : tuple of str
-        Names of what is no recording, likewise.
-    """
+    """The recordings of a folder, and the names of what is none, each in the order of names."""
 
     recordings: tuple[FoundRecording, ...]
     skipped: tuple[str, ...]
 
 
 def is_valve_file(name: str) -> bool:
-    """Tell whether a file describes a valve: ``valve.yaml`` or ``NAME.valve.yaml``."""
+    """Return whether a file describes a valve: ``valve.yaml`` or ``NAME.valve.yaml``."""
     return name == _VALVE_ENDING or name.endswith(f".{_VALVE_ENDING}")
 
 
@@ -96,7 +80,7 @@ def _is_storage(name: str) -> bool:
 
 
 def _is_bag_folder(folder: Path, files: list[str]) -> bool:
-    """Tell a bag's folder by its metadata beside its storage, or by what they say."""
+    """Return whether a folder is a bag: metadata beside storage files, or metadata of rosbag2."""
     if _METADATA not in files:
         return False
     if any(_is_storage(name) for name in files):
@@ -108,7 +92,7 @@ def _is_bag_folder(folder: Path, files: list[str]) -> bool:
 
 
 def _can_be_written(name: str) -> bool:
-    """Tell whether a name fits on a line of UTF-8."""
+    """Return whether a name can be written on one line of UTF-8."""
     try:
         name.encode()
     except UnicodeEncodeError:
@@ -120,21 +104,12 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
     """Find the recordings in a folder and in those below it.
 
     A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
-    each CSV or TSV file, gzipped or not, and each storage file of a bag is one, told by its
+    each CSV or TSV file, gzipped or not, and each storage file of a bag is one, found by its
     ending. Hidden files and folders and links to folders are skipped; so is a name that cannot
-    be written on a line.
+    be written on a line. The files of `left_out`, such as the output, are neither recordings nor
+    skipped.
 
-    Parameters
-    ----------
-    folder : Path
-        Where to search.
-    *left_out : Path
-        Files that are neither recordings nor listed as skipped: the output.
-
-    Raises
-    ------
-    ValueError
-        If it is no folder, or cannot be read.
+    Raises ValueError if the folder is none, or cannot be read.
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder")

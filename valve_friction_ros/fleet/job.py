@@ -1,4 +1,4 @@
-"""One recording to identify, and the rows that come of it."""
+"""One recording to identify, and the rows of its results."""
 
 import hashlib
 from collections.abc import Mapping
@@ -17,19 +17,7 @@ __all__ = ["Job", "Options", "identify_job"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a recording is read and identified.
-
-    Attributes
-    ----------
-    valve : Valve
-        The valve, or each valve of a bag.
-    reading : ReadingOptions
-        What the file does not say itself.
-    method : str
-        Name of the method, as in `METHODS`.
-    settings : IdentificationSettings
-        Its settings.
-    """
+    """Valve, options of reading, method and settings with which a recording is identified."""
 
     valve: Valve
     reading: ReadingOptions
@@ -76,11 +64,8 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
 def identify_job(job: Job) -> list[Mapping[str, Cell]]:
     """Read and identify a recording.
 
-    Returns
-    -------
-    list of mapping of str to str, float, int or None
-        The cells of a row for each valve, in the order of the file; a refusal has its reason
-        under ``error``. At least one.
+    Returns the cells of a row for each valve, at least one, in the order of the file; a refusal has
+    its reason under ``error``.
     """
     try:
         recorded = read_recordings(job.path, job.options.valve, job.options.reading)

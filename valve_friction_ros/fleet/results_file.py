@@ -20,16 +20,9 @@ _Row = Mapping[str, Cell]
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """All rows of one recording.
+    """All rows of one recording, one for each valve.
 
-    Attributes
-    ----------
-    recording : str
-        Its name.
-    content, settings : str
-        Fingerprints of its files and of the options it was identified with.
-    rows : tuple of mapping
-        A row for each valve.
+    `content` and `settings` are fingerprints of its files and of the options of its identification.
     """
 
     recording: str
@@ -65,10 +58,7 @@ _WRITERS = {".csv": _write_csv, ".jsonl": _write_json_lines}
 def writer_of(output: Path) -> Callable[[TextIO, Iterable[_Row]], None]:
     """Return what writes rows in the format that the name of the output ends in.
 
-    Raises
-    ------
-    ValueError
-        If it is not known; the message lists the known ones.
+    Raises ValueError if it is not known; the message lists the known ones.
     """
     known = _WRITERS.get(output.suffix.lower())
     if known is None:
@@ -86,17 +76,11 @@ class ResultsFile:
     """Rows that are on the disk when `append` returns; leaving the context writes the output.
 
     They are kept in the table ``result`` of `database_of` the output, in its columns and in the
-    order in which they were appended. Only one process at a time can open it.
+    order in which they were appended. Only one process at a time can open it. The ending of the
+    output's name is its format.
 
-    Parameters
-    ----------
-    path : Path
-        The output; the ending of its name is the format.
-
-    Raises
-    ------
-    ValueError
-        If the output or its database is another program's, or the database cannot be opened.
+    Raises ValueError if the output or its database is another program's, or the database cannot be
+    opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -117,7 +101,7 @@ class ResultsFile:
                 raise
 
     def _open(self) -> None:
-        """Take the database for this process alone, and see that it is one."""
+        """Lock the database for this process, and check that it holds results of this version."""
         self._connection.execute("PRAGMA locking_mode = EXCLUSIVE")
         self._connection.execute("PRAGMA journal_mode = WAL")  # one flush of the disk a recording
         self._connection.execute("PRAGMA synchronous = FULL")

@@ -35,18 +35,9 @@ def _one_line(text: str) -> str:
 def result_cells(
     valve: str, result: Result, recording: Recording, notes: Sequence[str]
 ) -> Mapping[str, Cell]:
-    """Fill the cells of an identified valve.
+    """Fill the cells of an identified valve; the notes of the reading join the warnings.
 
-    Parameters
-    ----------
-    valve : str
-        Its name in the recording.
-    result : Result
-        What was identified; a parameter that it does not hold leaves its cells empty.
-    recording : Recording
-        What it was identified from.
-    notes : sequence of str
-        Notes of the reading, which join the warnings.
+    A parameter that the result does not hold leaves its cells empty.
     """
     shown = result.to_dict()
     cells: dict[str, Cell] = {"valve": _one_line(valve), "method": shown["method"]}
@@ -62,7 +53,7 @@ def result_cells(
 
 
 def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
-    """Fill the cells of a valve that was refused; `path`, which the row names, leaves `reason`."""
+    """Fill the cells of a refused valve; `path`, which the row names, is removed from `reason`."""
     for start in (f"{path}, {valve}: ", f"{path}: "):
         while reason.startswith(start):
             reason = reason.removeprefix(start)
@@ -72,14 +63,8 @@ def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
 def key_cells(recording: str, content: str, settings: str, valves: int) -> Mapping[str, Cell]:
     """Fill the cells by which a later run knows what was done.
 
-    Parameters
-    ----------
-    recording : str
-        Name of the recording.
-    content, settings : str
-        Fingerprints of its files and of the options.
-    valves : int
-        Number of rows of this recording.
+    `content` and `settings` are fingerprints of the files and of the options, `valves` is the
+    number of rows of this recording.
     """
     return {
         "recording": recording,

@@ -1,4 +1,4 @@
-"""What came of many recordings, counted."""
+"""Counts of the results of many recordings."""
 
 import re
 from collections import Counter
@@ -17,17 +17,7 @@ _NUMBER = re.compile(r"[-+−]?\b\d+(?:[.,]\d+)*(?:e[-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Reason:
-    """A reason of refusals, its numbers left open.
-
-    Attributes
-    ----------
-    text : str
-        The reason.
-    count : int
-        Valves that were refused for it.
-    example : str
-        The first recording.
-    """
+    """A reason of refusals, its numbers left open; its count of valves and its first recording."""
 
     text: str
     count: int
@@ -36,13 +26,7 @@ class Reason:
 
 @dataclass
 class Tally:
-    """Counts of valves.
-
-    Attributes
-    ----------
-    outcomes : counter of str
-        Valves by the verdict on their Coulomb friction, or `REFUSED`.
-    """
+    """Counts of valves: by the verdict on their Coulomb friction, or `REFUSED`."""
 
     outcomes: Counter[str] = field(default_factory=Counter)
     _reasons: Counter[str] = field(default_factory=Counter)

@@ -1,4 +1,4 @@
-"""Work shared out to processes, of which any may die.
+"""Tasks for several processes, each of which may die.
 
 No library's pool does that. `concurrent.futures` gives up all tasks when one process dies. Pebble
 (5.2.3), which names the task that killed its process, shares one pipe and one lock among all of
@@ -34,18 +34,12 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class DeadWorker:
-    """In place of an answer: how the process that worked on it ended.
-
-    Attributes
-    ----------
-    exit_code : int
-        Its exit code; negative: the signal that killed it.
-    """
+    """In place of an answer: the exit code of its process, negative: the signal that ended it."""
 
     exit_code: int
 
     def __str__(self) -> str:
-        """Say it to people."""
+        """Describe the end of the process."""
         if self.exit_code >= 0:
             return f"its process ended with exit code {self.exit_code}"
         number = -self.exit_code
@@ -63,7 +57,7 @@ def usable_cores() -> int:
 
 
 def _work(tasks: "Connection[_Answer, _Task]", work: Callable[[_Task], _Answer]) -> None:
-    """Answer one task after the other until the other end is closed, or its process dead."""
+    """Answer the tasks one by one, until the other end of the pipe is closed."""
     with contextlib.suppress(EOFError, OSError):
         while True:
             tasks.send(work(tasks.recv()))
@@ -91,7 +85,7 @@ def _surroundings(folder: str) -> Iterator[None]:
 
 
 class _Worker(Generic[_Task, _Answer]):
-    """A process, this end of its pipe, and the task that it is at."""
+    """A process, this end of its pipe, and its present task."""
 
     def __init__(self, work: Callable[[_Task], _Answer], folder: str) -> None:
         context = multiprocessing.get_context("spawn")
@@ -132,26 +126,12 @@ def in_processes(
     processes: int,
     stopped: Callable[[], bool],
 ) -> Iterator[tuple[_Task, _Answer | DeadWorker]]:
-    """Yield tasks with their answers as they finish, worked on by several processes.
+    """Yield tasks with their answers, or a `DeadWorker`, as they finish in several processes.
 
     Each process has one task at a time, so that of one that dies it is known what it died of; a
-    new one takes its place. Compiled libraries get one thread a process.
-
-    Parameters
-    ----------
-    work : callable
-        What is done to a task; a function of a module, since the processes are started anew.
-    tasks : iterable
-        The tasks, taken one by one.
-    processes : int
-        Most processes at a time, at least 1.
-    stopped : callable
-        True to stop: nothing more is handed out, and what is being done is given up.
-
-    Yields
-    ------
-    tuple
-        A task and its answer, or a `DeadWorker`.
+    new one takes its place. Compiled libraries get one thread a process. `work` is a function of a
+    module, since the processes are started anew. Once `stopped` returns True nothing more is handed
+    out, and what is being done is given up.
     """
     waiting = iter(tasks)
     drafts = TemporaryDirectory()  # what a killed worker leaves behind goes with it

@@ -49,10 +49,7 @@ class Baseline:
     def of(cls, result: Result) -> "Baseline":
         """Return the Coulomb friction of a result as baseline.
 
-        Raises
-        ------
-        RefusalError
-            If it is not identifiable, or not above zero.
+        Raises RefusalError if it is not identifiable, or not above zero.
         """
         friction = result.parameters["coulomb_friction"]
         if math.isnan(friction.value):

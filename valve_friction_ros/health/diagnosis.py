@@ -3,9 +3,10 @@
 import math
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
+from typing import Any
 
 from valve_friction_ros.health.baseline import Baseline, Ratio
-from valve_friction_ros.identification import Parameter, Result
+from valve_friction_ros.identification import Parameter, Result, plain
 from valve_friction_ros.identification.trust.misfit import percentage
 from valve_friction_ros.model.valve import Valve
 
@@ -57,6 +58,12 @@ class FrictionLimits:
     ------
     ValueError
         Unless 0 < low_ratio < 1 < warn_ratio < error_ratio.
+
+    Notes
+    -----
+    No standard gives such ratios; the defaults are chosen. 2 doubles the dead band (F_c + F_s)/k,
+    0.5 halves it, and 1.25 is five times the half width that an identified friction may have
+    (`WEAK_SHARE`). A plant may know better: the ratios are parameters.
     """
 
     warn_ratio: float = 1.25
@@ -94,6 +101,21 @@ class Diagnosis:
     status_signal: StatusSignal
     message: str
     ratio: Ratio | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the diagnosis as a mapping of plain values, from which other forms are derived.
+
+        Its keys are ``level`` (OK, WARN or ERROR), ``ne_107``, ``message``, ``ratio`` and
+        ``ratio_interval``.
+        """
+        ratio = self.ratio
+        return {
+            "level": self.level.name,
+            "ne_107": self.status_signal.value,
+            "message": self.message,
+            "ratio": None if ratio is None else plain(ratio.value),
+            "ratio_interval": None if ratio is None else plain([ratio.low, ratio.high]),
+        }
 
     def __str__(self) -> str:
         """Return level and message on one line."""

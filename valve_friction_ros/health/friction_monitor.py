@@ -65,10 +65,7 @@ class IdentificationInput(NamedTuple):
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
     """Identify a snapshot of the buffer. It does not use the monitor, so any thread may run it.
 
-    Raises
-    ------
-    RefusalError
-        With the cause, and with the cause of a recent clearing of the buffer.
+    Raises RefusalError with the cause, and with the cause of a recent clearing of the buffer.
     """
     try:
         return method_named(settings.method)(
@@ -161,10 +158,8 @@ class FrictionMonitor:
     def result_as_baseline(self) -> Baseline:
         """Return the Coulomb friction of the latest result, without making it the baseline.
 
-        Raises
-        ------
-        RefusalError
-            If there is no result, or its Coulomb friction is not identifiable or not above zero.
+        Raises RefusalError if there is no result, or its Coulomb friction is not identifiable or
+        not above zero.
         """
         if self._result is None:
             raise RefusalError("the valve has no result to take as baseline: identify it first")

@@ -11,7 +11,7 @@ from valve_friction_ros import __version__
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
-from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict, parameter_mapping, plain
 from valve_friction_ros.streams.record_buffer import Snapshot
 
 __all__ = [
@@ -153,6 +153,32 @@ class HistoryEntry:
         """The Coulomb friction; None for a refusal."""
         return self.parameters.get("coulomb_friction")
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the entry as a mapping of plain values, SI units; times are ns since 1970 (UTC).
+
+        What it keeps of a result has the keys of `Result.to_dict`.
+        """
+        begin, end = self.span or (None, None)
+        baseline = self.baseline
+        return {
+            "time": self.time,
+            "begin": begin,
+            "end": end,
+            "method": self.method,
+            "parameters": {name: parameter_mapping(one) for name, one in self.parameters.items()},
+            "fit": plain(self.fit.share),
+            "rms": plain(self.fit.rms),
+            "systematic_misfit": plain(self.fit.systematic),
+            "warnings": list(self.warnings),
+            "diagnosis": self.diagnosis.to_dict(),
+            "baseline": None if baseline is None else baseline.coulomb_friction,
+            "baseline_half_width": None if baseline is None else baseline.half_width,
+            "limits": plain(vars(self.limits)),
+            "refusal": self.refusal,
+            "settings": json.loads(self.settings),
+            "software_version": self.version,
+        }
+
     def point(self) -> FrictionPoint | None:
         """Return the point of this entry in a trend, or None.
 
@@ -175,13 +201,6 @@ def span_of(snapshot: Snapshot) -> Span | None:
     return Span(min(ends)[0], max(end for _, end in ends)) if ends else None
 
 
-def _plain(value: object) -> Any:
-    """Return a value in types of JSON; a number that is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 def settings_text(settings: MonitorSettings) -> str:
     """Write the settings of an identification as JSON; equal settings give equal text."""
     content = {
@@ -189,7 +208,7 @@ def settings_text(settings: MonitorSettings) -> str:
         "identification": vars(settings.identification),
         "window": settings.window,
     }
-    return json.dumps(_plain(content), sort_keys=True, allow_nan=False)
+    return json.dumps(plain(content), sort_keys=True, allow_nan=False)
 
 
 def entry_of(

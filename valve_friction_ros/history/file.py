@@ -106,14 +106,9 @@ class HistoryFile:
         since: int = -_END_OF_TIME,
         until: int = _END_OF_TIME,
     ) -> tuple[HistoryEntry, ...]:
-        """Return identifications, oldest first.
+        """Return identifications, oldest first, of these valves or of all.
 
-        Parameters
-        ----------
-        valves : sequence of str, optional
-            Names of the valves; by default all.
-        since, until : int, optional
-            First time, and end (not included), ns since 1970 (UTC).
+        They lie from `since` on and before `until`, ns since 1970 (UTC).
         """
         with reading(self.path) as connection:
             try:

@@ -91,6 +91,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
             half_width=one.half_width,
             verdict=one.verdict.value,
             reason=one.reason,
+            published=one.published,
         )
 
 
@@ -125,6 +126,7 @@ def _parameter(row: sqlite3.Row) -> Parameter:
         _number(row["half_width"]),
         Verdict(row["verdict"]),
         row["reason"],
+        published=_number(row["published"]) if "published" in row.keys() else math.nan,  # noqa: SIM118
     )
 
 

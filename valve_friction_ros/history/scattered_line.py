@@ -59,20 +59,10 @@ class ScatteredLine(NamedTuple):
         return self.quantile * np.hypot(self.level_error, self.slope_error * away)
 
     def crossing(self, level: float, level_error: float) -> tuple[float, float, float] | None:
-        """Return when the line reaches a level.
+        """Return when the line reaches a level with a standard error: time and 95 % interval.
 
         By Fieller: the interval holds the times at which line and level do not differ at the 5 %
-        level. It is finite exactly where the slope's own interval excludes zero.
-
-        Parameters
-        ----------
-        level, level_error : float
-            The level and its standard error.
-
-        Returns
-        -------
-        tuple of float, or None
-            Expected time, and the ends of its 95 % interval; None where the slope may be zero.
+        level. It is finite exactly where the slope's own interval excludes zero; None elsewhere.
         """
         gap, factor = level - self.level, self.quantile**2
         a = self.slope**2 - factor * self.slope_error**2

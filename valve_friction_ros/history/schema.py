@@ -8,8 +8,8 @@ from urllib.parse import quote
 
 __all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
 
-SCHEMA_VERSION = 1
-"""The database's user_version."""
+SCHEMA_VERSION = 2
+"""The database's user_version. Version 1 has no published values."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -62,6 +62,7 @@ CREATE TABLE parameter (
     half_width REAL,
     verdict TEXT NOT NULL,
     reason TEXT NOT NULL,
+    published REAL,
     PRIMARY KEY (identification_id, name)
 ) WITHOUT ROWID;
 CREATE TABLE baseline (
@@ -173,6 +174,11 @@ def _set_journal(connection: sqlite3.Connection) -> None:
 
 
 def _make_tables(connection: sqlite3.Connection) -> None:
+    """Create the tables of a new file, and add to those of an older one what they lack."""
+    if _pragma(connection, "user_version") == 1:
+        connection.execute("ALTER TABLE parameter ADD COLUMN published REAL")
+        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        return
     for statement in filter(str.strip, _SCHEMA.split(";")):
         connection.execute(statement)
     connection.execute(f"PRAGMA application_id = {_APPLICATION}")
@@ -183,10 +189,7 @@ def _make_tables(connection: sqlite3.Connection) -> None:
 def writing(path: Path) -> Iterator[sqlite3.Connection]:
     """Open a history for one transaction, and create it if it is missing.
 
-    Raises
-    ------
-    HistoryError
-        If it cannot be written; then no part of the transaction is.
+    Raises HistoryError if it cannot be written; then no part of the transaction is.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -200,7 +203,7 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
         _set_journal(connection)
         connection.execute("BEGIN IMMEDIATE")
         try:
-            if _is_new(path, connection):
+            if _is_new(path, connection) or _pragma(connection, "user_version") < SCHEMA_VERSION:
                 _make_tables(connection)
             yield connection
             connection.execute("COMMIT")
@@ -228,10 +231,7 @@ def _reading_mode(path: Path) -> str:
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
     """Open an existing history, to read one state of it.
 
-    Raises
-    ------
-    HistoryError
-        If it is missing, or cannot be read.
+    Raises HistoryError if it is missing, or cannot be read.
     """
     try:
         is_there = path.is_file()

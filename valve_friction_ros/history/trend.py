@@ -48,16 +48,10 @@ class Limit(Enum):
 
 @dataclass(frozen=True)
 class Crossing:
-    """When a limit is expected to be crossed.
+    """When the next limit on the way is expected to be crossed.
 
-    Attributes
-    ----------
-    limit : Limit
-        The next limit on the way.
-    level : float
-        Its Coulomb friction, N.
-    time, earliest, latest : int
-        Expected time and the 95 % interval of it, ns since 1970 (UTC).
+    `level` is its Coulomb friction, N; `earliest` and `latest` are the ends of the 95 % interval of
+    the expected time, ns since 1970 (UTC).
     """
 
     limit: Limit
@@ -69,20 +63,11 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Trend:
-    """The drift of the Coulomb friction.
+    """The drift of the Coulomb friction, a line through the days, N over ns since `begin`.
 
-    Attributes
-    ----------
-    line : ScatteredLine
-        Through the days, N over ns since `begin`.
-    days : int
-        Days that the line goes through.
-    outliers : int
-        Days that are left out.
-    begin, end : int
-        First and last estimate, ns since 1970 (UTC).
-    crossing : Crossing or None
-        None without a significant drift, without a baseline, or where it lies too far ahead.
+    `days` go into the line, `outliers` are left out. `begin` and `end` are the first and the last
+    estimate, ns since 1970 (UTC). The crossing is None without a significant drift, without a
+    baseline, or where it lies too far ahead.
     """
 
     line: ScatteredLine
@@ -183,30 +168,14 @@ def trend_of(
     baseline: Baseline | None = None,
     limits: FrictionLimits | None = None,
 ) -> Trend | None:
-    """Estimate the drift of the Coulomb friction.
+    """Estimate the drift of the Coulomb friction from points since the last work on the packing.
 
     The weight of a point follows from its interval and from the scatter between days, which
     `fit_line` estimates. All points of one day count as one point. Outlying days are left out, a
-    tenth of all days at most.
+    tenth of all days at most. The baseline and the limits, as ratios to it, give the next crossing.
 
-    Parameters
-    ----------
-    points : sequence of FrictionPoint
-        Points since the last work on the packing, in any order.
-    baseline : Baseline, optional
-        Friction of the healthy valve, for the limits.
-    limits : FrictionLimits, optional
-        Bounds as ratios to it.
-
-    Returns
-    -------
-    Trend or None
-        None if the points lie on fewer than four days.
-
-    Raises
-    ------
-    ValueError
-        If a half width is negative or not finite.
+    Returns None if the points, in any order, lie on fewer than four days. Raises ValueError if a
+    half width is negative or not finite.
     """
     if not points:
         return None

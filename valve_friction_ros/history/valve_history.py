@@ -39,10 +39,7 @@ def valve_histories(
 ) -> tuple[ValveHistory, ...]:
     """Read the histories of some valves from `since` to `until`, ns; empty histories are left out.
 
-    Raises
-    ------
-    HistoryError
-        If the file cannot be read.
+    Raises HistoryError if the file cannot be read.
     """
     found = []
     for valve in valves:
@@ -64,10 +61,7 @@ def current_trend(
 ) -> Trend | None:
     """Return the trend of a valve since its baseline was last set, by the method in force.
 
-    Raises
-    ------
-    HistoryError
-        If the file cannot be read.
+    Raises HistoryError if the file cannot be read.
     """
     kept = history.baseline(valve)
     points = history.points(valve, settings.method, kept.since if kept else 0)

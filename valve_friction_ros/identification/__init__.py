@@ -1,5 +1,6 @@
 """Identification of the Karnopp model from recordings; no ROS."""
 
+from valve_friction_ros.identification.drawing import Curve, Drawing, Exhibit, Panel
 from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
 from valve_friction_ros.identification.methods import (
     DEFAULT_METHOD,
@@ -13,9 +14,11 @@ from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.published.identify import published_estimate
 from valve_friction_ros.identification.published.method import identify_published
 from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
+from valve_friction_ros.identification.published.sweep_drawing import sweep_panels
 from valve_friction_ros.identification.refined.method import identify_refined
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.rendering import (
+    parameter_cells,
     parameter_columns,
     parameter_mapping,
     plain,
@@ -52,11 +55,15 @@ __all__ = [
     "UNITS",
     "Bracket",
     "BreakawayPoint",
+    "Curve",
+    "Drawing",
     "Estimate",
+    "Exhibit",
     "IdentificationSettings",
     "IdentifiedModel",
     "Method",
     "Misfit",
+    "Panel",
     "Parameter",
     "RefusalError",
     "Result",
@@ -76,12 +83,14 @@ __all__ = [
     "identify_robust",
     "identify_signature",
     "method_named",
+    "parameter_cells",
     "parameter_columns",
     "parameter_mapping",
     "percentage",
     "plain",
     "published_estimate",
     "step_test",
+    "sweep_panels",
     "sweep_thresholds",
     "two_digits",
     "validate",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "frame_of",
     "html_of",
+    "parameter_cells",
     "parameter_columns",
     "parameter_mapping",
     "plain",
@@ -89,7 +90,8 @@ def two_digits(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
 
 
-def _cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:
+def parameter_cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a parameter as texts: name, value, half width, unit, verdict, published value."""
     value, width, published = (parameter[key] for key in ("value", "half_width", "published"))
     return (
         name,
@@ -102,7 +104,7 @@ def _cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _rows(shown: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    return [_cells(name, each) for name, each in shown["parameters"].items()]
+    return [parameter_cells(name, each) for name, each in shown["parameters"].items()]
 
 
 def _title(shown: Mapping[str, Any]) -> str:

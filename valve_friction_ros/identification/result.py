@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification import rendering
+from valve_friction_ros.identification.drawing import Drawing, Exhibit
 from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
@@ -26,17 +27,7 @@ __all__ = ["Result", "StemComparison"]
 
 
 class StemComparison(NamedTuple):
-    """Measured and simulated stem at the same times.
-
-    Attributes
-    ----------
-    sample_period : float
-        Time between two samples, s.
-    measured : ndarray of float, shape (m,)
-        Measured position as the identification took it, m.
-    simulated : ndarray of float, shape (m,)
-        Position of the model's stem, m.
-    """
+    """Measured position, as the identification took it, and the model's, m, shape (m,) each."""
 
     sample_period: float
     measured: NDArray[np.float64]
@@ -98,10 +89,8 @@ class Result:
         The evidence in words, one sentence each.
     model : KarnoppParameters or None
         The identified model, to simulate; None where a value is impossible.
-    estimate : Estimate or None
-        The published sweep that a figure can show; None in a method without a sweep.
-    signature : ValveSignature or None
-        The valve signature; None in a method without one.
+    exhibit : Exhibit or None
+        What figures and reports draw beside record and stem, such as a sweep or a valve signature.
     stem : StemComparison or None
         Measured and simulated stem; None where no stem is simulated.
 
@@ -134,8 +123,7 @@ class Result:
     evidence: Mapping[str, object] = field(default_factory=dict, repr=False)
     findings: tuple[str, ...] = field(default=(), repr=False)
     model: KarnoppParameters | None = field(default=None, repr=False)
-    estimate: Estimate | None = field(default=None, repr=False)
-    signature: ValveSignature | None = field(default=None, repr=False)
+    exhibit: Exhibit | None = field(default=None, repr=False)
     stem: StemComparison | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -147,6 +135,23 @@ class Result:
     def values(self) -> dict[str, float]:
         """The identified values by name; nan where a parameter is not identifiable."""
         return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The published sweep, where it is the exhibit."""
+        return self.exhibit if isinstance(self.exhibit, Estimate) else None
+
+    @property
+    def signature(self) -> ValveSignature | None:
+        """The valve signature, where it is the exhibit."""
+        return self.exhibit if isinstance(self.exhibit, ValveSignature) else None
+
+    @property
+    def drawing(self) -> Drawing:
+        """What is drawn of the exhibit."""
+        if self.exhibit is None:
+            return Drawing()
+        return self.exhibit.drawing(self.parameters, self.valve)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as a mapping of plain values, SI units; None replaces nan and infinity.

@@ -8,6 +8,7 @@ from valve_friction_ros.model.bench import (
     LOW_FRICTION,
     PRESSURE_RANGE,
 )
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.excitations import (
     Excitation,
     IsaSteps,
@@ -27,10 +28,9 @@ from valve_friction_ros.model.simulation import (
     compile_kernels,
     simulate,
 )
-from valve_friction_ros.model.valve import ATMOSPHERIC_PRESSURE, Valve
+from valve_friction_ros.model.valve import Valve
 
 __all__ = [
-    "ATMOSPHERIC_PRESSURE",
     "BENCH_VALVE",
     "DEFAULT_LAG",
     "GRAPHITE_PACKING",
@@ -38,6 +38,7 @@ __all__ = [
     "HIGH_FRICTION",
     "LOW_FRICTION",
     "PRESSURE_RANGE",
+    "Drive",
     "Excitation",
     "IsaSteps",
     "KarnoppParameters",

@@ -1,4 +1,4 @@
-"""A recording: pressure and stem position on one uniform time grid."""
+"""A recording: drive and stem position on one uniform time grid."""
 
 from dataclasses import dataclass, field
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_finite, require_positive
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.stamped import StampedRecord
 
 __all__ = ["Recording"]
@@ -13,20 +14,22 @@ __all__ = ["Recording"]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Actuator pressure and stem position, sampled together at a constant period.
+    """What drives the stem, and the stem position, sampled together at a constant period.
 
     Attributes
     ----------
     sample_period : float
         Time between two samples, s.
-    pressure : ndarray of float, shape (n,)
-        Actuator pressure, Pa. Kept as a read-only copy.
+    drive : ndarray of float, shape (n,)
+        Actuator pressure, Pa, or force, N. Kept as a read-only copy.
     position : ndarray of float, shape (n,)
         Stem position, m. Kept as a read-only copy.
     start_time : float
         Time of the first sample, s, on the clock of the stamps.
     stamped : StampedRecord, optional
         The samples at their own stamps, where those are not the grid.
+    driven_by : Drive
+        What `drive` is.
 
     Raises
     ------
@@ -38,39 +41,49 @@ class Recording:
     --------
     >>> import valve_friction_ros as vf
     >>> recording = vf.Recording(
-    ...     sample_period=0.1, pressure=[1e5, 1.1e5, 1.2e5], position=[0.0, 0.0, 1e-4]
+    ...     sample_period=0.1, drive=[1e5, 1.1e5, 1.2e5], position=[0.0, 0.0, 1e-4]
     ... )
     >>> recording.duration
     0.2
     """
 
     sample_period: float
-    pressure: NDArray[np.float64] = field(repr=False)
+    drive: NDArray[np.float64] = field(repr=False)
     position: NDArray[np.float64] = field(repr=False)
     start_time: float = 0.0
     stamped: StampedRecord | None = field(default=None, repr=False)
+    driven_by: Drive = Drive.PRESSURE
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not make a recording, and freeze them."""
         require_positive("sample_period", self.sample_period)
         require_finite("start_time", self.start_time)
-        for name in ("pressure", "position"):
+        for name in ("drive", "position"):
             values = np.array(getattr(self, name), dtype=np.float64)
+            words = self.driven_by.words if name == "drive" else name
             if values.ndim != 1 or values.size == 0:
-                raise ValueError(f"{name} must be a row of samples, got shape {values.shape}")
+                raise ValueError(f"{words} must be a row of samples, got shape {values.shape}")
             finite = np.isfinite(values)
             if not finite.all():
-                raise ValueError(f"{name} is not finite at sample {int(np.argmin(finite))}")
+                raise ValueError(f"{words} is not finite at sample {int(np.argmin(finite))}")
             values.flags.writeable = False
             object.__setattr__(self, name, values)
-        if self.pressure.shape != self.position.shape:
+        if self.drive.shape != self.position.shape:
             raise ValueError(
-                f"pressure has {self.pressure.size} samples, position {self.position.size}"
+                f"{self.driven_by.words} has {self.drive.size} samples, "
+                f"position {self.position.size}"
             )
 
     def __len__(self) -> int:
         """Count the samples."""
         return self.position.size
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Actuator pressure, Pa, shape (n,); raises ValueError where a force drives the stem."""
+        if self.driven_by is not Drive.PRESSURE:
+            raise ValueError("the recording holds a force and no pressure: use its drive, in N")
+        return self.drive
 
     @property
     def duration(self) -> float:

@@ -87,14 +87,14 @@ def _dynamics(valve: Valve, parameters: KarnoppParameters) -> _Ways:
     return _Ways(upward, downward)
 
 
-def balanced_state(valve: Valve, parameters: KarnoppParameters, pressure: float) -> StemState:
-    """Return the rest, within the travel, at which the spring balances `pressure` (Pa).
+def balanced_state(valve: Valve, parameters: KarnoppParameters, drive: float) -> StemState:
+    """Return the rest, within the travel, at which the spring balances `drive` (Pa or N).
 
     Without a spring no position balances; the stem then rests at 0.
     """
     if parameters.spring_constant == 0:
         return StemState(0.0)
-    force = valve.diaphragm_area * (pressure - valve.pressure_reference)
+    force = valve.actuator_force(drive)
     balance = (force - parameters.spring_preload) / parameters.spring_constant
     lowest = 0.0 if np.isfinite(valve.travel) else -np.inf
     return StemState(float(np.clip(balance, lowest, valve.travel)))
@@ -104,10 +104,10 @@ def advance(
     state: StemState,
     valve: Valve,
     parameters: KarnoppParameters,
-    pressures: tuple[float, float],
+    drives: tuple[float, float],
     duration: float,
 ) -> StemState:
-    """Advance `state` by `duration` seconds while the pressure runs linearly between two values.
+    """Advance `state` by `duration` seconds while the drive runs linearly between two values.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def advance(
         Geometry and travel stops.
     parameters : KarnoppParameters
         Mass, friction and spring during the step.
-    pressures : tuple of float
-        Actuator pressure at the start and at the end of the step, Pa.
+    drives : tuple of float
+        Actuator pressure, Pa, or force, N, at the start and at the end of the step.
     duration : float
         Length of the step, s, above zero.
 
@@ -129,9 +129,9 @@ def advance(
     """
     duration = require_positive("duration", duration)
     before, after = (
-        valve.diaphragm_area * (require_finite("pressure", pressure) - valve.pressure_reference)
+        valve.actuator_force(require_finite(valve.driven_by.words, drive))
         - parameters.spring_preload
-        for pressure in pressures
+        for drive in drives
     )
     return StemState(
         *advance_stem(
@@ -148,11 +148,11 @@ def advance(
 def simulate(
     valve: Valve,
     parameters: KarnoppParameters,
-    pressure: NDArray[np.float64],
+    drive: NDArray[np.float64],
     sample_period: float,
     start: StemState | None = None,
 ) -> Trajectory:
-    """Simulate the stem under sampled pressure, equations (1) and (2).
+    """Simulate the stem under a sampled drive, equations (1) and (2).
 
     Parameters
     ----------
@@ -160,8 +160,8 @@ def simulate(
         Geometry and travel stops.
     parameters : KarnoppParameters
         Mass, friction and spring.
-    pressure : ndarray of float, shape (n,)
-        Actuator pressure, Pa, taken as linear between the samples.
+    drive : ndarray of float, shape (n,)
+        Actuator pressure, Pa, or force, N (`Valve.driven_by`), taken as linear between the samples.
     sample_period : float
         Time between two samples, s.
     start : StemState, optional
@@ -175,7 +175,7 @@ def simulate(
     Raises
     ------
     ValueError
-        If the pressure is empty or not finite, or the period is not above zero.
+        If the drive is empty or not finite, or the period is not above zero.
 
     Notes
     -----
@@ -196,9 +196,9 @@ def simulate(
     (4000,)
     """
     period = require_positive("sample_period", sample_period)
-    samples = np.asarray(pressure, dtype=np.float64)
+    samples = np.asarray(drive, dtype=np.float64)
     if samples.ndim != 1 or samples.size == 0 or not np.isfinite(samples).all():
-        raise ValueError("pressure must be a non-empty row of finite samples")
+        raise ValueError(f"{valve.driven_by.words} must be a non-empty row of finite samples")
     state = start or balanced_state(valve, parameters, float(samples[0]))
     forces = valve.actuator_force(samples) - parameters.spring_preload
     positions, velocities = np.empty_like(forces), np.empty_like(forces)
@@ -212,7 +212,7 @@ def compile_kernels() -> None:
 
     Takes some seconds the first time on a machine; a node does it before its first message.
     """
-    valve = Valve(diaphragm_area=1.0)
+    valve = Valve()
     parameters = KarnoppParameters(1.0, 1.0, 1.0, 1.0, 1.0)
     simulate(valve, parameters, np.array([0.0, 2.0]), 1e-3)
     advance(StemState(0.0), valve, parameters, (0.0, 2.0), 1e-3)

@@ -6,6 +6,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.model.drive import Drive
+
 __all__ = ["StampedRecord", "StampedSignal"]
 
 
@@ -53,7 +55,8 @@ class StampedSignal:
 
 @dataclass(frozen=True, eq=False)
 class StampedRecord:
-    """Pressure (Pa) and stem position (m), their times counted from one origin."""
+    """Drive (Pa or N) and stem position (m), their times counted from one origin."""
 
-    pressure: StampedSignal
+    drive: StampedSignal
     position: StampedSignal
+    driven_by: Drive = Drive.PRESSURE

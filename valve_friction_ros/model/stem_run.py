@@ -1,4 +1,8 @@
-"""The stem through all samples: short cuts without events, located events between them."""
+"""The stem through all samples: short cuts without events, located events between them.
+
+Friction may be graded by the sample, and the stem set anew after a gap. numba leaves out the
+branches of an argument that is None, so a simulation without them costs nothing more.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +20,28 @@ from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
 
 __all__ = ["run_stem"]
 
+_Signal = NDArray[np.float64] | None
+
+
+@compiled
+def _more(grip: _Signal, sample: int) -> float:
+    """Return by how much friction is graded at a sample, N."""
+    return 0.0 if grip is None else grip[sample]
+
+
+@compiled
+def _is_anew(anew: _Signal, sample: int) -> bool:
+    """Return whether the stem is set anew at a sample."""
+    return False if anew is None else not np.isnan(anew[sample])
+
 
 @compiled
 def _rest_on(
     sample: int,
     position: float,
     forces: NDArray[np.float64],
+    grip: _Signal,
+    anew: _Signal,
     upward: Dynamics,
     downward: Dynamics,
     positions: NDArray[np.float64],
@@ -30,11 +50,13 @@ def _rest_on(
     """Fill in the samples through which the stem certainly rests; return the last one."""
     held = upward.spring_constant * position
     highest, lowest = held + upward.static_friction, held - downward.static_friction
-    if not lowest <= forces[sample] <= highest:
-        return sample
-    for following in range(sample + 1, forces.size):
-        if not lowest <= forces[following] <= highest:
-            return following - 1
+    for following in range(sample, forces.size):
+        more = _more(grip, following)
+        is_held = lowest - more <= forces[following] <= highest + more
+        if following == sample and is_held:
+            continue
+        if not is_held or _is_anew(anew, following):
+            return max(following - 1, sample)
         positions[following], velocities[following] = position, 0.0
     return forces.size - 1
 
@@ -46,6 +68,8 @@ def _slide_on(
     way: Dynamics,
     slide: SlidingMap,
     forces: NDArray[np.float64],
+    grip: _Signal,
+    anew: _Signal,
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
 ) -> int:
@@ -56,21 +80,16 @@ def _slide_on(
     stop.
     """
     lowest, highest = (0.0, way.travel) if way.travel < np.inf else (-np.inf, np.inf)
-    friction, spring, viscous = (
-        side * way.coulomb_friction,
-        way.spring_constant,
-        way.viscous_friction,
-    )
+    dry, spring, viscous = way.coulomb_friction, way.spring_constant, way.viscous_friction
     position, velocity = positions[sample], velocities[sample]
-    excess = forces[sample] - friction
+    excess = forces[sample] - side * (dry + _more(grip, sample))
     push = side * (excess - spring * position - viscous * velocity)
     if side * velocity <= way.limit_velocity:
         return sample
     left = forces.size - sample  # in a `for` loop numba fuses other products: other last digits
-    while sample < forces.size - 1:
-        after = forces[sample + 1] - friction
-        change = after - excess
-        place, following = slid(slide, position, velocity, excess, change)
+    while sample < forces.size - 1 and not _is_anew(anew, sample + 1):
+        after = forces[sample + 1] - side * (dry + _more(grip, sample + 1))
+        place, following = slid(slide, position, velocity, excess, after - excess)
         final_push = side * (after - spring * place - viscous * following)
         no_minimum = push >= 0 or final_push <= 0
         slowest = side * velocity + slide.reach * push
@@ -96,6 +115,8 @@ def _slide_on_falling(
     way: Dynamics,
     ladder: ChordLadder,
     forces: NDArray[np.float64],
+    grip: _Signal,
+    anew: _Signal,
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
 ) -> int:
@@ -110,11 +131,14 @@ def _slide_on_falling(
         return sample
     top = ladder.slides.shape[0] - 1
     for _ in range(sample, forces.size - 1):
+        if _is_anew(anew, sample + 1):
+            return sample
         rung = min(int(side * velocity / ladder.spacing), top)
-        friction, viscous = side * ladder.chords[rung, 0], ladder.chords[rung, 1]
+        dry, viscous = ladder.chords[rung, 0], ladder.chords[rung, 1]
         row = ladder.slides[rung]
         slide = SlidingMap(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
-        excess, after = forces[sample] - friction, forces[sample + 1] - friction
+        excess = forces[sample] - side * (dry + _more(grip, sample))
+        after = forces[sample + 1] - side * (dry + _more(grip, sample + 1))
         place, following = slid(slide, position, velocity, excess, after - excess)
         push = side * (excess - way.spring_constant * position - viscous * velocity)
         final_push = side * (after - way.spring_constant * place - viscous * following)
@@ -136,6 +160,21 @@ def _slide_on_falling(
 
 
 @compiled
+def _graded(way: Dynamics, more: float) -> Dynamics:
+    """Return the dynamics with `more` Coulomb and static friction."""
+    return Dynamics(
+        way.mass,
+        way.viscous_friction,
+        max(way.coulomb_friction + more, 0.0),
+        max(way.static_friction + more, 0.0),
+        way.spring_constant,
+        way.limit_velocity,
+        way.travel,
+        way.stribeck_velocity,
+    )
+
+
+@compiled
 def run_stem(
     forces: NDArray[np.float64],
     period: float,
@@ -143,11 +182,16 @@ def run_stem(
     downward: Dynamics,
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
+    grip: _Signal = None,
+    anew: _Signal = None,
+    leaving: _Signal = None,
 ) -> None:
     """Step through `forces` (actuator less preload, N) from the state at sample 0.
 
     Rest and sliding over several samples take short cuts; `advance_stem` steps all samples between
-    them, and so every sample with an event.
+    them, and so every sample with an event. `grip` (N) is added to the Coulomb and the static
+    friction of each sample. Where `anew` is a number, the stem is set to that place (m) and to the
+    velocity `leaving` (m/s).
     """
     up, down = sliding_map(upward, period), sliding_map(downward, period)
     steps_up, steps_down = chord_ladder(upward, period), chord_ladder(downward, period)
@@ -155,30 +199,35 @@ def run_stem(
     falls = upward.stribeck_velocity > 0.0
     sample = 0
     for _ in range(forces.size):
-        velocity = velocities[sample]
+        at, velocity = positions[sample], velocities[sample]
         side = 1.0 if velocity > 0 else -1.0
         way = upward if velocity > 0 else downward
         if velocity == 0.0:
             sample = _rest_on(
-                sample, positions[sample], forces, upward, downward, positions, velocities
+                sample, at, forces, grip, anew, upward, downward, positions, velocities
             )
         elif is_quick and falls:
             ladder = steps_up if velocity > 0 else steps_down
-            sample = _slide_on_falling(sample, side, way, ladder, forces, positions, velocities)
+            sample = _slide_on_falling(
+                sample, side, way, ladder, forces, grip, anew, positions, velocities
+            )
         elif is_quick:
             slide = up if velocity > 0 else down
-            sample = _slide_on(sample, side, way, slide, forces, positions, velocities)
+            sample = _slide_on(sample, side, way, slide, forces, grip, anew, positions, velocities)
         if sample == forces.size - 1:
             return
-        force, change = forces[sample], forces[sample + 1] - forces[sample]
-        positions[sample + 1], velocities[sample + 1] = advance_stem(
-            positions[sample],
-            velocities[sample],
-            force,
-            change / period,
-            period,
-            upward,
-            downward,
-        )
+        if anew is not None and leaving is not None and not np.isnan(anew[sample + 1]):
+            positions[sample + 1], velocities[sample + 1] = anew[sample + 1], leaving[sample + 1]
+        else:
+            more = 0.5 * (_more(grip, sample) + _more(grip, sample + 1))
+            positions[sample + 1], velocities[sample + 1] = advance_stem(
+                positions[sample],
+                velocities[sample],
+                forces[sample],
+                (forces[sample + 1] - forces[sample]) / period,
+                period,
+                _graded(upward, more),
+                _graded(downward, more),
+            )
         sample += 1
     raise ArithmeticError("the simulation did not reach its last sample")

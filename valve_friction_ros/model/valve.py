@@ -2,16 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_finite, require_positive
+from valve_friction_ros.model.drive import Drive
 
-__all__ = ["ATMOSPHERIC_PRESSURE", "Valve"]
+__all__ = ["Valve"]
 
-ATMOSPHERIC_PRESSURE = 101325.0
-"""Standard atmosphere in Pa: the `pressure_reference` of an absolute pressure sensor."""
+_Samples = TypeVar("_Samples", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,9 @@ class Valve:
 
     Attributes
     ----------
-    diaphragm_area : float
-        Effective area S_a of the actuator diaphragm, m².
+    diaphragm_area : float, optional
+        Effective area S_a of the actuator diaphragm, m²; None for a machine without a diaphragm,
+        which a force drives.
     pressure_reference : float
         Pressure P_ref at which the actuator exerts no force, Pa: 101325 for a sensor of
         absolute pressure, 0 for a gauge sensor.
@@ -43,7 +45,7 @@ class Valve:
     4450.0
     """
 
-    diaphragm_area: float
+    diaphragm_area: float | None = None
     pressure_reference: float = 0.0
     travel: float = math.inf
     pressure_minimum: float = -math.inf
@@ -51,7 +53,8 @@ class Valve:
 
     def __post_init__(self) -> None:
         """Refuse impossible values."""
-        require_positive("diaphragm_area", self.diaphragm_area)
+        if self.diaphragm_area is not None:
+            require_positive("diaphragm_area", self.diaphragm_area)
         require_finite("pressure_reference", self.pressure_reference)
         if self.travel != math.inf:
             require_positive("travel", self.travel)
@@ -61,12 +64,26 @@ class Valve:
                 f"pressure_maximum ({self.pressure_maximum:g})"
             )
 
-    def actuator_force(self, pressure: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Force F_ext = S_a·(P − P_ref) in N of the actuator at `pressure` in Pa."""
-        return self.diaphragm_area * (pressure - self.pressure_reference)
+    @property
+    def driven_by(self) -> Drive:
+        """What drives the stem."""
+        return Drive.FORCE if self.diaphragm_area is None else Drive.PRESSURE
 
-    def actuator_pressure(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Pressure in Pa at which the actuator exerts `force` in N."""
+    @property
+    def force_per_drive(self) -> float:
+        """Force per unit of the drive: S_a in m², or 1 where a force drives the stem."""
+        return 1.0 if self.diaphragm_area is None else self.diaphragm_area
+
+    def actuator_force(self, drive: _Samples) -> _Samples:
+        """Force F_ext = S_a·(P − P_ref) in N at a pressure in Pa; a force is passed on."""
+        if self.diaphragm_area is None:
+            return drive
+        return self.diaphragm_area * (drive - self.pressure_reference)
+
+    def actuator_drive(self, force: _Samples) -> _Samples:
+        """Pressure in Pa at which the actuator exerts `force` in N; without a diaphragm `force`."""
+        if self.diaphragm_area is None:
+            return force
         return force / self.diaphragm_area + self.pressure_reference
 
     def sensor_reads(self, pressure: NDArray[np.float64]) -> NDArray[np.bool_]:

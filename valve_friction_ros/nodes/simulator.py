@@ -91,7 +91,7 @@ class Simulator(PolledNode):
         self._plant = _plant(values_of(self, _CHANGEABLE))
 
     def poll(self) -> None:
-        """Let the stem follow the pressures that have come."""
+        """Let the stem follow the pressures that have arrived."""
         for pressure in self._pressures.take():
             self._follow(pressure.message)
 

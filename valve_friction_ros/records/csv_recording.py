@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.csv_table import (
@@ -29,10 +30,19 @@ from valve_friction_ros.records.units import (
 from valve_friction_ros.streams.samples import Samples
 from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
 
-__all__ = ["CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_recording"]
+__all__ = ["KNOWN_UNITS", "CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_csv"]
 
 _LATEST_TIME = 9e9
 """Latest time whose nanoseconds a signed 64-bit number holds, s, rounded down."""
+
+
+KNOWN_UNITS = {
+    "time": (*NANOSECONDS,),
+    "position": (*POSITION_UNITS, PERCENT),
+    "pressure": (*PRESSURE_UNITS,),
+    "force": (*FORCE_UNITS,),
+}
+"""Names of the units in which a column may be."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +59,7 @@ class CsvColumns:
 class CsvUnits:
     """Units of those columns, by their names in `records.units`.
 
-    Raises
-    ------
-    ValueError
-        If a unit is unknown.
+    Raises ValueError if a unit is unknown.
     """
 
     time: str = "s"
@@ -62,12 +69,7 @@ class CsvUnits:
 
     def __post_init__(self) -> None:
         """Refuse unknown units."""
-        for name, known in (
-            ("time", (*NANOSECONDS,)),
-            ("position", (*POSITION_UNITS, PERCENT)),
-            ("pressure", (*PRESSURE_UNITS,)),
-            ("force", (*FORCE_UNITS,)),
-        ):
+        for name, known in KNOWN_UNITS.items():
             unit = getattr(self, name)
             if unit not in known:
                 raise ValueError(f"unknown unit of {name} {unit!r}; known are {', '.join(known)}")
@@ -122,10 +124,7 @@ def _position_unit(path: Path, unit: str, valve: Valve) -> Unit:
 def drive_column(path: Path, form: CsvFormat) -> str:
     """Return the header of the signal that drives the stem: the pressure, or else the force.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or has neither pressure nor force.
+    Raises ValueError if the file cannot be read or has neither pressure nor force.
     """
     header = read_header(path, form.layout)
     columns = form.columns
@@ -135,28 +134,31 @@ def drive_column(path: Path, form: CsvFormat) -> str:
     raise ValueError(no_column(path, f"{columns.pressure!r} (or {columns.force!r})", header))
 
 
-def _pressure(table: CsvTable, drive: str, valve: Valve, form: CsvFormat) -> NDArray[np.float64]:
-    """Return the pressure in Pa; refuse values outside the sensor's range."""
-    driven_by_force = drive != form.columns.pressure
-    unit = form.units.force if driven_by_force else form.units.pressure
-    values = table.columns[drive]
-    pressure = (
-        valve.actuator_pressure(FORCE_UNITS[unit].to_si(values))
-        if driven_by_force
-        else PRESSURE_UNITS[unit].to_si(values)
-    )
-    readable = valve.sensor_reads(pressure)
+def _drive(
+    table: CsvTable, name: str, valve: Valve, form: CsvFormat
+) -> tuple[NDArray[np.float64], Drive]:
+    """Return the drive in its SI unit; refuse a pressure outside the sensor's range.
+
+    A force on the diaphragm of a valve becomes the pressure that exerts it.
+    """
+    values, unit, driven_by = table.columns[name], form.units.pressure, Drive.PRESSURE
+    if name == form.columns.pressure:
+        drive = PRESSURE_UNITS[unit].to_si(values)
+    else:
+        unit, driven_by = form.units.force, valve.driven_by
+        drive = valve.actuator_drive(FORCE_UNITS[unit].to_si(values))
+    readable = valve.sensor_reads(drive)
     if not readable.all():
         sample = int(np.argmin(readable))
         raise ValueError(
-            f"{table.place(sample, drive)}: {values[sample]:g} {unit} is outside the sensor's "
+            f"{table.place(sample, name)}: {values[sample]:g} {unit} is outside the sensor's "
             f"range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use a stretch "
             "of the record without it, name its unit, or correct the range"
         )
-    return pressure
+    return drive, driven_by
 
 
-def read_recording(
+def read_csv(
     path: Path,
     valve: Valve,
     form: CsvFormat | None = None,
@@ -172,8 +174,8 @@ def read_recording(
     path : Path
         The file, gzipped or not; its first bytes decide.
     valve : Valve
-        Converts force into pressure where the file holds a force; gives the sensor's range, and
-        the travel for positions in percent.
+        With a diaphragm it converts a force in the file into a pressure; it gives the sensor's
+        range, and the travel for positions in percent.
     form : CsvFormat, optional
         Columns, units and layout. Pressure is read from a file with both pressure and force.
     stretch : Stretch, optional
@@ -193,18 +195,18 @@ def read_recording(
     """
     form, stretch = form or CsvFormat(), stretch or Stretch()
     columns, units = form.columns, form.units
-    drive = drive_column(path, form)
-    whole = read_table(path, (columns.time, columns.position, drive), form.layout)
+    name = drive_column(path, form)
+    whole = read_table(path, (columns.time, columns.position, name), form.layout)
     table = whole.where(stretch.select(whole.columns[columns.time] * NANOSECONDS[units.time]))
     if table.samples.size == 0:
         raise RefusalError(f"{path}: the chosen stretch holds no rows: choose another begin or end")
     table.require_finite()
     stamps = _stamps(table, columns.time, units.time)
-    pressure = _pressure(table, drive, valve, form)
+    drive, driven_by = _drive(table, name, valve, form)
     position = _position_unit(path, units.position, valve).to_si(table.columns[columns.position])
     try:
         return uniform_recording(
-            Samples(stamps, pressure), Samples(stamps, position), (drive, columns.position)
+            Samples(stamps, drive), Samples(stamps, position), (name, columns.position), driven_by
         )
     except GapError as gap:
         raise RefusalError(

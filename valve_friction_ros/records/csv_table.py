@@ -27,10 +27,7 @@ _LONGEST_QUOTE = 40
 class CsvLayout:
     """Delimiter of the entries of a row, and decimal mark within them.
 
-    Raises
-    ------
-    ValueError
-        If one of them is not a single usable character.
+    Raises ValueError if one of them is not a single usable character.
     """
 
     delimiter: str = ","
@@ -76,10 +73,7 @@ def _opened(path: Path) -> Iterator[IO[str]]:
 def read_header(path: Path, layout: CsvLayout = CsvLayout()) -> list[str]:
     """Read the headers of the columns.
 
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or has no headers.
+    Raises ValueError if the file cannot be read or has no headers.
     """
     with _opened(path) as stream:
         header = next(csv.reader(stream, delimiter=layout.delimiter), None)
@@ -227,14 +221,9 @@ def read_table(
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-    """Read named columns of finite numbers from a CSV file with a header.
+    """Read named columns of finite numbers from a CSV file with a header, shape (n,) each.
 
     Parameters and errors are those of `read_table`; an entry that is not finite is refused too.
-
-    Returns
-    -------
-    dict of str to ndarray of float, shape (n,) each
-        The columns by name.
     """
     table = read_table(path, names)
     table.require_finite()

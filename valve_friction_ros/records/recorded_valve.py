@@ -38,10 +38,7 @@ class RecordedValve:
     def recording(self) -> Recording:
         """Return the recording.
 
-        Raises
-        ------
-        RefusalError
-            If the valve has no recording: file, valve, cause and notes.
+        Raises RefusalError if the valve has no recording: file, valve, cause and notes.
         """
         if isinstance(self.outcome, RefusalError):
             raise self.refused(self.outcome)

@@ -7,7 +7,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.files import is_bag
 from valve_friction_ros.records.bags.reading import read_bag
 from valve_friction_ros.records.bags.topics import TopicChoice
-from valve_friction_ros.records.csv_recording import CsvFormat, drive_column, read_recording
+from valve_friction_ros.records.csv_recording import CsvFormat, drive_column, read_csv
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.stretch import Stretch
 
@@ -72,4 +72,4 @@ def read_recordings(
     options = options or ReadingOptions()
     if is_bag(path):
         return read_bag(path, valve, options.topics, options.stretch)
-    return (RecordedValve(path, "", read_recording(path, valve, options.csv, options.stretch)),)
+    return (RecordedValve(path, "", read_csv(path, valve, options.csv, options.stretch)),)

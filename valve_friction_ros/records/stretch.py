@@ -50,12 +50,9 @@ class Stretch:
         return _nanoseconds(self.begin) <= since_first <= _nanoseconds(self.end)
 
     def select(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Choose from times in ns, shape (n,); a time that is not a number stays, to be refused.
+        """Choose from times in ns, shape (n,); return an array of bool, true within the stretch.
 
-        Returns
-        -------
-        ndarray of bool, shape (n,)
-            True within the stretch.
+        A time that is not a number stays, to be refused.
         """
         with np.errstate(invalid="ignore"):
             since = np.rint(times - times[0])

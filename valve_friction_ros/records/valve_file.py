@@ -50,17 +50,15 @@ class _StrictLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _numbers(path: Path) -> dict[str, Any]:
+def read_yaml(path: Path) -> Any:
+    """Read a YAML file; raises ValueError, with the file and the cause, if that fails."""
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), _StrictLoader)  # noqa: S506 - is safe
+        return yaml.load(path.read_text(encoding="utf-8"), _StrictLoader)  # noqa: S506 - is safe
     except (OSError, UnicodeDecodeError) as error:
         cause = (isinstance(error, OSError) and error.strerror) or error
         raise ValueError(f"{path}: cannot be read: {cause}") from None
     except yaml.YAMLError as error:
         raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(content, dict):
-        raise ValueError(f"{path}: expected lines such as 'diaphragm_area: 0.0445'")
-    return content
 
 
 def _number(key: str, value: object) -> float:
@@ -109,7 +107,9 @@ def read_valve_file(path: Path) -> ValveFile:
     >>> described.valve.diaphragm_area, described.known["mass"]
     (0.0445, 1.6)
     """
-    content = _numbers(path)
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        raise ValueError(f"{path}: expected lines such as 'diaphragm_area: 0.0445'")
     names = (*_GEOMETRY, *FIXABLE)
     for key in content:
         if key not in names:

@@ -9,17 +9,8 @@ __all__ = ["write_whole"]
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file; a failure leaves no part of it, and keeps what was there before.
 
-    Parameters
-    ----------
-    path : Path
-        The file; a link stays a link, a device or a pipe is written to as it is.
-    content : bytes
-        What it is to hold.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; it names `path`.
+    A link stays a link, a device or a pipe is written to as it is. Raises OSError, which names
+    `path`.
     """
     place = path.resolve()
     is_special = place.exists() and not place.is_file()

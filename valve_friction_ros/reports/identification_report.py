@@ -4,16 +4,14 @@ import math
 from collections.abc import Iterator
 
 from valve_friction_ros.figures.report_figures import (
-    SETTLED_SHARE,
-    chosen_region,
     comparison_figure,
+    evidence_figure,
     record_figure,
     residual_figure,
     signature_loop_figure,
-    sweep_figure,
 )
 from valve_friction_ros.health import percentage
-from valve_friction_ros.identification import Estimate, StemComparison
+from valve_friction_ros.identification import StemComparison
 from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
 from valve_friction_ros.reports.identification_tables import (
     friction_table,
@@ -41,17 +39,9 @@ _NO_STEM = (
 def identification_report(record: IdentifiedRecord) -> Page:
     """Return the page on an identified record: its parameters and the evidence for them.
 
-    Parameters
-    ----------
-    record : IdentifiedRecord
-        Record, result, baseline and limits.
-
-    Returns
-    -------
-    Page
-        The diagnosis in one sentence, then parameters, friction against its baseline, the record,
-        the valve signature, the sweep, the measured against the simulated position, the residual,
-        notes, settings and versions. Parts that a method does not have are left out.
+    The diagnosis in one sentence, then parameters, friction against its baseline, the record, the
+    valve signature, the evidence of the method, the measured against the simulated position, the
+    residual, notes, settings and versions. Parts that a method does not have are left out.
     """
     return Page(f"Friction of {record.name}", diagnosis_sentence(record), tuple(_sections(record)))
 
@@ -62,8 +52,10 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     yield _friction(record)
     yield _record(record)
     yield _signature(record)
-    if result.estimate is not None:
-        yield _sweep(record, result.estimate)
+    drawing = result.drawing
+    if drawing.panels:
+        picture = Picture(evidence_figure(drawing), drawing.caption, drawing.alt)
+        yield Section(drawing.heading, (picture,))
     comparison = result.stem
     if comparison is None:
         yield Section("Measured and simulated position", (Paragraph(_NO_STEM),))
@@ -88,9 +80,9 @@ def _friction(record: IdentifiedRecord) -> Section:
 
 
 def _record(record: IdentifiedRecord) -> Section:
-    drive = record.drive.label.partition(" [")[0]
+    drive = record.recording.driven_by.words
     picture = Picture(
-        record_figure(record.recording, record.drive),
+        record_figure(record.recording),
         f"The record: {drive} and stem position over the time.",
         f"Two curves over {record.recording.duration:.3g} s: {drive} above, stem position below.",
     )
@@ -98,38 +90,15 @@ def _record(record: IdentifiedRecord) -> Section:
 
 
 def _signature(record: IdentifiedRecord) -> Section:
-    result, drive = record.result, record.drive.label.partition(" [")[0]
+    result, drive = record.result, record.recording.driven_by.words
     caption = f"Stem position over {drive}: the wider the loop, the more friction."
-    if result.signature is not None:
-        share = percentage(result.signature.dead_zone_share)
-        caption += (
-            f" The stem breaks away upwards at P₁ and downwards at P₂; on the dashed lines it "
-            f"slides. The dead zone, the loop's width, is {share} of the pressure's span."
-        )
+    caption += result.drawing.loop_caption
     picture = Picture(
-        signature_loop_figure(result, record.drive),
+        signature_loop_figure(result),
         caption,
         f"A loop of stem position over {drive}.",
     )
     return Section("Valve signature", (picture,))
-
-
-def _sweep(record: IdentifiedRecord, estimate: Estimate) -> Section:
-    low, high = chosen_region(estimate.sweep, estimate.threshold)
-    caption = (
-        f"The friction force balance, fitted to the samples faster than each threshold δv. Chosen: "
-        f"{estimate.threshold * 1e3:.3g} mm/s, with {estimate.samples} samples above it, "
-        f"σ_s {estimate.sigma:.4g} N and R² {estimate.r_squared:.5f}. Shaded: the region around "
-        f"it, {low * 1e3:.3g} to {high * 1e3:.3g} mm/s, where σ_s stays within "
-        f"{100 * SETTLED_SHARE:.0f} % of that."
-    )
-    picture = Picture(
-        sweep_figure(record.result, record.drive),
-        caption,
-        "Coulomb friction, standard deviation and correlation over the velocity threshold, with "
-        "the chosen threshold and the region around it marked.",
-    )
-    return Section("Sweep of the velocity threshold δv", (picture,))
 
 
 def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section:
@@ -139,7 +108,7 @@ def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section
     picture = Picture(
         comparison_figure(comparison),
         f"The measured stem and, dotted, the stem of the identified model under the same "
-        f"{record.drive.label.partition(' [')[0]}. Fit {100 * result.fit:.2f} %, rms "
+        f"{record.recording.driven_by.words}. Fit {100 * result.fit:.2f} %, rms "
         f"{result.rms * 1e6:.3g} µm{of_travel}.",
         "Measured and simulated stem position over the time, in one panel.",
     )

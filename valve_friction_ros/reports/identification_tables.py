@@ -2,7 +2,9 @@
 
 import math
 import platform
+from collections.abc import Mapping
 from datetime import datetime, timezone
+from typing import Any
 
 import matplotlib
 import numba
@@ -11,7 +13,7 @@ import scipy
 
 import valve_friction_ros
 from valve_friction_ros.health import Baseline, dead_band, percentage
-from valve_friction_ros.identification import PARAMETER_UNITS, Parameter, Verdict
+from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
 
@@ -42,50 +44,38 @@ _DATED = (1e9, 1e11)
 """Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
 
 
-def _number(value: float) -> str:
+def _number(value: float | None) -> str:
     """Write five digits or more, without an exponent if possible."""
-    if not math.isfinite(value):
+    if value is None:
         return _NOTHING
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
 
 
-def _interval(parameter: Parameter) -> str:
-    if math.isnan(parameter.value) or parameter.verdict is Verdict.FIXED:
-        return _NOTHING
-    return " to ".join(map(_number, parameter.interval))
-
-
-def _verdict(parameter: Parameter) -> str:
-    return ": ".join(filter(None, (parameter.verdict.value, parameter.reason)))
+def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
+    stated = one["value"] is not None and one["verdict"] != Verdict.FIXED.value
+    return (
+        f"{_WORDS.get(name, name.replace('_', ' '))} [{one['unit']}]",
+        _number(one["value"]),
+        " to ".join(map(_number, one["interval"])) if stated else _NOTHING,
+        ": ".join(filter(None, (one["verdict"], one["reason"]))),
+        _number(one["published"]),
+    )
 
 
 def parameter_table(record: IdentifiedRecord) -> Table:
     """Return each parameter with interval and verdict, and its published value if known."""
-    parameters = record.result.parameters
-    columns = [
+    shown = record.result.to_dict()["parameters"]
+    columns = (
         Column("parameter"),
         Column("value", is_number=True),
         Column("95 % interval", is_number=True),
         Column("verdict"),
-    ]
-    rows = [
-        (
-            f"{_WORDS.get(name, name.replace('_', ' '))} [{PARAMETER_UNITS[name]}]",
-            _number(one.value),
-            _interval(one),
-            _verdict(one),
-        )
-        for name, one in parameters.items()
-    ]
-    marked = (list(parameters).index("coulomb_friction"),)
-    if all(math.isnan(one.published) for one in parameters.values()):
-        return Table(tuple(columns), tuple(rows), marked=marked)
-    beside = (_number(one.published) for one in parameters.values())
-    return Table(
-        (*columns, Column("published method", is_number=True)),
-        tuple((*row, value) for row, value in zip(rows, beside, strict=True)),
-        marked=marked,
+        Column("published method", is_number=True),
     )
+    rows = [_cells(name, one) for name, one in shown.items()]
+    marked = ([*shown].index("coulomb_friction"),)
+    count = 4 + any(one["published"] is not None for one in shown.values())
+    return Table(columns[:count], tuple(row[:count] for row in rows), marked=marked)
 
 
 def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
@@ -134,8 +124,8 @@ def friction_table(record: IdentifiedRecord) -> Table:
 
 def record_table(record: IdentifiedRecord) -> Table:
     """Return the source of the record, and its extent."""
-    recording, drive = record.recording, record.drive
-    pressure, position = recording.pressure / drive.pascals, recording.position * 1e3
+    recording, drive = record.recording, record.recording.driven_by
+    shown, position = recording.drive / drive.size, recording.position * 1e3
     rows = [("source", record.source)]
     if _DATED[0] < recording.start_time < _DATED[1]:
         began = datetime.fromtimestamp(recording.start_time, timezone.utc)
@@ -143,7 +133,7 @@ def record_table(record: IdentifiedRecord) -> Table:
     rows += [
         ("duration", f"{recording.duration:.4g} s"),
         ("samples", f"{len(recording)}, sampled every {recording.sample_period * 1e3:.4g} ms"),
-        (drive.label, f"{pressure.min():.5g} to {pressure.max():.5g}"),
+        (drive.label, f"{shown.min():.5g} to {shown.max():.5g}"),
         ("stem [mm]", f"{position.min():.4g} to {position.max():.4g}"),
     ]
     return _pairs(rows, "record", "extent")
@@ -152,32 +142,31 @@ def record_table(record: IdentifiedRecord) -> Table:
 def settings_table(record: IdentifiedRecord) -> Table:
     """Return settings, valve and software of the identification."""
     result, valve = record.result, record.valve
-    settings = result.settings
-    fixed = ", ".join(f"{name} = {value:g}" for name, value in settings.fixed.items())
-    window = settings.derivative_window
-    bias = settings.position_bias
+    shown = result.to_dict()
+    settings = shown["settings"]
+    fixed = ", ".join(f"{name} = {value:g}" for name, value in settings["fixed"].items())
+    source = "chosen from the noise of the record"
+    if settings["derivative_window"] is not None:
+        source = "as given"
+    bias = settings["position_bias"]
     rows = [
-        ("method", result.method),
-        (
-            "derivative window",
-            f"{result.derivative_window} samples, "
-            + ("chosen from the noise of the record" if window is None else "as given"),
-        ),
-    ]
-    if result.estimate is not None:
-        rows.append(
-            (
-                "of the published method",
-                f"window {settings.published_window} samples, polynomial order "
-                f"{settings.order}, {settings.steps} thresholds",
-            )
-        )
-    rows += [
+        ("method", shown["method"]),
+        ("derivative window", f"{shown['derivative_window']} samples, {source}"),
+        *(result.drawing.settings or {}).items(),
         ("given parameters", fixed or "none"),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
-        ("mass where the record does not determine it", f"{settings.assumed_mass:g} kg"),
-        ("diaphragm area S_a", f"{valve.diaphragm_area:g} m²"),
-        ("pressure reference P_ref", f"{valve.pressure_reference:g} Pa"),
+        (
+            "mass where the record does not determine it",
+            f"{settings['assumed_mass']:g} kg",
+        ),
+        *(
+            []
+            if valve.diaphragm_area is None
+            else [
+                ("diaphragm area S_a", f"{valve.diaphragm_area:g} m²"),
+                ("pressure reference P_ref", f"{valve.pressure_reference:g} Pa"),
+            ]
+        ),
         (
             "travel",
             f"{valve.travel * 1e3:g} mm" if math.isfinite(valve.travel) else "without stops",

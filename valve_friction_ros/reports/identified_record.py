@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from valve_friction_ros.figures import PRESSURE, DriveScale
 from valve_friction_ros.health import Baseline, Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
@@ -26,8 +25,6 @@ class IdentifiedRecord:
         Friction of the healthy valve.
     limits : FrictionLimits
         Bounds of the friction.
-    drive : DriveScale
-        Unit of the pressure.
     notes : tuple of str
         Limitations of the record, one sentence each.
     """
@@ -37,12 +34,11 @@ class IdentifiedRecord:
     result: Result = field(repr=False)
     baseline: Baseline | None = None
     limits: FrictionLimits = field(default_factory=FrictionLimits)
-    drive: DriveScale = PRESSURE
     notes: tuple[str, ...] = ()
 
     @property
     def recording(self) -> Recording:
-        """Pressure and stem position."""
+        """Drive and stem position."""
         return self.result.recording
 
     @property

@@ -34,23 +34,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of text under headings.
+    """Rows of text under headings, as many cells each as there are columns.
 
-    Attributes
-    ----------
-    columns : tuple of Column
-        From left to right.
-    rows : tuple of tuple of str
-        As many cells each as there are columns.
-    caption : str
-        Text above the table; empty for none.
-    marked : tuple of int
-        Highlighted rows, counted from 0.
-
-    Raises
-    ------
-    ValueError
-        If a row has another number of cells, or a marked row does not exist.
+    The caption stands above the table; `marked` rows, counted from 0, are highlighted. Raises
+    ValueError if a row has another number of cells, or a marked row does not exist.
     """
 
     kind: ClassVar[str] = "table"
@@ -72,17 +59,7 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure, drawn into the page.
-
-    Attributes
-    ----------
-    figure : Figure
-        The figure.
-    caption : str
-        Text below the picture.
-    alt : str
-        Description of the picture, for readers who cannot see it.
-    """
+    """A figure, its caption, and its description for readers who cannot see it."""
 
     kind: ClassVar[str] = "picture"
 

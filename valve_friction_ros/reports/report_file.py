@@ -14,11 +14,8 @@ _ENDINGS = (".html", ".htm")
 def require_report_file(path: Path) -> None:
     """Refuse a file that a report cannot be written to, before the work begins.
 
-    Raises
-    ------
-    ValueError
-        If the ending is not .html, or the folder does not exist or cannot be written; the
-        message names it.
+    Raises ValueError if the ending is not .html, or the folder does not exist or cannot be written;
+    the message names it.
     """
     if path.suffix.lower() not in _ENDINGS:
         raise ValueError(f"{path}: a report is an HTML page: give it a name that ends in .html")
@@ -37,9 +34,6 @@ def require_report_file(path: Path) -> None:
 def write_report(page: Page, path: Path) -> None:
     """Write a page as one HTML file, at once: a reader never finds part of it.
 
-    Raises
-    ------
-    OSError
-        If it cannot be written; an existing file stays unchanged.
+    Raises OSError if it cannot be written; an existing file stays unchanged.
     """
     write_whole(path, render(page).encode())

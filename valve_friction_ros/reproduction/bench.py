@@ -5,10 +5,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from valve_friction_ros.model import KarnoppParameters, SensorNoise, SquareWave, Valve
 from valve_friction_ros.model.checks import require_finite, require_positive
+from valve_friction_ros.records.valve_file import read_yaml
 
 __all__ = ["BENCH_NAMES", "Bench", "find_bench_folder", "read_bench"]
 
@@ -20,26 +19,11 @@ _PARAMETERS = tuple(field.name for field in fields(KarnoppParameters))
 
 @dataclass(frozen=True)
 class Bench:
-    """A simulated valve with its converter and its sensors.
+    """A simulated valve with its converter and its sensors, in SI units.
 
-    Attributes
-    ----------
-    name : str
-        Name of the packing: low, high, graphite.
-    valve : Valve
-        Geometry.
-    truth : KarnoppParameters
-        True parameters, which the identification should find.
-    square : SquareWave
-        The identification signal.
-    converter_lag : float
-        Time constant of the V/P converter, s.
-    sample_period : float
-        Time between two samples of both sensors, s.
-    noise : SensorNoise
-        Noise of both sensors; the pressure without noise acts on the stem.
-    assumed_mass : float
-        The nominal mass of the moving parts, kg.
+    The `truth` is what the identification should find. The pressure without noise acts on the stem.
+    `converter_lag` is the time constant of the V/P converter, `assumed_mass` the nominal mass of
+    the moving parts.
     """
 
     name: str
@@ -64,10 +48,7 @@ class Bench:
 def find_bench_folder() -> Path:
     """Find the folder of the configuration files, in the sources or where they are installed.
 
-    Raises
-    ------
-    ValueError
-        If it is not found.
+    Raises ValueError if it is not found.
     """
     package = Path(__file__).resolve().parents[1]
     for above in package.parents:
@@ -80,19 +61,10 @@ def find_bench_folder() -> Path:
 def read_bench(folder: Path, name: str) -> Bench:
     """Read a bench from ``bench_<name>.yaml``, the parameter file of its three nodes.
 
-    Raises
-    ------
-    ValueError
-        In one line: the file and the cause.
+    Raises ValueError, one line with the file and the cause.
     """
     path = folder / f"bench_{name}.yaml"
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
-        raise ValueError(f"{path}: cannot be read: {cause}") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    content = read_yaml(path)
     try:
         source, simulator, identifier = (
             _Section(content, node) for node in ("pressure_source", "simulator", "identifier")

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from valve_friction_ros.model import (
     Excitation,
     IsaSteps,
+    KarnoppParameters,
     Recording,
     SineWave,
+    StemState,
     TriangleWave,
     converter_response,
     simulate,
@@ -17,7 +19,18 @@ from valve_friction_ros.model import (
 from valve_friction_ros.model.excitations import pressure_at
 from valve_friction_ros.reproduction.bench import Bench
 
-__all__ = ["ISA", "SINE", "TRIANGLE", "Experiment", "Experiments", "Plan", "run", "run_all"]
+__all__ = [
+    "ISA",
+    "SINE",
+    "TRIANGLE",
+    "Experiment",
+    "Experiments",
+    "Plan",
+    "rms",
+    "run",
+    "run_all",
+    "stem_error",
+]
 
 TRIANGLE = TriangleWave(pressure_at(0.1), pressure_at(0.8), 42.0)
 """Triangle of the signature: the slope of the whole range in 60 s a period, without travel
@@ -32,15 +45,7 @@ ISA = IsaSteps()
 
 @dataclass(frozen=True)
 class Plan:
-    """Length of the record of each excitation.
-
-    Attributes
-    ----------
-    square_periods, triangle_periods, sine_periods : float
-        Periods of each wave.
-    isa : IsaSteps
-        The step sequence, recorded completely.
-    """
+    """Periods of each wave, and the step sequence, which is recorded completely."""
 
     square_periods: float = 6.0
     triangle_periods: float = 3.5
@@ -50,17 +55,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """The command, the true motion, and the measured motion.
-
-    Attributes
-    ----------
-    command : ndarray of float, shape (n,)
-        Commanded pressure, Pa.
-    clean : Recording
-        True pressure behind the converter, and true stem position.
-    measured : Recording
-        The same with the noise of the sensors.
-    """
+    """Commanded pressure (Pa, shape (n,)), the true motion, and the motion with sensor noise."""
 
     command: NDArray[np.float64] = field(repr=False)
     clean: Recording
@@ -78,19 +73,7 @@ class Experiments:
 
 
 def run(bench: Bench, excitation: Excitation, duration: float, number: int = 0) -> Experiment:
-    """Run one experiment.
-
-    Parameters
-    ----------
-    bench : Bench
-        Valve, converter and sensors.
-    excitation : Excitation
-        Commanded pressure.
-    duration : float
-        Length of the record, s.
-    number : int
-        Number of the experiment; it selects the noise.
-    """
+    """Run one experiment of `duration` seconds; its `number` selects the noise."""
     period = bench.sample_period
     command = excitation.sample(np.arange(round(duration / period) + 1) * period)
     pressure = converter_response(command, period, bench.converter_lag)
@@ -98,6 +81,21 @@ def run(bench: Bench, excitation: Excitation, duration: float, number: int = 0) 
     clean = Recording(period, pressure, stem.position)
     noise = replace(bench.noise, seed=bench.noise.seed + number)
     return Experiment(command, clean, noise.applied_to(clean))
+
+
+def stem_error(
+    bench: Bench, experiment: Experiment, model: KarnoppParameters
+) -> NDArray[np.float64]:
+    """Return the stem of a model minus the true stem, both under the true pressure, m."""
+    clean = experiment.clean
+    start = StemState(float(clean.position[0]))
+    stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
+    return stem.position - clean.position
+
+
+def rms(error: NDArray[np.float64]) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(error**2)))
 
 
 def run_all(bench: Bench, plan: Plan) -> Experiments:

@@ -20,15 +20,10 @@ _REST = 0.05
 
 
 class ForceTerms(NamedTuple):
-    """Terms of (4) over the time.
+    """Time since the first sample, s, and the terms of (4) by name, N, shape (n,) each.
 
-    Attributes
-    ----------
-    time : ndarray of float, shape (n,)
-        s since the first sample.
-    terms : dict of str to ndarray of float, shape (n,) each
-        k·x, F_c·sgn ẋ, F_v·ẋ and m·ẍ, N, in this order; x counts from the bias of (10), and the
-        sign of a resting stem is 0.
+    The terms are k·x, F_c·sgn ẋ, F_v·ẋ and m·ẍ, in this order; x counts from the bias of (10), and
+    the sign of a resting stem is 0.
     """
 
     time: NDArray[np.float64]

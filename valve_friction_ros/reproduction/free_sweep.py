@@ -66,7 +66,7 @@ def free_sweep(recording: Recording, valve: Valve, settings: IdentificationSetti
     derivatives = differentiate(
         recording.position, recording.sample_period, settings.published_window, settings.order
     )
-    force = valve.actuator_force(recording.pressure)
+    force = valve.actuator_force(recording.drive)
     regression = force_balance_regression(force, recording.position, derivatives, settings)
     first = float(regression.speed.max()) / settings.resolution
     steps = np.arange(1, settings.steps + 1, dtype=np.float64)

@@ -23,10 +23,17 @@ from valve_friction_ros.identification import (
     step_test,
     validate,
 )
-from valve_friction_ros.model import KarnoppParameters, Recording, StemState, simulate
+from valve_friction_ros.model import KarnoppParameters, Recording
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.bench import Bench
-from valve_friction_ros.reproduction.experiments import Experiment, Experiments, Plan, run_all
+from valve_friction_ros.reproduction.experiments import (
+    Experiment,
+    Experiments,
+    Plan,
+    rms,
+    run_all,
+    stem_error,
+)
 from valve_friction_ros.reproduction.found import model_of, signature_of
 from valve_friction_ros.reproduction.free_sweep import FreeSweep, free_sweep
 from valve_friction_ros.reproduction.scatter import Scatter, measure_scatter
@@ -52,20 +59,10 @@ _ROUNDING = 5e-6
 class Identified:
     """The result of each method on the records of one bench.
 
-    Attributes
-    ----------
-    position_bias : float
-        x̄ in model 1, m.
-    published : Estimate
-        Model 1, the sweep, from the square wave.
-    free : FreeSweep
-        The same with the mass as it is regressed, for Figs. 3 and 4.
-    force_balance : Result
-        Model 2, from the triangle.
-    refined : Result
-        Model 1 refined by simulation, from the square wave.
-    own_preload : Result
-        The same with F_0 as a parameter in place of x̄, and with the nominal mass fixed.
+    Model 1 is the sweep of the square wave with x̄ = `position_bias` (m): `published`, and `free`
+    with the mass as it is regressed, for Figs. 3 and 4. Model 2 is the `force_balance` of the
+    triangle. `refined` is model 1 refined by simulation; `own_preload` has F_0 as a parameter in
+    place of x̄, and the nominal mass fixed.
     """
 
     position_bias: float
@@ -98,14 +95,10 @@ class Identified:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A model compared with a record, and with the stem without sensor noise.
+    """A model compared with the measured stem, and with the stem without sensor noise.
 
-    Attributes
-    ----------
-    validation : Validation
-        Comparison with the measured stem.
-    error : ndarray of float, shape (n,)
-        Stem of the model minus the true stem, both under the true pressure, m.
+    `error` is the stem of the model minus the true stem, both under the true pressure, m, shape
+    (n,).
     """
 
     validation: Validation
@@ -114,7 +107,7 @@ class Comparison:
     @property
     def true_rms(self) -> float:
         """Root mean square of `error`, m."""
-        return float(np.sqrt(np.mean(self.error**2)))
+        return rms(self.error)
 
     @property
     def true_maximum(self) -> float:
@@ -126,19 +119,9 @@ class Comparison:
 class BenchResult:
     """All results on one bench.
 
-    Attributes
-    ----------
-    bench : Bench
-        The simulated valve.
-    experiments : Experiments
-        Its records.
-    identified : Identified
-        Its models.
-    sine, isa : mapping of str to Comparison
-        Validations by model: those of `Identified.models`, and of the paper's packings also
-        "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1.
-    steps : StepTest
-        Metrics of the ISA test, input and position in percent of their spans.
+    `sine` and `isa` are validations by model: those of `Identified.models`, and of the paper's
+    packings also "model 1, DV 1 %" and "paper's model 2", the numbers of Table 1. `steps` has input
+    and position in percent of their spans.
     """
 
     bench: Bench
@@ -158,19 +141,11 @@ class MassByBias(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """All results of the programme.
+    """All results of the programme, by bench.
 
-    Attributes
-    ----------
-    results : mapping of str to BenchResult
-        By bench.
-    without_noise : mapping of str to Estimate
-        Model 1 of the paper's packings without any noise.
-    mass_by_bias : tuple of MassByBias
-        The mass of the packing "low" without noise, with x̄ at either end and in the middle of
-        what rounds to the same 0.01 mm.
-    scatter : Scatter
-        How noise scatters the estimates.
+    `without_noise` is model 1 of the paper's packings without any noise, `mass_by_bias` the mass of
+    the packing "low" without noise, with x̄ at either end and in the middle of what rounds to the
+    same 0.01 mm.
     """
 
     results: Mapping[str, BenchResult]
@@ -206,12 +181,8 @@ def identified(
 
 def compared(bench: Bench, experiment: Experiment, model: KarnoppParameters) -> Comparison:
     """Simulate an experiment with a model, and compare the stems."""
-    clean = experiment.clean
-    start = StemState(float(clean.position[0]))
-    stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
-    return Comparison(
-        validate(experiment.measured, bench.valve, model), stem.position - clean.position
-    )
+    validation = validate(experiment.measured, bench.valve, model)
+    return Comparison(validation, stem_error(bench, experiment, model))
 
 
 def _steps(bench: Bench, isa: Experiment) -> StepTest:
@@ -260,28 +231,11 @@ def run_programme(
     seeds: int,
     progress: Callable[[str], object] = lambda _: None,
 ) -> Programme:
-    """Run the whole programme.
+    """Run the whole programme on the benches by name, the paper's two packings among them.
 
-    Parameters
-    ----------
-    benches : mapping of str to Bench
-        By name, the paper's two packings among them; x̄ is shared between these, as in the paper.
-    plan : Plan
-        Length of the records.
-    seeds : int
-        Repetitions with other noise, to estimate the scatter.
-    progress : callable
-        Called with the name of the next step.
-
-    Returns
-    -------
-    Programme
-        All results.
-
-    Raises
-    ------
-    RefusalError, ValueError
-        If the noise hides what a method needs; the message names it.
+    x̄ is shared between these two, as in the paper. With `seeds` repetitions of other noise the
+    scatter is estimated. `progress` is called with the name of the next step. Raises RefusalError
+    or ValueError, which names the method, if the noise hides what a method needs.
     """
     experiments, balances = {}, {}
     for name, bench in benches.items():

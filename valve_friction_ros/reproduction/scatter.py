@@ -12,13 +12,13 @@ from valve_friction_ros.identification import (
     identify_signature,
     published_estimate,
 )
-from valve_friction_ros.model import KarnoppParameters, SensorNoise, StemState, simulate
+from valve_friction_ros.model import SensorNoise
 from valve_friction_ros.reproduction.bench import Bench
-from valve_friction_ros.reproduction.experiments import SINE, TRIANGLE, Experiment, Plan, run
+from valve_friction_ros.reproduction.experiments import SINE, TRIANGLE, Plan, rms, run, stem_error
 from valve_friction_ros.reproduction.found import model_of, signature_of
 from valve_friction_ros.reproduction.free_sweep import free_sweep
 
-__all__ = ["NOISE_LEVELS", "Level", "Rivals", "Scatter", "measure_scatter", "true_rms"]
+__all__ = ["NOISE_LEVELS", "Level", "Rivals", "Scatter", "measure_scatter"]
 
 NOISE_LEVELS = (
     SensorNoise(0.3e-6, 1.0),
@@ -80,14 +80,6 @@ class Scatter:
         return next(one for one in self.rivals if one[:2] == (packing, excitation))
 
 
-def true_rms(bench: Bench, experiment: Experiment, model: KarnoppParameters) -> float:
-    """Return the rms distance of a model's stem from the true one, m, without sensor noise."""
-    clean = experiment.clean
-    start = StemState(float(clean.position[0]))
-    stem = simulate(bench.valve, model, clean.pressure, clean.sample_period, start)
-    return float(np.sqrt(np.mean((stem.position - clean.position) ** 2)))
-
-
 def _seeded(bench: Bench, noise: SensorNoise, number: int) -> Bench:
     """Return the bench with other random numbers than its own experiments."""
     return bench.with_noise(replace(noise, seed=bench.noise.seed + _SEED_STEP * (number + 1)))
@@ -121,7 +113,7 @@ def _rivals(bench: Bench, plan: Plan, seeds: int) -> list[Rivals]:
         "sine": run(bench, SINE, plan.sine_periods * SINE.period),
         "ISA steps": run(bench, plan.isa, plan.isa.duration),
     }
-    errors: dict[str, list[tuple[float, float]]] = {name: [] for name in validations}
+    errors: dict[str, list[tuple[float, ...]]] = {name: [] for name in validations}
     for number in range(seeds):
         noisy = _seeded(bench, bench.noise, number)
         square = run(noisy, noisy.square, plan.square_periods * noisy.square.period, 0)
@@ -136,9 +128,9 @@ def _rivals(bench: Bench, plan: Plan, seeds: int) -> list[Rivals]:
         sweep = published_estimate(square.measured, noisy.valve, settings)
         for name, experiment in validations.items():
             errors[name].append(
-                (
-                    true_rms(bench, experiment, sweep.parameters()),
-                    true_rms(bench, experiment, model_of(balance)),
+                tuple(
+                    rms(stem_error(bench, experiment, model))
+                    for model in (sweep.parameters(), model_of(balance))
                 )
             )
     return [

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-from valve_friction_ros.identification import Parameter, StepMetrics
+from valve_friction_ros.identification import StepMetrics
 from valve_friction_ros.reports import Column, Table
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.checks.check import Check, written
@@ -74,17 +75,18 @@ def signature_table(results: Sequence[BenchResult]) -> Table:
     return Table(columns, tuple(rows), "(14) to (16); ± one standard error, between the strokes")
 
 
-def _interval(parameter: Parameter) -> str:
-    if math.isnan(parameter.value):
-        return parameter.verdict.value
-    if parameter.half_width == 0:
-        return f"{written(parameter.value)} ({parameter.verdict.value})"
-    return f"{written(parameter.value)} ± {written(parameter.half_width, 2)}"
+def _interval(parameter: Mapping[str, Any]) -> str:
+    value, width, verdict = (parameter[key] for key in ("value", "half_width", "verdict"))
+    if value is None:
+        return str(verdict)
+    return f"{written(value)} ± {written(width, 2)}" if width else f"{written(value)} ({verdict})"
 
 
 def parameter_table(result: BenchResult) -> Table:
     """Show Table 1 for one packing: paper, truth and the three estimates."""
     found, name = result.identified, result.bench.name
+    results = (found.force_balance, found.refined, found.own_preload)
+    shown = [one.to_dict()["parameters"] for one in results]
     rows = []
     for key, (symbol, unit) in NOTATION.items():
         published = found.published.values[key]
@@ -103,9 +105,7 @@ def parameter_table(result: BenchResult) -> Table:
                 ),
                 written(getattr(result.bench.truth, key)),
                 model_1,
-                _interval(found.force_balance.parameters[key]),
-                _interval(found.refined.parameters[key]),
-                _interval(found.own_preload.parameters[key]),
+                *(_interval(parameters[key]) for parameters in shown),
             )
         )
     titles = (
@@ -223,7 +223,7 @@ def step_summary_table(results: Sequence[BenchResult]) -> Table:
     """Show dead band and resolution of the ISA test, and the dead band that friction predicts."""
     rows = []
     for one in results:
-        expected = 2 * one.bench.truth.static_friction / one.bench.valve.diaphragm_area
+        expected = 2 * one.bench.truth.static_friction / one.bench.valve.force_per_drive
         band, resolution = one.steps.dead_band, one.steps.resolution
         rows.append(
             (

@@ -12,7 +12,7 @@ from valve_friction_ros.signals.smoothing import (
     smooth_between,
 )
 
-__all__ = ["ConditionedRecord", "condition", "smoothed_pressure"]
+__all__ = ["ConditionedRecord", "condition", "smoothed_drive"]
 
 _SAMPLES_A_WINDOW = 32
 """Samples of the thinned record in a smoothing window. Chosen: a cubic needs far fewer, so nothing
@@ -62,8 +62,8 @@ def condition(recording: Recording) -> ConditionedRecord:
     at most, is the new sample period. A noiseless record passes unchanged.
     """
     record = measured(recording)
-    pressure, period = record.pressure, record.sample_period
-    corners, window = record.pressure_smoothing
+    pressure, period = record.drive, record.sample_period
+    corners, window = record.drive_smoothing
     stride = max(min(window // _SAMPLES_A_WINDOW, int(_LONGEST_PERIOD / period)), 1)
     if window == 1:
         whole = pressure[::stride]
@@ -84,12 +84,12 @@ def condition(recording: Recording) -> ConditionedRecord:
     )
 
 
-def smoothed_pressure(recording: Recording) -> NDArray[np.float64]:
-    """Smooth the pressure between its corners as far as its noise requires, Pa, shape (n,)."""
-    corners, window = measured(recording).pressure_smoothing
+def smoothed_drive(recording: Recording) -> NDArray[np.float64]:
+    """Smooth the drive between its corners as far as its noise requires, shape (n,)."""
+    corners, window = measured(recording).drive_smoothing
     if window == 1:
-        return recording.pressure
-    return smooth_between(recording.pressure, corners, window)
+        return recording.drive
+    return smooth_between(recording.drive, corners, window)
 
 
 def _averaged(signal: NDArray[np.float64], stride: int) -> tuple[NDArray[np.float64], float]:

@@ -12,7 +12,7 @@ from valve_friction_ros.signals.derivatives import Derivatives, differentiate
 from valve_friction_ros.signals.noise import position_noise, quantisation_step
 from valve_friction_ros.signals.smoothing import find_corners, longest_faithful_window
 
-__all__ = ["MeasuredRecord", "PressureSmoothing", "measured"]
+__all__ = ["DriveSmoothing", "MeasuredRecord", "measured"]
 
 _CORNER_TIME = 0.04
 _CORNER_SAMPLES = 8
@@ -22,7 +22,7 @@ Chosen: short against the 1.3 s lag of the bench's converter; a slope over 8 sam
 the noise per sample. An absolute time."""
 
 _LONGEST_SMOOTHING = 0.5
-"""Longest smoothing window of the pressure, s. Chosen: it bounds the time of the search.
+"""Longest smoothing window of the drive, s. Chosen: it bounds the time of the search.
 
 `longest_faithful_window` decides before that where the signal bends. An absolute time."""
 
@@ -32,15 +32,15 @@ _LONGEST_DERIVATIVE_WINDOW = 1.0
 _NO_CORNERS = np.empty(0, dtype=np.intp)
 
 
-class PressureSmoothing(NamedTuple):
-    """Smoothing of the pressure, as far as its noise requires.
+class DriveSmoothing(NamedTuple):
+    """Smoothing of the drive, as far as its noise requires.
 
     Attributes
     ----------
     corners : ndarray of int
-        Samples at which the slope of the pressure jumps; it is smoothed between them.
+        Samples at which the slope of the drive jumps; it is smoothed between them.
     window : int
-        Window to smooth over, samples; 1 for a noiseless pressure.
+        Window to smooth over, samples; 1 for a noiseless drive.
     """
 
     corners: NDArray[np.intp]
@@ -64,20 +64,20 @@ class MeasuredRecord(Recording):
         return math.hypot(self.white_noise, quantisation_step(self.position) / math.sqrt(12.0))
 
     @cached_property
-    def pressure_noise(self) -> float:
-        """Standard deviation of the noise of the pressure, Pa, rounding included."""
-        white = position_noise(self.pressure)
-        return math.hypot(white, quantisation_step(self.pressure) / math.sqrt(12.0))
+    def drive_noise(self) -> float:
+        """Standard deviation of the noise of the drive, Pa or N, rounding included."""
+        white = position_noise(self.drive)
+        return math.hypot(white, quantisation_step(self.drive) / math.sqrt(12.0))
 
     @cached_property
-    def pressure_smoothing(self) -> PressureSmoothing:
-        """Corners of the pressure, and the window to smooth it over between them."""
+    def drive_smoothing(self) -> DriveSmoothing:
+        """Corners of the drive, and the window to smooth it over between them."""
         period = self.sample_period
         reach = max(round(_CORNER_TIME / period), _CORNER_SAMPLES)
-        corners = find_corners(self.pressure, self.pressure_noise, reach)
+        corners = find_corners(self.drive, self.drive_noise, reach)
         longest = max(round(_LONGEST_SMOOTHING / period), 1)
-        window = longest_faithful_window(self.pressure, corners, self.pressure_noise, longest)
-        return PressureSmoothing(corners, window)
+        window = longest_faithful_window(self.drive, corners, self.drive_noise, longest)
+        return DriveSmoothing(corners, window)
 
     @cached_property
     def _faithful_window(self) -> int:
@@ -116,5 +116,9 @@ def measured(recording: Recording) -> MeasuredRecord:
     if isinstance(recording, MeasuredRecord):
         return recording
     return MeasuredRecord(
-        recording.sample_period, recording.pressure, recording.position, recording.start_time
+        recording.sample_period,
+        recording.drive,
+        recording.position,
+        recording.start_time,
+        driven_by=recording.driven_by,
     )

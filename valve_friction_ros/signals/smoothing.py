@@ -176,28 +176,14 @@ def _local_cubics(stretch: NDArray[np.float64], window: int) -> NDArray[np.float
 def longest_faithful_window(
     signal: NDArray[np.float64], corners: NDArray[np.intp], noise: float, longest: int
 ) -> int:
-    """Find the longest smoothing window that removes only noise from the signal.
+    """Find the longest smoothing window that removes only noise: odd, `longest` at most.
 
     The residual of a smoother on white noise, averaged over blocks of a quarter window, has a
     variance that follows from the weights. A smoother that removes signal leaves a larger variance
     of the block averages. Windows that grow by half are tried, the longest first and then by
-    bisection: a window within a faithful one is faithful too.
-
-    Parameters
-    ----------
-    signal : ndarray of float, shape (n,)
-        The signal.
-    corners : ndarray of int
-        Where its slope jumps (`find_corners`).
-    noise : float
-        Standard deviation of its white noise.
-    longest : int
-        Longest window to try, samples.
-
-    Returns
-    -------
-    int
-        Odd; 1 for a noiseless signal.
+    bisection: a window within a faithful one is faithful too. `corners` are the samples where the
+    slope jumps (`find_corners`), `noise` is the standard deviation of the white noise; without
+    noise the window is 1.
     """
     if noise == 0:
         return 1

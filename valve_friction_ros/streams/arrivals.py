@@ -56,26 +56,14 @@ class Arrivals(NamedTuple):
 
 
 def rows_arrived(table: ArrayLike, labels: Sequence[str] = COLUMNS) -> Arrivals:
-    """Take a table of samples apart.
+    """Split a table into samples of both signals: of each row the pressure, then the position.
 
-    Parameters
-    ----------
-    table : array_like of float, shape (n, 3)
-        One row per sample. Its time is rounded to the finest decimal that floats of this size
-        resolve: nanoseconds below 97 days, microseconds for seconds since 1970. So a time of whole
-        microseconds comes back exactly.
-    labels : sequence of str
-        Names of the columns: those of `COLUMNS`, in their order.
+    The table has the shape (n, 3), one row per sample, and its `labels` are `COLUMNS`. A time is
+    rounded to the finest decimal that floats of this size resolve: nanoseconds below 97 days,
+    microseconds for seconds since 1970. So a time of whole microseconds comes back exactly.
 
-    Returns
-    -------
-    Arrivals
-        Of each row the pressure, then the position.
-
-    Raises
-    ------
-    ValueError
-        If the table has another shape or other columns, or a time does not fit a 64-bit clock.
+    Raises ValueError if the table has another shape or other columns, or a time does not fit a
+    64-bit clock.
     """
     if tuple(labels) != COLUMNS:
         raise ValueError(f"the columns are {','.join(labels)!r}, not {','.join(COLUMNS)!r}")

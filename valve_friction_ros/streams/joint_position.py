@@ -22,16 +22,9 @@ def joint_index(names: Sequence[str], positions: int, joint: str) -> int | None:
 
 
 def joint_position(names: Sequence[str], positions: Sequence[float], joint: str) -> float | None:
-    """Position of `joint`, of the first joint for an empty name; None if it is missing.
+    """Position (m) of `joint`, of the first joint for an empty name; None if it is missing.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the joints; a message may leave them out.
-    positions : sequence of float
-        Their positions, m.
-    joint : str
-        Name of the stem's joint.
+    A message may leave out the names of its joints.
     """
     index = joint_index(names, len(positions), joint)
     return None if index is None else positions[index]
@@ -40,10 +33,7 @@ def joint_position(names: Sequence[str], positions: Sequence[float], joint: str)
 def only_joint(names: Sequence[str]) -> str:
     """Choose the stem's joint among `names`: the only joint, or the joint of the default name.
 
-    Raises
-    ------
-    ValueError
-        If there are several joints without the default name.
+    Raises ValueError if there are several joints without the default name.
     """
     if len(names) <= 1:
         return "".join(names)

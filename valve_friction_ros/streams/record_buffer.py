@@ -55,10 +55,8 @@ class Snapshot(NamedTuple):
     def recording(self) -> Recording:
         """Put both signals on one time grid.
 
-        Raises
-        ------
-        RefusalError
-            If samples were rejected within the window, or the signals do not make a record.
+        Raises RefusalError if samples were rejected within the window, or the signals do not make a
+        record.
         """
         if self.rejections:
             raise RefusalError(
@@ -78,17 +76,10 @@ def _are_good(last_stamp: int | None, samples: Samples) -> bool:
 
 
 class RecordBuffer:
-    """The last seconds of pressure and stem position of one valve.
+    """The last `window` seconds of pressure and stem position of one valve.
 
-    An impossible sample is rejected and kept with its cause. A stamp that goes back means that the
-    clock has jumped, and clears the buffer.
-
-    Parameters
-    ----------
-    valve : Valve
-        Gives the range of the pressure sensor.
-    window : float
-        Time to keep, s.
+    An impossible sample, such as a pressure outside the sensor's range, is rejected and kept with
+    its cause. A stamp that goes back means that the clock has jumped, and clears the buffer.
     """
 
     def __init__(self, valve: Valve, window: float) -> None:

@@ -20,15 +20,7 @@ def nanoseconds(seconds: float) -> int:
 
 
 class Samples(NamedTuple):
-    """Part of a stamped signal.
-
-    Attributes
-    ----------
-    stamps : ndarray of int64, shape (n,)
-        Times, ns, increasing.
-    values : ndarray of float, shape (n,)
-        Values at those times, SI units.
-    """
+    """Part of a stamped signal: times, ns, increasing, and values, SI units, shape (n,) each."""
 
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]
@@ -58,15 +50,10 @@ class _Chunk(NamedTuple):
 
 
 class SampleBuffer:
-    """The last seconds of one signal, in bounded memory.
+    """The last `window` seconds of one signal, in bounded memory.
 
     A sample takes 12 bytes, or 16 where 1024 samples last longer than the 4.29 s that 32 bits of
     nanoseconds hold; at most 1024 samples older than the window are still in memory.
-
-    Parameters
-    ----------
-    window : float
-        Time to keep, s.
     """
 
     def __init__(self, window: float) -> None:

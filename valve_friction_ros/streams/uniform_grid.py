@@ -3,6 +3,7 @@
 import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.streams.samples import Samples
@@ -21,26 +22,7 @@ Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, bel
 
 
 class GapError(RefusalError):
-    """A signal has a gap.
-
-    Parameters
-    ----------
-    name : str
-        Name of the signal in the message.
-    samples : Samples
-        The signal.
-    sample : int
-        Number of the first sample after the gap.
-
-    Attributes
-    ----------
-    sample : int
-        As above.
-    seconds : float
-        Length of the gap, s.
-    what : str
-        The refusal without its remedy.
-    """
+    """A gap of `seconds` before a `sample`; `what` is the refusal without its remedy."""
 
     def __init__(self, name: str, samples: Samples, sample: int) -> None:
         self.sample = sample
@@ -69,25 +51,28 @@ def _checked(name: str, samples: Samples) -> int:
 
 
 def uniform_recording(
-    pressure: Samples,
+    drive: Samples,
     position: Samples,
     names: tuple[str, str] = ("actuator_pressure", "stem_state"),
+    driven_by: Drive = Drive.PRESSURE,
 ) -> Recording:
-    """Put pressure and stem position on the time grid of the stem position.
+    """Put drive and stem position on the time grid of the stem position.
 
     The grid starts at the first position inside the time that both signals cover and runs at
     the median period of the positions; both signals are interpolated linearly. Where
     the positions are uniform already, their values stay unchanged to the last bit, and so do those
-    of the pressure where it shares their stamps.
+    of the drive where it shares their stamps.
 
     Parameters
     ----------
-    pressure : Samples
-        Actuator pressure, Pa.
+    drive : Samples
+        Actuator pressure, Pa, or force, N.
     position : Samples
         Stem position, m.
     names : tuple of str
         Names of the two signals in a refusal.
+    driven_by : Drive
+        What `drive` is.
 
     Returns
     -------
@@ -101,13 +86,13 @@ def uniform_recording(
         If a signal is empty or has a gap of more than ten of its periods (a `GapError`), or the
         two do not overlap in time.
     """
-    _checked(names[0], pressure)
+    _checked(names[0], drive)
     period = _checked(names[1], position)
-    begin = max(pressure.stamps[0], position.stamps[0])
-    end = min(pressure.stamps[-1], position.stamps[-1])
+    begin = max(drive.stamps[0], position.stamps[0])
+    end = min(drive.stamps[-1], position.stamps[-1])
     inside = position.stamps[(position.stamps >= begin) & (position.stamps <= end)]
     if inside.size < 2:
-        apart = (position.stamps[0] - pressure.stamps[0]) / 1e9
+        apart = (position.stamps[0] - drive.stamps[0]) / 1e9
         raise RefusalError(
             f"{names[0]} and {names[1]} do not overlap in time ({names[1]} begins {apart:.3g} s "
             "later): check that their clocks agree and that both are recorded"
@@ -116,33 +101,33 @@ def uniform_recording(
     grid = np.arange(0, inside[-1] - origin + 1, period, dtype=np.float64)
     on_grid = [
         np.interp(grid, (signal.stamps - origin).astype(np.float64), signal.values)
-        for signal in (pressure, position)
+        for signal in (drive, position)
     ]
     return Recording(
         period / 1e9,
         on_grid[0],
         on_grid[1],
         start_time=float(origin) / 1e9,
-        stamped=_at_own_stamps(pressure, position, int(origin), period),
+        stamped=_at_own_stamps(drive, position, int(origin), period, driven_by),
+        driven_by=driven_by,
     )
 
 
 def _at_own_stamps(
-    pressure: Samples, position: Samples, origin: int, period: int
+    drive: Samples, position: Samples, origin: int, period: int, driven_by: Drive
 ) -> StampedRecord | None:
     """Return both signals at their own stamps; None where these are the grid, or too few."""
-    signals = pressure, position
+    signals = drive, position
     if min(samples.stamps.size for samples in signals) < StampedSignal.FEWEST:
         return None
-    same_size = pressure.stamps.size == position.stamps.size
+    same_size = drive.stamps.size == position.stamps.size
     if same_size and all(_is_on_grid(samples, origin, period) for samples in signals):
         return None
-    return StampedRecord(
-        *(
-            StampedSignal((samples.stamps - origin).astype(np.float64) / 1e9, samples.values)
-            for samples in signals
-        )
+    own = (
+        StampedSignal((samples.stamps - origin).astype(np.float64) / 1e9, samples.values)
+        for samples in signals
     )
+    return StampedRecord(next(own), next(own), driven_by)
 
 
 def _is_on_grid(samples: Samples, origin: int, period: int) -> bool:

@@ -65,7 +65,7 @@ def test_points_are_where_static_friction_gives_way(signature):
     assert (len(found.upward_points), len(found.downward_points)) == (3, 2)
     for side, points in ((1, found.upward_points), (-1, found.downward_points)):
         for point in points:
-            assert point.force == plant.valve.actuator_force(np.array([point.pressure]))[0]
+            assert point.force == plant.valve.actuator_force(np.array([point.drive]))[0]
             pull = point.force - truth.spring_constant * point.position - truth.spring_preload
             assert side * pull == pytest.approx(truth.static_friction, rel=0.03)
 

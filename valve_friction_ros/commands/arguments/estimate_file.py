@@ -22,17 +22,9 @@ def _value(path: Path, name: str, entry: Any) -> float:
 
 
 def read_estimate(path: Path) -> dict[str, float]:
-    """Read the assessed values from the JSON of `valve_friction identify`.
+    """Read the values by name from the JSON of `valve_friction identify`; nan: not identifiable.
 
-    Returns
-    -------
-    dict of str to float
-        By name; nan where a parameter is not identifiable.
-
-    Raises
-    ------
-    ValueError
-        In one line: the file, and what it lacks.
+    Raises ValueError, one line with the file and what it lacks.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

@@ -40,6 +40,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--derivative-window",
         type=int,
+        metavar="SAMPLES",
         help=f"derivative window d, samples; by default {defaults.published_window} for the "
         "published method, and chosen by the noise of the record for the others",
     )
@@ -51,7 +52,11 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         f"by default {TIMING_UNCERTAINTY:g}",
     )
     parser.add_argument(
-        "--order", type=int, default=defaults.order, help="polynomial order n (%(default)s)"
+        "--order",
+        type=int,
+        default=defaults.order,
+        metavar="N",
+        help="polynomial order n (%(default)s)",
     )
 
 
@@ -81,10 +86,7 @@ def identification_settings(
 ) -> IdentificationSettings:
     """Build the settings from the parsed arguments, and from what the valve file names.
 
-    Raises
-    ------
-    ValueError
-        If they do not go together.
+    Raises ValueError if they do not go together.
     """
     defaults = IdentificationSettings()
     return IdentificationSettings(

@@ -33,15 +33,7 @@ class BenchError(Exception):
 
 
 class BenchClient(Node):
-    """Gathers what the bench publishes, as any third node would.
-
-    Parameters
-    ----------
-    namespace : str
-        Namespace of the valve.
-    buffer : RecordBuffer
-        Takes pressure and stem position.
-    """
+    """Gathers in `buffer` what the bench in `namespace` publishes, as any third node would."""
 
     def __init__(self, namespace: str, buffer: RecordBuffer) -> None:
         super().__init__("demo", namespace=namespace)

@@ -49,7 +49,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "packing while it runs, and identify again."
     )
     parser.epilog = (
-        "Exit code 0: all within tolerance and the excess friction was diagnosed; 1: not so; "
+        "Exit code 0: all numbers are within tolerance, and the excess friction was diagnosed; 1: "
+        "not so; "
         "2: the bench did not run, or the picture could not be written."
     )
     parser.add_argument(
@@ -122,12 +123,12 @@ def _run(client: BenchClient, console: Console) -> _Story:
 
 
 def _report(story: _Story, output: Path, console: Console) -> int:
-    """Print and draw what was seen, and judge it; return the exit code."""
+    """Print and draw what was seen, compare it with the tolerances; return the exit code."""
     for outcome in story.outcomes:
         console.print(table_of(outcome))
     level = "without a level" if story.level is None else Level(story.level).name
-    verdict = f"/diagnostics {level}: {story.message}"
-    console.print(verdict, style="bold", highlight=False, markup=False)
+    diagnosis = f"/diagnostics {level}: {story.message}"
+    console.print(diagnosis, style="bold", highlight=False, markup=False)
     missed = [
         f"{name} ({outcome.label})" for outcome in story.outcomes for name in outcome.missed()
     ]
@@ -135,7 +136,7 @@ def _report(story: _Story, output: Path, console: Console) -> int:
         console.print(f"outside the tolerance: {', '.join(missed)}", style="bold red")
     if story.level != Level.ERROR:
         console.print("the excess friction was not diagnosed", style="bold red")
-    save_picture(friction_figure([outcome.case for outcome in story.outcomes], verdict), output)
+    save_picture(friction_figure([outcome.case for outcome in story.outcomes], diagnosis), output)
     console.print(f"picture: {output}", highlight=False, markup=False, soft_wrap=True)
     return ExitCode.PARTLY if missed or story.level != Level.ERROR else ExitCode.DONE
 

@@ -1,6 +1,5 @@
 """One identified state of the packing, as the topics of the identifier tell it."""
 
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -8,7 +7,15 @@ from rich.table import Table
 
 from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
 from valve_friction_ros.figures import Case
-from valve_friction_ros.identification import UNITS, Parameter, Verdict, two_digits
+from valve_friction_ros.identification import (
+    UNITS,
+    Drawing,
+    Parameter,
+    Verdict,
+    parameter_cells,
+    parameter_mapping,
+    sweep_panels,
+)
 from valve_friction_ros.model import KarnoppParameters
 
 __all__ = ["TOLERANCES", "Outcome", "identified", "table_of"]
@@ -71,16 +78,14 @@ def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Out
     sweep = client.sweep_columns()
     published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in TOLERANCES}
     refined = {name: _refined(name, values) for name in TOLERANCES}
-    case = Case(
-        label,
-        recording,
+    panels = sweep_panels(
         sweep["threshold"],
         sweep["coulomb_friction"],
         sweep["sigma"],
         float(values["threshold [m/s]"]),
         refined["coulomb_friction"],
     )
-    return Outcome(label, truth, published, refined, case)
+    return Outcome(label, truth, published, refined, Case(label, recording, Drawing(panels)))
 
 
 def _refined(name: str, values: Mapping[str, str]) -> Parameter:
@@ -105,17 +110,18 @@ def table_of(outcome: Outcome) -> Table:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     for name, error in outcome.errors().items():
-        refined = outcome.refined[name]
-        told = not math.isnan(refined.value)
+        _, value, width, unit, verdict, _ = parameter_cells(
+            name, parameter_mapping(outcome.refined[name])
+        )
         table.add_row(
             name,
-            UNITS[name],
+            unit,
             f"{getattr(outcome.truth, name):.6g}",
             f"{outcome.published[name]:.6g}",
             f"{100 * error:+.3f} %",
-            f"{refined.value:.6g}" if told else "–",
-            two_digits(refined.half_width) if refined.half_width > 0 else "",
-            refined.verdict.value,
+            value,
+            width,
+            verdict,
             style="red" if name in outcome.missed() else None,
         )
     return table

@@ -17,16 +17,9 @@ _VALVE_FILE = "valve.yaml"
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be done with a recording.
+    """What is to be done with a recording: the job, or why it cannot be done.
 
-    Attributes
-    ----------
-    name : str
-        Its name.
-    content, settings : str
-        Fingerprints of its files and of its options.
-    job : Job or str
-        How it is identified, or why it cannot be.
+    `content` and `settings` are fingerprints of its files and of its options.
     """
 
     name: str
@@ -76,27 +69,11 @@ def _is_current(entry: Entry, plan: Plan) -> bool:
 def forget_stale(
     results: ResultsFile, plans: Mapping[str, Plan], options: argparse.Namespace
 ) -> tuple[list[Plan], int]:
-    """Drop the rows that do not hold any more, and return what is left to do.
+    """Drop the rows that do not hold any more; return what is left, and how many were dropped.
 
-    Parameters
-    ----------
-    results : ResultsFile
-        The rows of former runs.
-    plans : mapping of str to Plan
-        The recordings by name.
-    options : argparse.Namespace
-        Tells by ``redo`` whether good rows of other options may go, and by ``retry_failed``
-        whether refused ones are tried again.
-
-    Returns
-    -------
-    tuple of list of Plan, int
-        What is left to do, and of how many recordings rows were dropped.
-
-    Raises
-    ------
-    ValueError
-        If good rows were made with other options, and may not go.
+    With ``redo`` good rows of other options may go; with ``retry_failed`` refused recordings are
+    tried again. Raises ValueError if good rows were made with other
+    options and may not go.
     """
     done, others = set(), 0
     for entry in results.entries():

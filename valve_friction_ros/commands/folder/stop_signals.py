@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a wish that is looked at where it suits."""
+"""Ctrl-C and SIGTERM, noted until the command can stop."""
 
 import signal
 from types import FrameType, TracebackType
@@ -18,7 +18,7 @@ class StopSignals:
         self.received = number
 
     def wanted(self) -> bool:
-        """Tell whether one has come."""
+        """Return whether one of them has come."""
         return self.received is not None
 
     @property
@@ -37,6 +37,6 @@ class StopSignals:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Do again what was done before."""
+        """Restore the former handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)

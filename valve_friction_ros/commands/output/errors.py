@@ -71,14 +71,9 @@ def _text(error: Exception | str) -> str:
 
 
 def complain(command: str, error: Exception | str) -> None:
-    """Print an error on one line of stderr.
+    """Print an error on one line of stderr; an OSError is reduced to the file and the cause.
 
-    Parameters
-    ----------
-    command : str
-        The sub-command, or an empty string.
-    error : Exception or str
-        The error; an OSError is reduced to the file and the cause.
+    `command` is the sub-command, or an empty string.
     """
     speaker = " ".join(filter(None, (PROGRAM, command)))
     try:

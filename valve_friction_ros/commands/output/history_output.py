@@ -2,8 +2,6 @@
 
 import csv
 import io
-import json
-import math
 import re
 from collections.abc import Sequence
 from datetime import datetime, timezone
@@ -15,17 +13,14 @@ from rich.table import Table
 from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
 from valve_friction_ros.identification import (
-    Parameter,
+    parameter_cells,
     parameter_columns,
     parameter_mapping,
-    plain,
     two_digits,
 )
 from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["as_json", "print_table", "write_csv"]
-
-_LEVELS = ("OK", "WARN", "ERROR")
 
 
 def time_text(time: float, timespec: str = "milliseconds") -> str:
@@ -64,38 +59,12 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     return told
 
 
-def _stored(parameter: Parameter) -> dict[str, Any]:
-    """Return what a history keeps of a parameter: its published value is not stored."""
-    shown = parameter_mapping(parameter)
-    del shown["published"]
+def _shown(entry: HistoryEntry) -> dict[str, Any]:
+    """Return an entry as a mapping, with its times as text."""
+    shown = entry.to_dict()
+    for name in ("time", "begin", "end"):
+        shown[name] = None if shown[name] is None else time_text(shown[name])
     return shown
-
-
-def _entry_as_json(entry: HistoryEntry) -> Any:
-    ratio, baseline = entry.diagnosis.ratio, entry.baseline
-    return plain(
-        {
-            "time": time_text(entry.time),
-            "begin": None if entry.span is None else time_text(entry.span.begin),
-            "end": None if entry.span is None else time_text(entry.span.end),
-            "method": entry.method,
-            "parameters": {name: _stored(one) for name, one in entry.parameters.items()},
-            "fit": entry.fit.share,
-            "rms": entry.fit.rms,
-            "systematic_misfit": entry.fit.systematic,
-            "warnings": list(entry.warnings),
-            "level": int(entry.diagnosis.level),
-            "status_signal": entry.diagnosis.status_signal.value,
-            "message": entry.diagnosis.message,
-            "ratio": None if ratio is None else list(ratio),
-            "baseline": None if baseline is None else baseline.coulomb_friction,
-            "baseline_half_width": None if baseline is None else baseline.half_width,
-            "limits": vars(entry.limits),
-            "refusal": entry.refusal,
-            "settings": json.loads(entry.settings),
-            "software_version": entry.version,
-        }
-    )
 
 
 def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
@@ -106,41 +75,34 @@ def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
                 "name": history.valve.name,
                 "tag": history.valve.tag,
                 "trend": _trend_as_json(history.trend),
-                "entries": [_entry_as_json(entry) for entry in history.entries],
+                "entries": [_shown(entry) for entry in history.entries],
             }
             for history in histories
         ]
     }
 
 
-def _parameter_cells(entry: HistoryEntry) -> dict[str, object]:
-    cells: dict[str, object] = {}
-    for name, one in entry.parameters.items():
-        cells |= parameter_columns(name, parameter_mapping(one))
-    return cells
-
-
 def _row(entry: HistoryEntry) -> dict[str, object]:
-    span, ratio, baseline = entry.span, entry.diagnosis.ratio, entry.baseline
-    return {
-        "time": time_text(entry.time),
+    shown = _shown(entry)
+    diagnosis = shown["diagnosis"]
+    low, high = diagnosis["ratio_interval"] or (None, None)
+    row = {
+        "time": shown["time"],
         "valve": entry.valve.name,
         "tag": entry.valve.tag,
-        "begin": None if span is None else time_text(span.begin),
-        "end": None if span is None else time_text(span.end),
-        "method": entry.method,
-        "level": _LEVELS[entry.diagnosis.level],
-        "refusal": entry.refusal,
-        "ratio": None if ratio is None else ratio.value,
-        "ratio_low": None if ratio is None else ratio.low,
-        "ratio_high": None if ratio is None else ratio.high,
-        "baseline_n": None if baseline is None else baseline.coulomb_friction,
-        "fit": entry.fit.share,
-        "rms_m": entry.fit.rms,
-        **_parameter_cells(entry),
-        "message": entry.diagnosis.message,
-        "software_version": entry.version,
+        **{name: shown[name] for name in ("begin", "end", "method")},
+        "level": diagnosis["level"],
+        "refusal": shown["refusal"],
+        "ratio": diagnosis["ratio"],
+        "ratio_low": low,
+        "ratio_high": high,
+        "baseline_n": shown["baseline"],
+        "fit": shown["fit"],
+        "rms_m": shown["rms"],
     }
+    for name, parameter in shown["parameters"].items():
+        row |= parameter_columns(name, parameter)
+    return row | {"message": diagnosis["message"], "software_version": shown["software_version"]}
 
 
 def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
@@ -154,7 +116,7 @@ def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     entries = sorted(
         (entry for history in histories for entry in history.entries), key=lambda one: one.time
     )
-    rows = [plain(_row(entry)) for entry in entries]
+    rows = [_row(entry) for entry in entries]
     widest = max(rows, key=len)
     header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
     text = io.StringIO()
@@ -193,14 +155,14 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             table.columns[column].no_wrap = True
         for entry in history.entries:
             one, ratio = entry.friction, entry.diagnosis.ratio
-            is_known = one is not None and math.isfinite(one.value)
+            cells: tuple[str, ...] = ("", "–", "", "", "refused")
+            if one is not None:
+                cells = parameter_cells(one.name, parameter_mapping(one))
             table.add_row(
                 time_text(entry.time, "seconds")[:-1].replace("T", " "),
-                f"{one.value:.6g}" if one is not None and is_known else "–",
-                two_digits(one.half_width) if one is not None and one.half_width > 0 else "",
-                "refused" if one is None else one.verdict.value,
+                *(cells[place] for place in (1, 2, 4)),
                 "" if ratio is None or entry.refusal else f"{ratio.value:.2f}",
-                _LEVELS[entry.diagnosis.level],
+                entry.diagnosis.level.name,
                 _told(entry),
             )
         console.print(table)

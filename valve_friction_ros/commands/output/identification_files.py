@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from valve_friction_ros.commands.arguments.recording import DIRECT_DRIVE, require_one
+from valve_friction_ros.commands.arguments.recording import require_one
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import Result
 from valve_friction_ros.records.recorded_valve import RecordedValve
-from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["IdentificationFiles", "add_file_arguments", "baseline_from", "identification_files"]
 
@@ -21,13 +20,13 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         "--report",
         type=Path,
         metavar="FILE.html",
-        help="write a page for people: verdict, parameters, pictures, settings; one file",
+        help="write a page for people, one file: diagnosis, parameters, pictures, settings",
     )
     parser.add_argument(
         "--baseline-coulomb-friction",
         type=float,
         metavar="N",
-        help="F_c of this valve when it was healthy, to tell its excess friction",
+        help="F_c of this valve when it was healthy; its diagnosis compares with it",
     )
     parser.add_argument(
         "--baseline-half-width",
@@ -40,10 +39,7 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
 def baseline_from(options: argparse.Namespace) -> Baseline | None:
     """Build the baseline from the parsed arguments.
 
-    Raises
-    ------
-    ValueError
-        If it is impossible, or its interval is given without it.
+    Raises ValueError if it is impossible, or its interval is given without it.
     """
     friction, width = options.baseline_coulomb_friction, options.baseline_half_width
     if friction is None:
@@ -71,7 +67,6 @@ class IdentificationFiles(NamedTuple):
     def write(
         self,
         recorded: RecordedValve,
-        description: ValveFile,
         result: Result,
         baseline: Baseline | None,
     ) -> None:
@@ -81,9 +76,8 @@ class IdentificationFiles(NamedTuple):
 
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
-        drive = figures.FORCE if description is DIRECT_DRIVE else figures.PRESSURE
         if self.plot is not None:
-            figures.save_picture(figures.identification_figure(result, drive), self.plot)
+            figures.save_picture(figures.identification_figure(result), self.plot)
         if self.report is not None:
             from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
 
@@ -92,19 +86,15 @@ class IdentificationFiles(NamedTuple):
                 source=recorded.label,
                 result=result,
                 baseline=baseline,
-                drive=drive,
                 notes=recorded.notes,
             )
             reports.write_report(reports.identification_report(record), self.report)
 
 
 def identification_files(options: argparse.Namespace) -> IdentificationFiles:
-    """Return the files that were asked for, and refuse those that cannot be written.
+    """Return the files that were asked for.
 
-    Raises
-    ------
-    ValueError
-        One line that names the file and the cause.
+    Raises ValueError, which names the file and the cause, for a file that cannot be written.
     """
     if options.plot is not None:
         from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import

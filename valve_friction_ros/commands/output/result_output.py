@@ -4,20 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from valve_friction_ros.health import Diagnosis
-from valve_friction_ros.identification import Result, plain
+from valve_friction_ros.identification import Result
 
 __all__ = ["as_json", "print_table"]
-
-
-def _diagnosis_as_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    ratio = diagnosis.ratio
-    return {
-        "level": diagnosis.level.name,
-        "ne_107": diagnosis.status_signal.value,
-        "message": diagnosis.message,
-        "ratio": None if ratio is None else plain(ratio.value),
-        "ratio_interval": None if ratio is None else plain([ratio.low, ratio.high]),
-    }
 
 
 def as_json(
@@ -29,7 +18,7 @@ def as_json(
     """
     shown = result.to_dict()
     shown["warnings"] = [*notes, *shown["warnings"]]
-    return shown if diagnosis is None else shown | {"diagnosis": _diagnosis_as_json(diagnosis)}
+    return shown if diagnosis is None else shown | {"diagnosis": diagnosis.to_dict()}
 
 
 def print_table(
@@ -40,4 +29,4 @@ def print_table(
     for note in notes:
         print(f"note: {note}")
     if diagnosis is not None:
-        print(f"{diagnosis.level.name}: {diagnosis.message}")
+        print(diagnosis)

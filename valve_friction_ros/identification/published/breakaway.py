@@ -10,7 +10,7 @@ from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.signals.measured_record import measured
 from valve_friction_ros.signals.noise import velocity_noise
 
-__all__ = ["Breakaway", "find_breakaways"]
+__all__ = ["Breakaway", "find_breakaways", "runs_of"]
 
 _AT_REST = 4.0
 """A stem rests while its speed is below this many standard deviations of the velocity's noise.
@@ -42,10 +42,11 @@ class Breakaway(NamedTuple):
     direction: int
 
 
-def _runs(active: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def runs_of(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and one-past-last index of each run of True."""
     edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
 
 def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
@@ -101,15 +102,15 @@ def find_breakaways(recording: Recording, settings: IdentificationSettings) -> l
     speed = np.abs(derivatives.velocity)
     noise = velocity_noise(record.white_noise, record.sample_period, window, settings.order)
     moving = speed > max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
-    for begin, end in zip(*_runs(moving), strict=True):
+    for begin, end in runs_of(moving):
         # The filter spreads any true motion over a window: a shorter burst is noise.
         moving[begin:end] = end - begin >= window // 2
     still = ~moving
     found = []
-    for begin, end in zip(*_runs(still), strict=True):
+    for begin, end in runs_of(still):
         if end - begin < 2 * window or end == still.size:
             continue
-        first_moving = int(end) + derivatives.margin
+        first_moving = end + derivatives.margin
         rest = recording.position[begin + window : first_moving - window // 2]
         level, spread = float(np.median(rest)), float(np.std(rest))
         stretch = recording.position[first_moving - window : first_moving + 2 * window] - level

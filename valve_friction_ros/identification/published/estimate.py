@@ -1,11 +1,21 @@
 """The estimate: the parameters that the published method finds."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from valve_friction_ros.identification.drawing import Drawing
 from valve_friction_ros.identification.published.sweep import Sweep
+from valve_friction_ros.identification.published.sweep_drawing import (
+    SETTLED_SHARE,
+    chosen_region,
+    r_squared_panel,
+    sweep_panels,
+)
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.valve import Valve
 
 __all__ = ["Estimate", "possible_model"]
 
@@ -59,13 +69,38 @@ class Estimate:
         """The parameters by name, in the order of `UNITS`."""
         return {name: getattr(self, name) for name in UNITS}
 
+    def drawing(self, parameters: Mapping[str, Parameter], valve: Valve) -> Drawing:  # noqa: ARG002
+        """Return the sweep as figures and reports show it (`Exhibit`)."""
+        sweep, settings = self.sweep, self.settings
+        low, high = chosen_region(sweep, self.threshold)
+        panels = sweep_panels(
+            sweep.thresholds,
+            sweep.estimates["coulomb_friction"],
+            sweep.sigma,
+            self.threshold,
+            parameters["coulomb_friction"],
+        )
+        return Drawing(
+            (*panels, r_squared_panel(sweep, self.threshold)),
+            "Sweep of the velocity threshold δv",
+            f"The friction force balance, fitted to the samples faster than each threshold δv. "
+            f"Chosen: {self.threshold * 1e3:.3g} mm/s, with {self.samples} samples above it, σ_s "
+            f"{self.sigma:.4g} N and R² {self.r_squared:.5f}. Shaded: the region around it, "
+            f"{low * 1e3:.3g} to {high * 1e3:.3g} mm/s, where σ_s stays within "
+            f"{100 * SETTLED_SHARE:.0f} % of that.",
+            "Coulomb friction, standard deviation and correlation over the velocity threshold, "
+            "with the chosen threshold and the region around it marked.",
+            (low, high),
+            settings={
+                "of the published method": f"window {settings.published_window} samples, "
+                f"polynomial order {settings.order}, {settings.steps} thresholds"
+            },
+        )
+
     def parameters(self) -> KarnoppParameters:
         """Return the parameters as a model to simulate.
 
-        Raises
-        ------
-        ValueError
-            If an identified value is impossible; the message names it.
+        Raises ValueError if an identified value is impossible; the message names it.
         """
         return KarnoppParameters(**self.values)
 

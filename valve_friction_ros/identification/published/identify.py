@@ -16,6 +16,7 @@ from valve_friction_ros.identification.published.sweep import Sweep, sweep_thres
 from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (
+    require_drive,
     require_enough_samples,
     require_motion,
     require_two_directions,
@@ -150,8 +151,9 @@ def published_fit(
     require_enough_samples(record, settings.published_window)
     derivatives = record.derivatives(settings.published_window, settings.order)
     require_motion(record)
+    require_drive(record, valve)
     require_two_directions(record, settings.published_window)
-    force = valve.actuator_force(record.pressure)
+    force = valve.actuator_force(record.drive)
     regression = force_balance_regression(force, record.position, derivatives, settings)
     sweep, chosen = _sweep(regression, settings)
     if "mass" not in settings.fixed:

@@ -71,7 +71,7 @@ def identify_published(
         evidence=sweep_evidence(estimate),
         findings=(sweep_finding(estimate),),
         model=possible_model(estimate),
-        estimate=estimate,
+        exhibit=estimate,
     )
 
 

@@ -68,23 +68,10 @@ def force_balance_regression(
     derivatives: Derivatives,
     settings: IdentificationSettings,
 ) -> ForceBalanceRegression:
-    """Set up the regression (4) for the samples that have derivatives.
+    """Set up the regression (4) for the m = n − d + 1 samples that have derivatives.
 
-    Parameters
-    ----------
-    force : ndarray of float, shape (n,)
-        Actuator force F_ext, N.
-    position : ndarray of float, shape (n,)
-        Stem position, m.
-    derivatives : Derivatives
-        Velocity and acceleration.
-    settings : IdentificationSettings
-        Which parameters are fixed, and the position bias if it is known.
-
-    Returns
-    -------
-    ForceBalanceRegression
-        With m = n − d + 1 rows.
+    Force (N) and position (m) have the shape (n,). The settings name the fixed parameters, and the
+    position bias if it is known.
     """
     bias = settings.position_bias
     velocity = derivatives.velocity

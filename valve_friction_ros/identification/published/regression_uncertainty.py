@@ -18,18 +18,9 @@ __all__ = ["RegressionUncertainty", "regression_uncertainty"]
 
 
 class RegressionUncertainty(NamedTuple):
-    """Covariance of a regression, and how well it reproduces the force.
+    """Covariance of the regressed `names` over blocks of one stroke, and the strokes of the record.
 
-    Attributes
-    ----------
-    names : tuple of str
-        The regressed parameters, in the order of the covariance.
-    covariance : Covariance
-        From sums over blocks of one stroke.
-    fit : float
-        Share of the force that is reproduced, 1 − |residual| / |force − mean|.
-    strokes : int
-        Strokes of the record.
+    `fit` is the share of the force that is reproduced, 1 − |residual| / |force − mean|.
     """
 
     names: tuple[str, ...]

@@ -125,7 +125,7 @@ def identify_refined(
             f"{sweep_finding(estimate)}; refined from {window}",
         ),
         model=outcome.model,
-        estimate=estimate,
+        exhibit=estimate,
         stem=outcome.stem,
     )
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.coordinates import (
-    MAIN,
     Coordinates,
     physical,
     straight,
@@ -17,10 +16,9 @@ from valve_friction_ros.identification.robust.driven_stem import (
     LOW_SPEED,
     Course,
     Place,
+    drive_stem,
     read_stem,
-    run_stem,
 )
-
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.weights import reading_weights
@@ -113,7 +111,7 @@ class BroadModel:
         """Simulate the stem itself."""
         force = np.empty_like(self.record.force)
         position, velocity = np.empty_like(force), np.empty_like(force)
-        run_stem(self.course(self.record.force), Place(**at), force, position, velocity)
+        drive_stem(self.course(self.record.force), Place(**at), force, position, velocity)
         return Simulated(position, velocity)
 
     def readings(self, at: Coordinates) -> NDArray[np.float64]:

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled
-from valve_friction_ros.model.graded_run import run_graded_stem
 from valve_friction_ros.model.stem_motion import Dynamics
+from valve_friction_ros.model.stem_run import run_stem
 
-__all__ = ["LOW_SPEED", "Course", "Place", "read_stem", "run_stem"]
+__all__ = ["LOW_SPEED", "Course", "Place", "drive_stem", "read_stem"]
 
 LOW_SPEED = 3e-3
 """Speed, m/s, below which packings are known to hold faster: the v_s published for graphite."""
@@ -100,7 +100,7 @@ def _lag(signal: NDArray[np.float64], lag: float, period: float) -> None:
 
 
 @compiled
-def run_stem(
+def drive_stem(
     course: Course,
     at: Place,
     force: NDArray[np.float64],
@@ -136,26 +136,22 @@ def run_stem(
     falling = at.stribeck_velocity if at.slip_force > 0.0 else 0.0
     static = dry + at.slip_force
     spring, zone, travel = at.spring_constant, at.limit_velocity, course.travel
-    upward = Dynamics(
-        at.mass, viscous * (1.0 + side), dry, static, spring, zone, travel, falling
-    )
-    downward = Dynamics(
-        at.mass, viscous * (1.0 - side), dry, static, spring, zone, travel, falling
-    )
+    upward = Dynamics(at.mass, viscous * (1.0 + side), dry, static, spring, zone, travel, falling)
+    downward = Dynamics(at.mass, viscous * (1.0 - side), dry, static, spring, zone, travel, falling)
     positions[0] = at.start_position
     if travel < np.inf:
         positions[0] = min(max(at.start_position, 0.0), travel)
     velocities[0] = course.leaving[0]
-    run_graded_stem(
+    run_stem(
         force,
-        grip,
-        course.anew,
-        course.leaving,
         course.period,
         upward,
         downward,
         positions,
         velocities,
+        grip,
+        course.anew,
+        course.leaving,
     )
 
 
@@ -170,7 +166,7 @@ def read_stem(
     """
     force = np.empty_like(course.force)
     positions, velocities = np.empty_like(force), np.empty_like(force)
-    run_stem(course, at, force, positions, velocities)
+    drive_stem(course, at, force, positions, velocities)
     if at.presliding != 0.0:
         full = at.coulomb_friction + at.slip_force + 1e-9
         for step in range(force.size):
@@ -187,6 +183,5 @@ def read_stem(
         place = cells[cell] - shift
         step = min(max(int(math.floor(place)), 0), last)
         share = place - step
-        if share > 1.0:
-            share = 1.0
+        share = min(share, 1.0)
         readings[cell] = positions[step] + share * (positions[step + 1] - positions[step])

@@ -279,8 +279,8 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     RefusalError
         If the signals have too little time in common.
     """
-    begin = max(record.pressure.time[0], record.position.time[0])
-    end = min(record.pressure.time[-1], record.position.time[-1])
+    begin = max(record.drive.time[0], record.position.time[0])
+    end = min(record.drive.time[-1], record.position.time[-1])
     inside = (record.position.time >= begin) & (record.position.time <= end)
     if np.count_nonzero(inside) < _FEWEST:
         raise RefusalError(
@@ -288,7 +288,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
             f"the record is too short; at least {_FEWEST} are needed"
         )
     stem = StampedSignal(record.position.time[inside] - begin, record.position.value[inside])
-    drive = StampedSignal(record.pressure.time - begin, record.pressure.value)
+    drive = StampedSignal(record.drive.time - begin, record.drive.value)
     finest = min(stem.period, drive.period)
     grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
     pressure = _smoothed(drive, grid)
@@ -323,7 +323,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
         np.asarray(time, dtype=np.float64),
         count.astype(np.float64),
         stem_noise,
-        np.interp(time, grid, pressure.variance) * valve.diaphragm_area**2,
+        np.interp(time, grid, pressure.variance) * valve.force_per_drive**2,
         max(pressure.window * finest / (_MEMORY * period), 1.0),
         _slow_view(grid, np.interp(grid, time, position), force, period),
         valve.travel,

@@ -13,6 +13,7 @@ from valve_friction_ros.identification.robust.sentences import found_imperfectio
 from valve_friction_ros.identification.robust.verdicts import fit_misfit, fit_verdicts
 from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (
+    require_drive,
     require_enough_samples,
     require_motion,
     require_related_signals,
@@ -126,6 +127,7 @@ def _require_record(recording: Recording, valve: Valve, settings: Identification
     record = measured(recording)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
+    require_drive(record, valve)
     require_two_directions(record, settings.published_window)
     require_travel(record, valve)
     require_stem_between_stops(record, valve)
@@ -138,7 +140,9 @@ def _stamped(recording: Recording) -> StampedRecord:
         return recording.stamped
     time = recording.time
     return StampedRecord(
-        StampedSignal(time, recording.pressure), StampedSignal(time, recording.position)
+        StampedSignal(time, recording.drive),
+        StampedSignal(time, recording.position),
+        recording.driven_by,
     )
 
 

@@ -64,13 +64,13 @@ def _value_remarks(name: str, signal: StampedSignal) -> list[str]:
 
 def sampling_remarks(record: StampedRecord) -> tuple[str, ...]:
     """Return a sentence for each way in which the samples are not what a good sensor sends."""
-    remarks = []
-    for name, signal in (("the pressure", record.pressure), ("the stem", record.position)):
+    remarks, words = [], record.driven_by.words
+    for name, signal in ((f"the {words}", record.drive), ("the stem", record.position)):
         remarks += _stamp_remarks(name, signal) + _value_remarks(name, signal)
-    periods = record.pressure.period, record.position.period
+    periods = record.drive.period, record.position.period
     if max(periods) > _RATES * min(periods):
         remarks.append(
-            f"the signals have different rates: pressure {1 / periods[0]:.3g} Hz, stem "
+            f"the signals have different rates: {words} {1 / periods[0]:.3g} Hz, stem "
             f"{1 / periods[1]:.3g} Hz"
         )
     if max(periods) > _SLOW:

@@ -134,6 +134,7 @@ def _nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinat
 
     The mean magnitude counts: a single jump at the wrong time says little of a start.
     """
+
     def distance(start: Coordinates) -> float:
         residual = model.record.position - model.readings(start)
         return float(np.sum(np.abs(residual * model.weights)))

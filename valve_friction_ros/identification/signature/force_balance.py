@@ -8,6 +8,7 @@ from valve_friction_ros.identification.identified_model import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.signature.strokes import BreakawayPoint
 from valve_friction_ros.identification.signature.valve_signature import (
     TRIANGLE_NEEDED,
     ValveSignature,
@@ -38,6 +39,7 @@ from valve_friction_ros.identification.trust.verdict import (
     with_verdict,
 )
 from valve_friction_ros.identification.units import UNITS
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import measured
@@ -165,21 +167,26 @@ def identify_signature(
         misfit=None,
         derivative_window=signature.window,
         warnings=identified.notes,
-        evidence=_evidence(signature),
+        evidence=_evidence(signature, valve.driven_by),
         findings=_findings(signature, validation, valve),
         model=identified.parameters,
-        signature=signature,
+        exhibit=signature,
         stem=StemComparison(recording.sample_period, recording.position, validation.simulated),
     )
 
 
-def _evidence(signature: ValveSignature) -> dict[str, object]:
+def _evidence(signature: ValveSignature, driven_by: Drive) -> dict[str, object]:
+    def shown(point: BreakawayPoint) -> dict[str, float]:
+        values = point._asdict()
+        drive = values.pop("drive")
+        return values if driven_by is Drive.FORCE else values | {"pressure": drive}
+
     return {
         "position_bias": signature.position_bias,
         "dead_zone": signature.dead_zone,
         "dead_zone_share": signature.dead_zone_share,
         "breakaway_points": [
-            {"direction": stroke.direction, **stroke.breakaway._asdict()}
+            {"direction": stroke.direction, **shown(stroke.breakaway)}
             for stroke in signature.strokes
             if stroke.breakaway is not None
         ],
@@ -188,12 +195,14 @@ def _evidence(signature: ValveSignature) -> dict[str, object]:
 
 def _findings(signature: ValveSignature, validation: Validation, valve: Valve) -> tuple[str, ...]:
     upward, downward = signature.upward_points, signature.downward_points
+    drive = valve.driven_by
     return (
         f"fit {100 * validation.fit:.2f} %: the model's stem is "
         f"{stem_distance(validation.rms, valve)}",
         f"signature: {len(upward)} strokes up and {len(downward)} down, bias x̄ "
-        f"{signature.position_bias * 1e3:.4g} mm, dead zone {signature.dead_zone * 1e-3:.4g} kPa, "
-        f"{percentage(signature.dead_zone_share)} of the pressure's span",
+        f"{signature.position_bias * 1e3:.4g} mm, dead zone "
+        f"{signature.dead_zone / drive.size:.4g} {drive.unit}, "
+        f"{percentage(signature.dead_zone_share)} of the {drive.words}'s span",
     )
 
 

@@ -23,17 +23,10 @@ fit without a jump. Chosen: the best of all starts is kept."""
 
 
 class Onset(NamedTuple):
-    """When a stem leaves its rest, and at which speed.
+    """When a stem leaves its rest, s on the axis of the samples, and the position of the rest, m.
 
-    Attributes
-    ----------
-    time : float
-        Time of the onset, s, on the axis of the samples.
-    level : float
-        Position of the rest, m.
-    jump_speed : float
-        Speed in the way of motion at which the stem leaves, m/s: above zero after a slip jump
-        that shows.
+    `jump_speed`, m/s, is the speed in the way of motion at which the stem leaves: above zero after
+    a slip jump that shows.
     """
 
     time: float

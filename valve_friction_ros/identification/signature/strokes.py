@@ -7,6 +7,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.published.breakaway import runs_of
 from valve_friction_ros.identification.signature.onset import fit_onset
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -59,23 +60,14 @@ Chosen: five strokes each way hold two windows each."""
 class BreakawayPoint(NamedTuple):
     """Where a resting stem begins to slide: P1 of the valve signature on the way up, P2 down.
 
-    Attributes
-    ----------
-    time : float
-        Since the first sample, s.
-    position : float
-        Stem position of the rest, m.
-    pressure : float
-        Pressure at that instant, Pa.
-    force : float
-        Actuator force F_ext at that instant, N.
-    speed : float
-        Speed at which the stem leaves, m/s: above zero after a slip jump that shows.
+    Time since the first sample, s; stem position of the rest, m; drive (pressure, Pa, or force, N)
+    and actuator force F_ext, N, at that instant; and the speed at which the stem leaves, m/s: above
+    zero after a slip jump that shows.
     """
 
     time: float
     position: float
-    pressure: float
+    drive: float
     force: float
     speed: float
 
@@ -83,18 +75,8 @@ class BreakawayPoint(NamedTuple):
 class Sliding(NamedTuple):
     """The instants of a stroke at which the stem slides at a constant speed, shape (n,) each.
 
-    Attributes
-    ----------
-    time : ndarray of float
-        Since the first sample, s.
-    position : ndarray of float
-        Stem position, m.
-    force : ndarray of float
-        Actuator force F_ext, N.
-    velocity : ndarray of float
-        Stem velocity, m/s.
-    force_rate : ndarray of float
-        Its derivative with time, N/s.
+    Time since the first sample, s; stem position, m; actuator force F_ext, N; stem velocity, m/s;
+    and the derivative of the force with time, N/s.
     """
 
     time: NDArray[np.float64]
@@ -106,18 +88,10 @@ class Sliding(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SignatureStroke:
-    """One stroke of the stem.
+    """One stroke of the stem: its direction, +1 up or −1 down, and its instants at constant speed.
 
-    Attributes
-    ----------
-    direction : int
-        +1 up, −1 down.
-    breakaway : BreakawayPoint or None
-        Where it begins; None without a recorded rest before it.
-    steadiness : float
-        Share of the stroke's way at constant speed.
-    sliding : Sliding
-        The instants at constant speed.
+    `breakaway` is None without a recorded rest before it; `steadiness` is the share of the stroke's
+    way at constant speed.
     """
 
     direction: int
@@ -133,13 +107,6 @@ class SignatureStroke:
         speed, and noise of the speed does not bias it.
         """
         return float(np.sum(self.sliding.force_rate) / np.sum(self.sliding.velocity))
-
-
-def _runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one-past-last index of each run of True."""
-    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
 
 def _usual_speed(speed: NDArray[np.float64]) -> float:
@@ -165,7 +132,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
 
     A stroke is a run at more than half the usual speed over at least a tenth of the stem's range.
     The breakaway is located by `fit_onset`, from the rest before the stroke and the first 5 % of
-    its way; a parabola through as many samples gives the pressure there.
+    its way; a parabola through as many samples gives the drive there.
 
     Parameters
     ----------
@@ -182,7 +149,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
         In the order of time.
     """
     position, period = recording.position, recording.sample_period
-    force = valve.actuator_force(recording.pressure)
+    force = valve.actuator_force(recording.drive)
     if len(recording) < window:
         return ()
     velocity, _, margin = measured(recording).derivatives(window, _ORDER)
@@ -193,7 +160,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
     span = float(np.ptp(position))
     strokes = []
     last_end = 0
-    for begin, end in _runs(speed > _RUN_SHARE * usual):
+    for begin, end in runs_of(speed > _RUN_SHARE * usual):
         way = position[end - 1 + margin] - position[begin + margin]
         direction = 1 if way > 0 else -1
         run = velocity[begin:end]
@@ -207,7 +174,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
             velocity[steady],
             force_rate[steady],
         )
-        rests = [(a + last_end, b + last_end) for a, b in _runs(still[last_end:begin])]
+        rests = [(a + last_end, b + last_end) for a, b in runs_of(still[last_end:begin])]
         rest = max(rests, key=lambda one: one[1] - one[0], default=(begin, begin))
         strokes.append(
             SignatureStroke(
@@ -228,7 +195,7 @@ def _steady_instants(run: NDArray[np.float64]) -> NDArray[np.intp]:
     """
     pace = float(np.median(run))
     distance = np.abs(run - pace)
-    begin, end = max(_runs(distance <= 2 * _STEADY * abs(pace)), key=lambda one: one[1] - one[0])
+    begin, end = max(runs_of(distance <= 2 * _STEADY * abs(pace)), key=lambda one: one[1] - one[0])
     return begin + np.flatnonzero(distance[begin:end] <= _STEADY * abs(pace))
 
 
@@ -248,19 +215,19 @@ def _breakaway(
         return None
     around = slice(first, begin + length)
     time = recording.time[around]
-    pressure_then = Polynomial.fit(time, recording.pressure[around], 2)
-    rate = float(pressure_then.deriv()(begin * period))
-    growth = float(pressure_then.deriv(2)(begin * period)) / rate if rate else 0.0
+    drive_then = Polynomial.fit(time, recording.drive[around], 2)
+    rate = float(drive_then.deriv()(begin * period))
+    growth = float(drive_then.deriv(2)(begin * period)) / rate if rate else 0.0
     most = 1 / float(time[-1] - time[0])
     growth = min(max(growth, -most), most)
     onset = fit_onset(time, position[around], begin * period, growth)
     middle = round(onset.time / period)
     near = slice(max(middle - length // 2, first), middle + length // 2 + 1)
-    pressure = float(Polynomial.fit(recording.time[near], recording.pressure[near], 2)(onset.time))
+    drive = float(Polynomial.fit(recording.time[near], recording.drive[near], 2)(onset.time))
     return BreakawayPoint(
         onset.time,
         onset.level,
-        pressure,
-        valve.diaphragm_area * (pressure - valve.pressure_reference),
+        drive,
+        valve.actuator_force(drive),
         onset.jump_speed,
     )

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from valve_friction_ros.identification.drawing import Curve, Drawing
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.signature.strokes import (
     BreakawayPoint,
@@ -13,7 +14,10 @@ from valve_friction_ros.identification.signature.strokes import (
     find_strokes,
     velocity_window,
 )
+from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
+from valve_friction_ros.identification.trust.misfit import percentage
+from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
@@ -59,8 +63,8 @@ class ValveSignature:
     position_bias : float
         x̄ of (14), m, between the mean P1 and the mean P2.
     dead_zone : float
-        Width of the loop in pressure, Pa: the difference of the pressures at which the stem slides
-        up and down through one position, 2·(F_c + F_v·|ẋ|)/S_a.
+        Width of the loop, Pa or N: the difference of the drives at which the stem slides up and
+        down through one position, 2·(F_c + F_v·|ẋ|)/S_a.
     dead_zone_share : float
         The same as a share of the pressure's span in the record.
     standard_errors : mapping of str to float
@@ -83,6 +87,38 @@ class ValveSignature:
         """The strokes up, and the strokes down."""
         upward = tuple(stroke for stroke in self.strokes if stroke.direction > 0)
         return upward, tuple(stroke for stroke in self.strokes if stroke.direction < 0)
+
+    def drawing(self, parameters: Mapping[str, Parameter], valve: Valve) -> Drawing:  # noqa: ARG002
+        """Return P1, P2 and the lines of the sliding stem, as figures and reports show them."""
+        drive, k = valve.driven_by, self.spring_constant
+        lines = []
+        for stroke in (way[0] for way in self.ways):
+            place = stroke.sliding.position[[0, -1]]
+            level = float(np.mean(stroke.sliding.force - k * stroke.sliding.position))
+            label = f"slides {'up' if stroke.direction > 0 else 'down'}, slope $S_a$/k"
+            lines.append(Curve(valve.actuator_drive(level + k * place), place, "--", label))
+        points = breakaway_points(self.strokes)
+        times, places = [one.time for one in points], [one.position for one in points]
+        return Drawing(
+            stem=(Curve(times, places, "o"),),
+            stem_title="stem (dotted: model; ●: breakaway)",
+            loop=(*lines, *self.breakaway_curves()),
+            loop_title=f"valve signature: dead zone {self.dead_zone / drive.size:.4g} "
+            f"{drive.unit}, x̄ {self.position_bias * 1e3:.3g} mm",
+            loop_caption=" The stem breaks away upwards at P₁ and downwards at P₂; on the dashed "
+            "lines it slides. The dead zone, the loop's width, is "
+            f"{percentage(self.dead_zone_share)} of the {drive.words}'s span.",
+        )
+
+    def breakaway_curves(self) -> tuple[Curve, ...]:
+        """Return P1 and P2 of every stroke: stem position, m, over the drive, Pa or N."""
+        return tuple(
+            Curve([one.drive for one in points], [one.position for one in points], style, label)
+            for label, style, points in (
+                ("$P_1$", "^", self.upward_points),
+                ("$P_2$", "v", self.downward_points),
+            )
+        )
 
     @property
     def upward_points(self) -> tuple[BreakawayPoint, ...]:
@@ -173,6 +209,7 @@ def valve_signature(
     RefusalError
         If a direction has no such stroke, or the stem does not slide at a constant speed.
     """
+    require_drive(recording, valve)
     window = window or velocity_window(recording)
     strokes = find_strokes(recording, valve, window)
     ways = [[one for one in strokes if one.direction == way] for way in (1, -1)]
@@ -195,7 +232,7 @@ def valve_signature(
         return {
             "spring_constant": spring_constant,
             "position_bias": mean_position_bias(ways, spring_constant),
-            "dead_zone": 2 * sliding_friction(ways, spring_constant) / valve.diaphragm_area,
+            "dead_zone": 2 * sliding_friction(ways, spring_constant) / valve.force_per_drive,
         }
 
     pointed = [[stroke for stroke in way if stroke.breakaway is not None] for way in ways]
@@ -203,7 +240,7 @@ def valve_signature(
     return ValveSignature(
         strokes,
         **found.values,
-        dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.pressure)),
+        dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.drive)),
         standard_errors=MappingProxyType(dict(found.standard_errors)),
         window=window,
     )

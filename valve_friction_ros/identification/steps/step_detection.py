@@ -30,7 +30,9 @@ _JUMP_SHARE = 0.9
 _CORNER_SAMPLES = 40
 """Samples on either side of a corner over which slopes are compared (`find_corners`).
 
-Chosen: 40 ms at 1 kHz, as for a pressure, short against the lag of a converter."""
+Chosen: 40 ms at 1 kHz, as for a pressure, short against the lag of a converter. A number of
+samples,
+because the function knows no time: at 10 Hz it is 4 s."""
 
 
 def find_steps(signal: NDArray[np.float64]) -> list[int]:

@@ -8,7 +8,7 @@ their spans the gain is the response gain of the standard.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -43,7 +43,8 @@ _LEAST_VISIBLE = 1e-3
 Chosen: about the movement of a stem that still settles after a hold of 10 s."""
 
 _LONGEST_SMOOTHING = 0.2
-"""Longest window that smooths the position, s. Chosen: it bounds the error of a dead time."""
+"""Longest window that smooths the position, s. Chosen: it bounds the error of a dead time. It is
+absolute, and does not follow the speed of the valve."""
 
 _NO_CORNERS = np.empty(0, dtype=np.intp)
 """A position has inertia: its slope does not jump."""
@@ -125,15 +126,12 @@ class StepTest:
         bound: the smallest such change with a movement.
     smallest_movement : float
         Least movement that counts, unit of the position.
-    smoothed : ndarray of float, shape (n,)
-        Position without its noise, from which times and overshoot were read.
     """
 
     steps: tuple[StepMetrics, ...]
     dead_band: Bracket
     resolution: Bracket
     smallest_movement: float
-    smoothed: NDArray[np.float64] = field(repr=False, compare=False)
 
     def __str__(self) -> str:
         """Return dead band and resolution, and the response to each step, a line each."""
@@ -230,7 +228,7 @@ def step_test(
         _metrics(smooth[hold], hold.start * period, period, (u, y), least)
         for hold, u, y in zip(holds[1:], pairwise(inputs), pairwise(outputs), strict=True)
     )
-    return StepTest(steps, _dead_band(inputs, steps), _resolution(steps), least, smooth)
+    return StepTest(steps, _dead_band(inputs, steps), _resolution(steps), least)
 
 
 def _smoothed(position: NDArray[np.float64], period: float) -> tuple[NDArray[np.float64], float]:

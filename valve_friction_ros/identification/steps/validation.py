@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.identified_model import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.identification.trust.excitation import require_motion
+from valve_friction_ros.identification.trust.excitation import require_drive, require_motion
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.conditioned_record import smoothed_pressure
+from valve_friction_ros.signals.conditioned_record import smoothed_drive
 from valve_friction_ros.signals.measured_record import measured
 
 __all__ = ["Validation", "measured_start", "validate"]
@@ -159,10 +159,11 @@ def validate(
         )
     record = measured(recording)
     require_motion(record)
+    require_drive(record, valve)
     trajectory = simulate(
         valve,
         parameters,
-        smoothed_pressure(record),
+        smoothed_drive(record),
         recording.sample_period,
         measured_start(record, valve),
     )

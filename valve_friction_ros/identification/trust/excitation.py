@@ -14,6 +14,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import measured
 
 __all__ = [
+    "require_drive",
     "require_enough_samples",
     "require_motion",
     "require_related_signals",
@@ -44,6 +45,13 @@ _LEAST_TRAVEL = 0.01
 _MOST_AT_A_STOP = 0.5
 """Share of the time at a travel stop: 0.18 at most in simulated records. Chosen."""
 
+_AT_A_STOP_NOISE = 5.0
+_AT_A_STOP_SHARE = 1e-3
+"""Distance within which the stem is at a stop: in standard deviations of the position's noise,
+which chance exceeds in 6 of 10⁷ samples, and at least this share of the travel.
+
+Chosen: the share of a noiseless record, far below the dead band of a stem."""
+
 _OUTSIDE = 0.05
 """Distance beyond a travel stop over the travel.
 
@@ -62,7 +70,8 @@ inverted record; a small share has a slope by chance."""
 _FOLLOWED_BLOCK = 0.1
 """Time, s, over which pressure and position are averaged before that test.
 
-Chosen: 100 samples at 1 kHz average noise; an absolute time, a tenth of a converter's lag."""
+Chosen: 100 samples at 1 kHz average noise. It is absolute, a tenth of the bench's lag; a share of
+the time of a stroke would suit other valves."""
 
 _MOVING_SHARE = 0.05
 """Speed over the top speed from which the stem counts as moving in that test. Chosen: leaves the
@@ -72,6 +81,22 @@ _LEAST_SAMPLES_A_STROKE = 10
 """Samples that the whole range takes at the top speed; 11 and more in simulated records.
 
 Chosen: with fewer a stroke has no resting and sliding part, or the sample is a sensor's glitch."""
+
+
+def require_drive(recording: Recording, valve: Valve) -> None:
+    """Refuse a force on the diaphragm of a valve, and a pressure without a diaphragm.
+
+    Raises
+    ------
+    ValueError
+        With the remedy.
+    """
+    if recording.driven_by is not valve.driven_by:
+        raise ValueError(
+            f"the recording holds a {recording.driven_by.words}, the valve is driven by a "
+            f"{valve.driven_by.words}: leave the diaphragm_area of the valve out for a recorded "
+            "force, and give it for a pressure"
+        )
 
 
 def require_enough_samples(recording: Recording, window: int) -> None:
@@ -157,7 +182,7 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
     travel = valve.travel
     if not np.isfinite(travel):
         return
-    reach = max(5 * measured(recording).white_noise, 1e-3 * travel)
+    reach = max(_AT_A_STOP_NOISE * measured(recording).white_noise, _AT_A_STOP_SHARE * travel)
     for name, distance in (
         ("lower", np.abs(recording.position)),
         ("upper", np.abs(recording.position - travel)),
@@ -166,30 +191,27 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
         if share > _MOST_AT_A_STOP:
             raise RefusalError(
                 f"the stem is at its {name} stop for {100 * share:.0f} % of the record, where "
-                "pressure holds no information on friction: excite the valve around mid-travel"
+                f"{recording.driven_by.words} holds no information on friction: excite the valve "
+                "around mid-travel"
             )
 
 
 def _followed(recording: Recording) -> tuple[float, float]:
-    """Fit the pressure of the moving stem by its position and its direction.
+    """Fit the drive of the moving stem by its position and its direction.
 
-    While the stem moves, pressure follows position, shifted up or down by the friction. While it
-    rests, any pressure within the dead band is possible, so rests are left out.
-
-    Returns
-    -------
-    slope, share : float
-        Pressure over position, Pa/m, and the share of the variance that is explained.
+    Returns the slope, Pa/m or N/m, and the share of the variance that is explained. While the stem
+    moves, its drive follows position, shifted up or down by the friction. While it rests, any drive
+    within the dead band is possible, so rests are left out.
     """
     length = max(round(_FOLLOWED_BLOCK / recording.sample_period), 1)
     blocks = len(recording) // length
-    position, pressure = (
+    position, drive = (
         signal[: blocks * length].reshape(blocks, length).mean(axis=1)
-        for signal in (recording.position, recording.pressure)
+        for signal in (recording.position, recording.drive)
     )
     moves = np.diff(position)
     moving = np.abs(moves) > _MOVING_SHARE * np.abs(moves).max()
-    place, target = (0.5 * (one[1:] + one[:-1])[moving] for one in (position, pressure))
+    place, target = (0.5 * (one[1:] + one[:-1])[moving] for one in (position, drive))
     columns = np.column_stack([place - place.mean(), np.sign(moves[moving]), np.ones(place.size)])
     fitted, *_ = np.linalg.lstsq(columns, target, rcond=None)
     left = target - columns @ fitted
@@ -199,23 +221,23 @@ def _followed(recording: Recording) -> tuple[float, float]:
 
 
 def require_related_signals(recording: Recording) -> None:
-    """Refuse pressure and stem that do not move together, or move too fast for the sampling."""
-    pressure, position = recording.pressure, recording.position
-    if np.ptp(pressure) == 0:
+    """Refuse drive and stem that do not move together, or move too fast for the sampling."""
+    words, position = recording.driven_by.words, recording.position
+    if np.ptp(recording.drive) == 0:
         raise RefusalError(
-            "the pressure did not change: excite the valve, or check the pressure sensor"
+            f"the {words} did not change: excite the valve, or check the {words} sensor"
         )
     slope, share = _followed(recording)
     if share < _LEAST_FOLLOWED:
         raise RefusalError(
-            "pressure and stem do not move together (position and direction of the moving stem "
-            f"explain {100 * share:.0f} % of the pressure): check that both signals belong to "
+            f"{words} and stem do not move together (position and direction of the moving stem "
+            f"explain {100 * share:.0f} % of the {words}): check that both signals belong to "
             "this valve, are not swapped, come from working sensors, and share one clock"
         )
     if slope < 0 and share > _SURELY_FOLLOWED:
         raise RefusalError(
-            "the stem moves against the pressure: invert the position, so that it grows in the "
-            "direction in which pressure pushes the stem"
+            f"the stem moves against the {words}: invert the position, so that it grows in the "
+            f"direction in which {words} pushes the stem"
         )
     step = float(np.max(np.abs(np.diff(position))))
     span = float(np.ptp(position))

@@ -10,16 +10,9 @@ _Member = TypeVar("_Member")
 
 
 class Jackknife(NamedTuple):
-    """Values with their standard errors.
+    """Values of all members together, their standard errors, and the degrees of freedom.
 
-    Attributes
-    ----------
-    values : mapping of str to float
-        Of all members together.
-    standard_errors : mapping of str to float
-        nan where a group has a single member.
-    freedom : int
-        Degrees of freedom, members less groups.
+    A standard error is nan where a group has a single member; the freedom is members less groups.
     """
 
     values: Mapping[str, float]

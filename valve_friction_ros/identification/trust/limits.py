@@ -19,7 +19,7 @@ _FINEST_SPRING = 2e-4
 """Least half width of an interval, as a share of the value, however quiet the record is.
 
 Chosen for the errors of smoothing and sampling, which no scatter shows; they change a spring
-constant less."""
+constant less. The shares are absolute: they do not follow the sampling of the record."""
 
 NO_SLIP = "no slip jump in the record: F_s cannot be separated from F_c"
 """Reason of a static friction that is not identifiable."""

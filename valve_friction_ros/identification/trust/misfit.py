@@ -15,7 +15,8 @@ Chosen: 68 of 71 simulated noisy records of Karnopp valves lie below it, 70 belo
 _GROSS = 0.9
 """Share of the movement below which a model that does not describe the record is refused.
 
-Chosen: 0.96 and more in simulated records, except in-service records of graphite at 100 Hz
+Chosen below all simulated records, which have 0.96 and more, except in-service records of graphite
+at 100 Hz
 (0.84)."""
 
 

@@ -19,10 +19,7 @@ async def saved_bag(
 ) -> Path:
     """Write what the buffer holds now as a bag, in a thread of `worker`; return its path.
 
-    Raises
-    ------
-    RefusalError
-        If it cannot be written.
+    Raises RefusalError if it cannot be written.
     """
     given = node.get_parameter(SAVE_FOLDER.name).value
     name = file_name(node, node.get_clock().now().nanoseconds)

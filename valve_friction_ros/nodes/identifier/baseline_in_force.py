@@ -32,13 +32,6 @@ class BaselineInForce:
 
     The parameter shows the value of the baseline in force. A parameter that is set to another
     value stands for an exact baseline.
-
-    Parameters
-    ----------
-    node : Node
-        The identifier.
-    monitor : FrictionMonitor
-        Compares with the baseline.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor) -> None:

@@ -1,4 +1,4 @@
-"""The history of the plant: what the identifier writes to it, and reads from it at the start."""
+"""The history of the plant, as the identifier writes it, and reads it at the start."""
 
 import contextlib
 from collections import deque
@@ -35,15 +35,6 @@ class HistoryWriter:
     """Writes to the history in a thread of its own, so that no slow disk holds up the node.
 
     What could not be written waits, and is tried again with what comes next.
-
-    Parameters
-    ----------
-    node : Node
-        The identifier, with its parameters.
-    monitor : FrictionMonitor
-        What it knows.
-    tag : str
-        Tag of the valve.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor, tag: str) -> None:
@@ -74,7 +65,7 @@ class HistoryWriter:
 
     @property
     def reservation(self) -> str:
-        """What to add to the news that something was kept."""
+        """Addition to the answer that something was kept; empty if it is in the file."""
         return "".join(f", but it is lost with this node: {one}" for one in self.problems)
 
     @property

@@ -49,7 +49,7 @@ _LOG_EVERY = 5.0
 
 @contextlib.contextmanager
 def identification_worker() -> Iterator[ThreadPoolExecutor]:
-    """Provide the thread that identifies; what waits for it at the end is dropped."""
+    """Provide the thread that identifies; at the end, tasks that still wait are dropped."""
     worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="identify")
     worker.submit(compile_kernels)
     try:
@@ -116,7 +116,7 @@ class Identifier(PolledNode):
         super().destroy_node()
 
     def poll(self) -> None:
-        """Take the samples that have come."""
+        """Take the samples that have arrived."""
         self._inputs.take()
 
     def _take_samples(self, arrivals: Arrivals) -> None:
@@ -140,7 +140,7 @@ class Identifier(PolledNode):
         self.get_logger().warning(f"{cause}: the buffer was cleared")
 
     async def _identify(self) -> str:
-        """Identify the buffer and keep what came of it; return the diagnosis."""
+        """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
         if self._identifying:
             raise RefusalError("an identification is already running: wait for it")
         record, refused = self._copied_buffer(), None
@@ -188,12 +188,8 @@ class Identifier(PolledNode):
     async def _identified(self, record: IdentificationInput) -> None:
         """Identify a record in the worker, then take over and publish the result.
 
-        Raises
-        ------
-        RefusalError
-            If the record cannot be identified.
-        InternalError
-            If a bug is met; the monitor shows it until an identification succeeds.
+        Raises RefusalError if the record cannot be identified, and InternalError if a bug is met;
+        the monitor shows the bug until an identification succeeds.
         """
         self._identifying = True
         try:

@@ -147,10 +147,7 @@ PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, JOINT)
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
     """Build the settings of the monitor from parameter values.
 
-    Raises
-    ------
-    ValueError
-        If they break a rule; the message names it.
+    Raises ValueError if they break a rule; the message names it.
     """
     fixed = {name: optional(values[f"fixed.{name}"]) for name in FIXABLE}
     return MonitorSettings(

@@ -21,10 +21,7 @@ async def written_report(
 ) -> Path:
     """Write a page on the last result, in a thread of `worker`; return its path.
 
-    Raises
-    ------
-    RefusalError
-        If there is no result, or the page cannot be written.
+    Raises RefusalError if there is no result, or the page cannot be written.
     """
     result, stamp, refusal = monitor.result, monitor.stamp, monitor.refusal
     if result is None or stamp is None:

@@ -1,4 +1,4 @@
-"""The latched topics that an identifier's results go out on."""
+"""The latched topics of an identifier's results."""
 
 from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
@@ -22,13 +22,7 @@ _FIGURES = (
 
 
 class ResultTopics:
-    """Publishes each number of a result on a topic of its own, and the sweep.
-
-    Parameters
-    ----------
-    node : Node
-        The identifier.
-    """
+    """Publishes each number of a result on a topic of its own, and the sweep."""
 
     def __init__(self, node: Node) -> None:
         self._friction = {

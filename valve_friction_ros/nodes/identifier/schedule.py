@@ -1,4 +1,4 @@
-"""Identification every so many seconds, and what came of it when nothing could be identified."""
+"""Periodic identification, and the reason of the last one that was skipped."""
 
 from collections.abc import Awaitable, Callable
 
@@ -14,16 +14,8 @@ __all__ = ["Schedule"]
 class Schedule:
     """Calls for an identification by the node's clock, and remembers why the last was skipped.
 
-    A skip changes neither diagnosis nor level, and it is not logged.
-
-    Parameters
-    ----------
-    node : Node
-        The identifier, with its parameters.
-    identify : callable
-        Coroutine that identifies.
-    group : CallbackGroup
-        Reentrant, so that other callbacks run while an identification is awaited.
+    A skip changes neither diagnosis nor level, and it is not logged. `group` is reentrant, so that
+    other callbacks run while an identification is awaited.
     """
 
     def __init__(

@@ -79,29 +79,10 @@ def friction_status(
     upkeep_problems: Sequence[str],
     more: Mapping[str, str],
 ) -> DiagnosticStatus:
-    """Compose the status of a valve.
+    """Compose the status of a valve at the time `now`, ns; the unit of a number is in its key.
 
-    Parameters
-    ----------
-    monitor : FrictionMonitor
-        Result, baseline and diagnosis.
-    name : str
-        Name of the status.
-    hardware_id : str
-        Tag of the valve.
-    now : int
-        Time, ns, for the age of the result.
-    input_problems : sequence of str
-        What is wrong with the inputs; any raises the level to WARN at least.
-    upkeep_problems : sequence of str
-        Other problems, which leave the diagnosis valid; any raises the level to WARN at least.
-    more : mapping of str to str
-        Further values.
-
-    Returns
-    -------
-    DiagnosticStatus
-        Values are bare numbers, their unit is in the key.
+    Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
+    level to WARN at least. `more` holds further values.
     """
     diagnosis = monitor.diagnosis()
     level, signal = diagnosis.level, diagnosis.status_signal
@@ -126,9 +107,8 @@ def friction_status(
         values["baseline_coulomb_friction [N]"] = _number(monitor.baseline.coulomb_friction)
         values["baseline half width [N]"] = _number(monitor.baseline.half_width)
     if diagnosis.ratio is not None:
-        values["coulomb_friction_ratio"] = _number(diagnosis.ratio.value)
-        values["coulomb_friction_ratio low"] = _number(diagnosis.ratio.low)
-        values["coulomb_friction_ratio high"] = _number(diagnosis.ratio.high)
+        for bound, value in zip(("", " low", " high"), diagnosis.ratio, strict=True):
+            values[f"coulomb_friction_ratio{bound}"] = _number(value)
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
     return _status(

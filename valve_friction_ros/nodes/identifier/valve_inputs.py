@@ -37,14 +37,7 @@ class _Input:
 class ValveInputs:
     """Takes the samples of a valve from its topics and hands them on by the block.
 
-    Parameters
-    ----------
-    node : Node
-        The node that subscribes.
-    joint : str
-        Joint of the stem; empty: the first.
-    hand_on : callable
-        Called with the arrivals.
+    An empty `joint` means the first joint of a message.
     """
 
     def __init__(self, node: Node, joint: str, hand_on: Callable[[Arrivals], None]) -> None:
@@ -62,7 +55,7 @@ class ValveInputs:
         return StreamNames(self._pressure.watch.topic, self._stem.watch.topic, self._joint)
 
     def take(self) -> None:
-        """Take what has come so far."""
+        """Take the samples that have arrived."""
         pressures, stems = self._pressure.take(), self._stem.take()
         if pressures or stems:
             self._hand_on(arrivals_of(pressures, stems, self._joint))
@@ -90,7 +83,7 @@ class ValveInputs:
         return found + [problem for problem in problems if problem is not None]
 
     def _is_fed_by_blocks(self) -> bool:
-        """Say whether blocks are what came last, or what is offered while nothing came."""
+        """Return whether the last samples came in blocks, or only blocks are offered."""
         since_topics = min(self._pressure.watch.silence(), self._stem.watch.silence())
         blocks_watch = self._blocks.watch
         return blocks_watch.silence() <= since_topics and blocks_watch.is_used()

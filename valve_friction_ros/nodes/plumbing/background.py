@@ -1,4 +1,4 @@
-"""Work in another thread, awaited by a callback, and what becomes of a bug."""
+"""Work in another thread, awaited by a callback, and the report of a bug in it."""
 
 import contextlib
 import traceback
@@ -19,7 +19,7 @@ _Result = TypeVar("_Result")
 
 
 class InternalError(Exception):
-    """A bug of this package, described for who asked; its traceback is in the log."""
+    """A bug of this package, in one line for the caller; its traceback is in the log."""
 
 
 def _internal_error(bug: Exception) -> InternalError:
@@ -36,15 +36,8 @@ def bugs_reported(
     """Turn a bug into an InternalError, and log its traceback.
 
     An exception that leaves a callback would end the node, with all valves of its process.
-
-    Parameters
-    ----------
-    node : Node
-        Logs the traceback.
-    *expected : type
-        Exceptions that are not bugs, beside RefusalError; they pass unchanged.
-    known : str, optional
-        An internal error that is in the log already: the same is not logged again.
+    RefusalError and the `expected` exceptions are no bugs, and pass unchanged. An internal error
+    that is `known`, in the log already, is not logged again.
     """
     passed: tuple[type[Exception], ...] = (RefusalError, InternalError, *expected)
     try:

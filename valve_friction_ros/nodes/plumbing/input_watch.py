@@ -1,4 +1,4 @@
-"""Watching that the input topics arrive, and saying why where they do not."""
+"""Watch over an input topic: whether it arrives, and if not, why."""
 
 from collections.abc import Sequence
 
@@ -11,15 +11,7 @@ __all__ = ["InputWatch"]
 
 
 class InputWatch:
-    """Says what is wrong with one subscribed topic.
-
-    Parameters
-    ----------
-    node : Node
-        The node that subscribes.
-    subscription : Subscription
-        Its subscription.
-    """
+    """Says what is wrong with one subscribed topic."""
 
     def __init__(self, node: Node, subscription: Subscription) -> None:
         self._node = node

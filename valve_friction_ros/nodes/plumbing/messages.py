@@ -1,4 +1,4 @@
-"""Between messages and plain numbers."""
+"""Conversion between messages and plain numbers."""
 
 import math
 from collections.abc import Mapping
@@ -37,10 +37,7 @@ def position_of(message: JointState, joint: str) -> float | None:
 def rows_of(message: Float64MultiArray) -> Arrivals:
     """Take the samples out of a block: a row each of s, Pa and m.
 
-    Raises
-    ------
-    ValueError
-        If the layout is not that of such a block; the message says what it should be.
+    Raises ValueError if the layout is not that of such a block; the message says what it should be.
     """
     dimensions = message.layout.dim
     if len(dimensions) != 2:

@@ -15,21 +15,10 @@ __all__ = ["file_name", "output_folder"]
 
 @contextlib.contextmanager
 def output_folder(given: str, usual: str, content: str) -> Iterator[Path]:
-    """Provide the folder for some content, and refuse what cannot be written into it.
+    """Provide the folder that a parameter gives, or else the `usual` one in the data folder.
 
-    Parameters
-    ----------
-    given : str
-        The folder that a parameter gives; empty: `usual` in the data folder.
-    usual : str
-        Name of the folder in the data folder.
-    content : str
-        What is written, with its article, for the refusal.
-
-    Raises
-    ------
-    RefusalError
-        If the home directory in its path is unknown, or the block raises OSError.
+    Raises RefusalError, which names the `content` with its article, if the home directory in the
+    path is unknown, or the block raises OSError.
     """
     try:
         folder = Path(given).expanduser() if given else data_folder() / usual

@@ -19,23 +19,12 @@ __all__ = ["ParameterSpec", "declare_parameters", "optional", "reject_invalid", 
 
 @dataclass(frozen=True)
 class ParameterSpec:
-    """One parameter of a node.
+    """One parameter of a node: its default, which fixes its type, and a description with its unit.
 
-    Attributes
-    ----------
-    name : str
-        Its name.
-    default : bool, int, float, str or list of str
-        Its default, which also fixes its type.
-    description : str
-        What it means, with its unit.
-    limits : tuple of float, optional
-        Lowest and highest value. A parameter that may be nan ("not given") has none, because
-        ROS counts nan as outside any range; the value types check it all the same.
-    read_only : bool
-        True where it can only be given at start.
-    choices : tuple of str
-        The values that a text may have; any, if empty.
+    `limits` are the lowest and the highest value. A parameter that may be nan ("not given") has
+    none, because ROS counts nan as outside any range; the value types check it all the same. A
+    `read_only` parameter can only be given at start. `choices` are the values that a text may have;
+    any, if empty.
     """
 
     name: str

@@ -38,7 +38,7 @@ class PolledNode(Node):
         return super().create_subscription(*arguments, **named)
 
     def poll(self) -> None:
-        """Do what has become due; called in every turn."""
+        """Do the work that is due; called in every turn."""
 
 
 class TurnExecutor(SingleThreadedExecutor):

@@ -48,20 +48,9 @@ class _NeverReady(CallbackGroup):
 class PolledSubscription:
     """A subscription that no executor waits for.
 
-    Its history, depth and reliability can be overridden by ``qos_overrides.…`` parameters.
-
-    Parameters
-    ----------
-    node : Node
-        The node that subscribes.
-    kind : type
-        Type of the messages.
-    topic : str
-        The topic.
-    quality : QoSProfile
-        Quality of service; the depth must hold what arrives between two calls of `take`.
-    raw : bool
-        Whether messages are taken as they came, serialised.
+    Its history, depth and reliability can be overridden by ``qos_overrides.…`` parameters. The
+    depth of `quality` must hold what arrives between two calls of `take`. With `raw` messages are
+    taken as they came, serialised.
     """
 
     def __init__(

@@ -5,20 +5,20 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 __all__ = ["LATCHED", "REQUESTS", "blocks", "qos_overrides", "stream"]
 
-LATCHED = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+
+def _reliable(depth: int, durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durability,
+    )
+
+
+LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 """Results: a late subscriber receives the last one."""
 
-REQUESTS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=100,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-)
+REQUESTS = _reliable(100)
 """Requests to a service, ten times as many as usual: they wait for the executor's next turn."""
 
 
@@ -28,22 +28,12 @@ def stream() -> QoSProfile:
     Deep enough for 20 s at 1 kHz while the receiver is busy. Every topic needs a profile of its
     own, because rclpy writes a topic's overrides into the profile that it is given.
     """
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=20_000,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.VOLATILE,
-    )
+    return _reliable(20_000)
 
 
 def blocks() -> QoSProfile:
     """Return the quality of service of a stream of blocks: deep enough for 100 s at 10 Hz."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=1_000,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.VOLATILE,
-    )
+    return _reliable(1_000)
 
 
 def qos_overrides() -> QoSOverridingOptions:

@@ -146,12 +146,8 @@ def arrivals_of(
 ) -> Arrivals:
     """Return the samples of serialised messages of both topics, in the order of their receipt.
 
-    Parameters
-    ----------
-    pressures, stems : sequence of TakenMessage
-        Serialised sensor_msgs/FluidPressure and sensor_msgs/JointState messages.
-    joint : str
-        Joint of the stem; empty: the first.
+    The messages are sensor_msgs/FluidPressure and sensor_msgs/JointState; an empty `joint` means
+    the first joint.
     """
     pressure = pressures_in([one.message for one in pressures])
     stem = positions_in([one.message for one in stems], joint)

@@ -70,22 +70,12 @@ def run_nodes(
     arguments: Sequence[str] | None = None,
     pause: float = _PAUSE,
 ) -> int:
-    """Run nodes in one process until Ctrl-C, SIGTERM or shutdown.
+    """Run nodes in one process until Ctrl-C, SIGTERM or shutdown; return the exit code.
 
-    Parameters
-    ----------
-    create : callable
-        Builds the nodes; what they or rclpy refuse is written to stderr in one line.
-    arguments : sequence of str, optional
-        ROS arguments, by default those of the process.
-    pause : float
-        Time between two turns, s, while no service is in use: for so long messages gather, and
-        a first request waits.
-
-    Returns
-    -------
-    int
-        Exit code: 0 after a clean stop, 2 if arguments or parameters do not let it start.
+    It is 0 after a clean stop, and 2 if arguments or parameters do not let the nodes start: what
+    they or rclpy refuse is written to stderr in one line. The ROS arguments are those of the
+    process by default. The `pause` is the time between two turns, s, while no service is in use:
+    for so long messages gather, and a first request waits.
     """
     stop = _StopRequest()
     nodes: list[Node] = []

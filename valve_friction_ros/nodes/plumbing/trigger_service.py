@@ -18,17 +18,9 @@ def create_trigger_service(
 ) -> None:
     """Create a std_srvs/Trigger service.
 
-    Parameters
-    ----------
-    node : Node
-        The node that offers it.
-    name : str
-        Its name.
-    work : callable
-        Coroutine that returns the message of a success, or raises RefusalError with the reason;
-        anything else that it raises is answered as an internal error.
-    group : CallbackGroup
-        Reentrant, if other callbacks shall run while the work waits.
+    The coroutine `work` returns the message of a success, or raises RefusalError with the reason;
+    anything else that it raises is answered as an internal error. `group` is reentrant, if other
+    callbacks shall run while the work waits.
     """
 
     async def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -10,17 +10,7 @@ __all__ = ["usage"]
 
 
 def usage(name: str, purpose: str, specs: Iterable[ParameterSpec]) -> str:
-    """Say how a node is run, and what its parameters mean.
-
-    Parameters
-    ----------
-    name : str
-        Name of the executable.
-    purpose : str
-        What the node does.
-    specs : iterable of ParameterSpec
-        Its parameters.
-    """
+    """Say how the executable `name` is run, and what its parameters mean."""
     lines = [
         f"usage: {name} [--ros-args [-r __ns:=/fv_101] [-p NAME:=VALUE] [--params-file FILE]]",
         "",

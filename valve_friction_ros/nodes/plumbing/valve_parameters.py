@@ -24,7 +24,7 @@ JOINT = ParameterSpec(
 
 VALVE_PARAMETERS = (
     ParameterSpec(
-        "diaphragm_area", BENCH_VALVE.diaphragm_area, "Diaphragm area S_a [m²]", (1e-6, 1e3)
+        "diaphragm_area", BENCH_VALVE.force_per_drive, "Diaphragm area S_a [m²]", (1e-6, 1e3)
     ),
     ParameterSpec(
         "pressure_reference",

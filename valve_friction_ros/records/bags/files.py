@@ -1,4 +1,4 @@
-"""Storage files of a bag: which they are, what they are, and how each is opened."""
+"""Storage files of a bag: their names, their formats, and how each is opened."""
 
 import contextlib
 import re
@@ -32,7 +32,7 @@ def _first_bytes(path: Path) -> bytes:
 
 
 def is_bag(path: Path) -> bool:
-    """Tell whether a file or folder is a bag, or means to be one, and no CSV file."""
+    """Return whether a file or folder is a bag, by its content or its ending, and no CSV file."""
     if path.is_dir() or path.suffix in _SUFFIXES:
         return True
     try:
@@ -57,12 +57,9 @@ def _named_files(folder: Path) -> list[str] | None:
 
 
 def storage_files(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the storage files of a bag in the order of time, and what was odd about them.
+    """Return the storage files of a bag in the order of time, and notes on what is missing.
 
-    Raises
-    ------
-    ValueError
-        If there is none.
+    Raises ValueError if there is none.
     """
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder")
@@ -90,7 +87,7 @@ def storage_files(path: Path) -> tuple[list[Path], list[str]]:
 
 @contextlib.contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
-    """Unpack a file that was compressed as a whole, of a cut one what there is."""
+    """Unpack a file that was compressed as a whole; of a cut file, the part that is there."""
     if not _first_bytes(path).startswith(_ZSTD):
         yield path
         return
@@ -106,7 +103,7 @@ def _unpacked(path: Path) -> Iterator[Path]:
 
 
 def _is_mcap(path: Path, start: bytes) -> bool:
-    """Tell MCAP (True) from SQLite3 (False) by the first bytes; refuse anything else."""
+    """Return True for MCAP, False for SQLite3, by the first bytes; refuse anything else."""
     if start.startswith((_MCAP, _SQLITE)):
         return start.startswith(_MCAP)
     if not start and path.stat().st_size:
@@ -120,21 +117,11 @@ def _is_mcap(path: Path, start: bytes) -> bool:
 
 @contextlib.contextmanager
 def opened(path: Path, salvage: bool) -> Iterator[Storage]:
-    """Open a storage file, compressed or not.
+    """Open a storage file, compressed or not; its first bytes give its format.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its first bytes tell its format.
-    salvage : bool
-        True to read it without its index as far as it goes.
-
-    Raises
-    ------
-    ValueError
-        If it is no storage file of ROS 2.
-    DamagedFileError
-        If it cannot be read without salvage, now or while its messages are gone through.
+    With `salvage` it is read without its index as far as it goes. Raises ValueError if it is no
+    storage file of ROS 2, and DamagedFileError if it cannot be read without salvage, now or while
+    its messages are gone through.
     """
     with _unpacked(path) as file:
         is_mcap = _is_mcap(path, _first_bytes(file))

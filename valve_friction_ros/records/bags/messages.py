@@ -21,10 +21,7 @@ class UndecodableError(ValueError):
 def decode(data: bytes, kind: str) -> Any:
     """Decode a message, compressed by its recorder or not.
 
-    Raises
-    ------
-    UndecodableError
-        If the bytes are no such message.
+    Raises UndecodableError if the bytes are no such message.
     """
     if data.startswith(_ZSTD):
         try:

@@ -34,7 +34,7 @@ def _valves(
 
 
 def _pass_on(storages: Sequence[Storage], feeds: Sequence[ValveFeed]) -> None:
-    """Give every message to the valve whose it is, in one pass."""
+    """Hand each message to its valve, in one pass."""
     takers = {topic: take for feed in feeds for topic, take in feed.inputs.items()}
     for storage in storages:
         for topic, data in storage.messages(takers.keys() & set(storage.topics)):
@@ -58,7 +58,7 @@ def _read(
     choice: TopicChoice,
     stretch: Stretch,
 ) -> list[tuple[ValveTopics, ValveFeed]]:
-    """Read all valves from a bag, of its damaged files what can be salvaged."""
+    """Read all valves from a bag; of damaged files, the part that can be salvaged."""
     with contextlib.ExitStack() as stack:
         storages = [stack.enter_context(opened(file, file in damaged)) for file in files]
         topics = {topic for storage in storages for topic in storage.topics}
@@ -76,32 +76,14 @@ def read_bag(
     choice: TopicChoice | None = None,
     stretch: Stretch | None = None,
 ) -> tuple[RecordedValve, ...]:
-    """Read the recordings of all valves in a bag, in one pass through its messages.
+    """Read the recordings of all valves in a bag, by namespace, in one pass through its messages.
 
     The messages go through the node's own buffer by their header stamps, in the order in which
     each topic was recorded, so that they give the numbers that the node gave.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. Without its
-        metadata or index, or cut off, it is read as far as it goes.
-    valve : Valve
-        Tells the range of the pressure sensors.
-    choice : TopicChoice, optional
-        Topics, joint and valve, where the bag does not tell them.
-    stretch : Stretch, optional
-        Which part to read.
-
-    Returns
-    -------
-    tuple of RecordedValve
-        By namespace; at least one.
-
-    Raises
-    ------
-    ValueError
-        If the file is no bag of ROS 2, or holds no valve: one line with what to do.
+    `path` is the folder of a bag, or one of its files: MCAP or SQLite3, compressed or not. Without
+    its metadata or index, or cut off, it is read as far as it goes. Raises ValueError, one line
+    with the remedy, if the file is no bag of ROS 2, or holds no valve.
     """
     choice, stretch = choice or TopicChoice(), stretch or Stretch()
     files, notes = storage_files(path)

@@ -1,8 +1,8 @@
-"""All that is used of rosbags beyond its documented names: the file to mend when they move.
+"""Private names of rosbags, in this file only.
 
 Checked with rosbags 0.11.9; `test_rosbags_internals.py` names what a newer version lacks.
 
-- `McapReader`: the documented `Reader` judges a file by the ending of its name, and refuses an
+- `McapReader`: the documented `Reader` takes the format of a file from its ending, and refuses an
   MCAP file without index whose receive times go back, as those of several topics may.
 - The decoders of `Typestore.get_msgdef`: the documented `deserialize_cdr` refuses a message with
   bytes after its end, which rclpy's serialisation may leave.
@@ -52,19 +52,10 @@ def decoded(body: bytes, kind: str, little_endian: bool) -> Any:
 
 
 class McapFile:
-    """An undamaged MCAP file.
+    """An undamaged MCAP file: `file`, which is `path` or what was unpacked of it.
 
-    Parameters
-    ----------
-    path : Path
-        The file that messages name.
-    file : Path
-        The file to read: `path`, or what was unpacked of it.
-
-    Raises
-    ------
-    DamagedFileError
-        If it is damaged, now or while its messages are gone through.
+    Raises DamagedFileError, which names `path`, if it is damaged, now or while its messages are
+    gone through.
     """
 
     def __init__(self, path: Path, file: Path) -> None:

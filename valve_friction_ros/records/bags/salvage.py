@@ -29,7 +29,7 @@ def _text(stream: io.BytesIO) -> str:
 
 
 def _chunk_content(chunk: bytes) -> bytes:
-    """Uncompressed content of a chunk, of a cut one as far as it goes; empty if it is damaged."""
+    """Uncompressed content of a chunk; of a cut chunk, the part that is there; empty if damaged."""
     stream = io.BytesIO(chunk)
     try:
         *_, size, checksum = _CHUNK_HEADER.unpack(stream.read(_CHUNK_HEADER.size))
@@ -70,13 +70,7 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
 
 
 class SalvagedMcap:
-    """An MCAP file read from its beginning to its end or first damage, without its index.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    """
+    """An MCAP file read from its beginning to its end or first damage, without its index."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

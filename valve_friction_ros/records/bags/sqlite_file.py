@@ -21,21 +21,9 @@ _HEADER = struct.Struct(">16xH10xI")
 class SqliteFile:
     """A SQLite3 file, read row by row; if it is damaged, until SQLite meets the damage.
 
-    Rows that are still in a write-ahead log beside the file are read as well.
-
-    Parameters
-    ----------
-    path : Path
-        The file that messages name.
-    file : Path
-        The file to read: `path`, or what was unpacked of it.
-    salvage : bool
-        True to read what there is of a damaged file.
-
-    Raises
-    ------
-    DamagedFileError
-        If it cannot be read without salvage, now or while its messages are gone through.
+    Rows that are still in a write-ahead log beside the file are read as well. `path` is the file
+    that messages name, `file` the same or what was unpacked of it. Without `salvage`, a damaged
+    file raises DamagedFileError, now or while its messages are gone through.
     """
 
     def __init__(self, path: Path, file: Path, salvage: bool) -> None:

@@ -33,13 +33,13 @@ class Topic(NamedTuple):
 
 @dataclass(frozen=True)
 class TopicChoice:
-    """What to read from a bag where it does not say so itself.
+    """Topics, joint and valve to read, where a bag leaves them open.
 
     Attributes
     ----------
     pressure, stem : str or None
         Topic of the pressure and of the stem; without a leading slash: its name within the
-        namespace of each valve. None: told by its type.
+        namespace of each valve. None: found by its type.
     joint : str or None
         Name of the stem's joint; None: the only one, or the one called `stem`.
     valve : str or None
@@ -124,7 +124,7 @@ def _common_namespace(*namespaces: str) -> str:
 
 
 def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> list[ValveTopics]:
-    """Put topics of one namespace together; one of each belong together wherever they are."""
+    """Pair the topics of each namespace; a single pressure and a single stem belong together."""
     if len(pressures) == len(stems) == 1:
         namespace = _common_namespace(*pressures, *stems)
         pressures, stems = ({namespace: next(iter(each.values()))} for each in (pressures, stems))
@@ -139,33 +139,20 @@ def _paired(pressures: dict[str, list[str]], stems: dict[str, list[str]]) -> lis
 
 
 def _is_a_valve(valve: ValveTopics) -> bool:
-    """Tell whether half a pair is a valve's: a barometer is none, nor is a robot's arm."""
+    """Return whether a pressure or a stem alone belongs to a valve.
+
+    Any other sensor of pressure and any other joint has these types too; the name decides.
+    """
     names = {topic.rpartition("/")[2] for topic in (valve.pressure, valve.stem) if topic}
     return valve.missing is None or bool(names & set(_OWN_NAMES.values()))
 
 
 def valves_in(topics: Collection[Topic], choice: TopicChoice) -> list[ValveTopics]:
-    """Find the valves of a bag.
+    """Find the valves of a bag, by namespace; one of this package's own topics may be missing.
 
     A valve is a namespace with a topic of each type; where there is one of each in all the bag,
-    or one of each is named, they are a valve wherever they are.
-
-    Parameters
-    ----------
-    topics : collection of Topic
-        What the bag holds.
-    choice : TopicChoice
-        What is asked for.
-
-    Returns
-    -------
-    list of ValveTopics
-        By namespace; of a valve with this package's topic names one may be missing.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or it cannot be told which topics are meant; with what there is.
+    or one of each is named, they are a valve wherever they are. Raises ValueError, with what the
+    bag holds, if there is none, or if the topics cannot be told apart.
     """
     pressures = _candidates(topics, PRESSURE_TYPE, choice.pressure)
     stems = _candidates(topics, STEM_TYPE, choice.stem)

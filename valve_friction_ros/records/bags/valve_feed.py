@@ -1,4 +1,4 @@
-"""The messages of one valve in a bag, on their way through the buffer that the node has."""
+"""The messages of one valve in a bag, taken by the same buffer as in the node."""
 
 from collections.abc import Callable, Mapping
 
@@ -19,18 +19,9 @@ _ALL = 1e9
 
 
 class ValveFeed:
-    """Fills a `RecordBuffer` from recorded messages.
+    """Fills a `RecordBuffer` from recorded messages of a valve whose topics are both there.
 
-    Parameters
-    ----------
-    topics : ValveTopics
-        The valve's topics; both are there.
-    valve : Valve
-        Tells the range of the pressure sensor.
-    joint : str or None
-        Name of the stem's joint; None: the only one, or the one called `stem`.
-    stretch : Stretch
-        Which part to take.
+    Without a `joint`, the stem is the only joint, or the joint called `stem`.
     """
 
     def __init__(
@@ -95,7 +86,7 @@ class ValveFeed:
         self._undecodable[str(topic)] = self._undecodable.get(str(topic), 0) + 1
 
     def notes(self) -> list[str]:
-        """Tell what of the messages was left out."""
+        """Return which messages were left out, and why."""
         notes = [
             f"{count} messages of {topic} cannot be decoded as its type, and were left out"
             for topic, count in self._undecodable.items()
@@ -108,10 +99,7 @@ class ValveFeed:
     def recording(self) -> Recording:
         """Bring both signals onto one grid, as the node does.
 
-        Raises
-        ------
-        RefusalError
-            If the samples make no record; the remedies are those for a file.
+        Raises RefusalError if the samples make no record; the remedies are those for a file.
         """
         if self._refusal is not None:
             raise RefusalError(self._refusal)

@@ -104,38 +104,16 @@ def write_bag(
     valve: Valve,
     assumed_mass: float,
 ) -> Path:
-    """Write a snapshot as a bag of MCAP, with the stamps it was received with.
+    """Write a snapshot as a bag of MCAP, with the stamps it was received with; return its path.
 
     It is written in a hidden folder beside its place and then renamed, so that nobody reads
-    half a bag. A valve file lies in it: `valve_friction identify BAG --valve BAG/valve.yaml` gives
-    the numbers that the snapshot gives.
+    half a bag. The folder is made if it is not there; where the name is taken, a number is put
+    after it. Rejected samples are only counted, in the metadata. A valve file with the assumed mass
+    (kg) lies in the bag: `valve_friction identify BAG --valve BAG/valve.yaml` gives the numbers
+    that the snapshot gives.
 
-    Parameters
-    ----------
-    folder : Path
-        Where the bag is put; made if it is not there.
-    name : str
-        Name of the bag; where it is taken, a number is put after it.
-    snapshot : Snapshot
-        Samples; the rejected ones are only counted, in the metadata.
-    names : StreamNames
-        Topics and joint.
-    valve : Valve
-        Geometry and sensor range, for the valve file.
-    assumed_mass : float
-        Mass where the record does not tell it, kg, for the valve file.
-
-    Returns
-    -------
-    Path
-        The bag.
-
-    Raises
-    ------
-    RefusalError
-        If there is nothing to write.
-    OSError
-        If it cannot be written; nothing is left behind.
+    Raises RefusalError if there is nothing to write, and OSError if it cannot be written; then
+    nothing is left behind.
     """
     stamps = np.concatenate((snapshot.pressure.stamps, snapshot.position.stamps))
     if stamps.size == 0:

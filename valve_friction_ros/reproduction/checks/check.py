@@ -9,27 +9,10 @@ __all__ = ["Check", "compared", "summary", "within", "written"]
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison with the paper.
+    """One comparison with the paper, in the paper's unit; its criterion was set before the values.
 
-    Attributes
-    ----------
-    item : int
-        Section of the report, from 1.
-    name : str
-        Name of the number, with its place in the paper.
-    paper, ours : str
-        Both values, in the paper's unit.
-    criterion : str
-        Criterion of a match; set before the values were known.
-    matched : bool
-        Whether the values match.
-    why : str
-        The reason of a mismatch.
-
-    Raises
-    ------
-    ValueError
-        If a reason is given for a match, or none for a mismatch.
+    `item` is the section of the report, from 1. A mismatch has a reason, and a match has none: else
+    it raises ValueError.
     """
 
     item: int

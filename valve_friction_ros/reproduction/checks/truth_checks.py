@@ -23,7 +23,7 @@ smaller."""
 def dead_band_checks(low: BenchResult, high: BenchResult) -> Iterator[Check]:
     """Compare the dead band of the ISA test with the friction of the valve."""
     for one in (low, high):
-        truth = 2 * one.bench.truth.static_friction / one.bench.valve.diaphragm_area
+        truth = 2 * one.bench.truth.static_friction / one.bench.valve.force_per_drive
         share = 100 * truth / paper.PRESSURE_SPAN
         band = one.steps.dead_band
         yield compared(

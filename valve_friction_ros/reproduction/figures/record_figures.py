@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures import draw_breakaway_points
+from valve_friction_ros.figures import draw_curves
 from valve_friction_ros.figures.page import dress
 from valve_friction_ros.figures.panels import COLOURS, thinned
 from valve_friction_ros.reproduction import paper
@@ -112,7 +112,7 @@ def signatures_figure(*results: BenchResult) -> Figure:
             lw=1.2,
             label=f"{packing_name(result)}: dead zone {zone:.2f} kPa",
         )
-        draw_breakaway_points(axes, signature, colour=colour)
+        draw_curves(axes, signature.breakaway_curves(), 1e3, colour)
         _draw_dead_zone(axes, result, colour)
     handles, labels = axes.get_legend_handles_labels()
     # P1 and P2 look alike for all packings; the legend lists them last.
@@ -131,7 +131,7 @@ def _draw_dead_zone(axes: Axes, result: BenchResult, colour: str) -> None:
     height = 0.5 * float(position.min() + position.max())
     height += 0.05 * float(np.ptp(position)) * (1 if result.bench.name == "low" else -1)
     force = signature.spring_constant * (height + signature.position_bias)
-    middle = float(result.bench.valve.actuator_pressure(np.array([force]))[0]) / 1e3
+    middle = float(result.bench.valve.actuator_drive(float(force))) / 1e3
     half = signature.dead_zone / 2e3
     axes.annotate(
         "",

@@ -1,0 +1,37 @@
+"""What drives the stem in a recording: the pressure of an actuator, or a force itself."""
+
+from enum import Enum
+
+__all__ = ["Drive"]
+
+
+class Drive(Enum):
+    """What drives the stem: its name in a sentence, and the unit in which people read it.
+
+    Attributes
+    ----------
+    words : str
+        Name in a sentence.
+    unit : str
+        Unit in figures and tables.
+    size : float
+        That unit in the SI unit of the samples, Pa or N.
+
+    Examples
+    --------
+    >>> Drive.PRESSURE.label, Drive.FORCE.label
+    ('pressure [kPa]', 'drive force [N]')
+    """
+
+    PRESSURE = ("pressure", "kPa", 1e3)
+    """The actuator's pressure on its diaphragm."""
+    FORCE = ("drive force", "N", 1.0)
+    """The force of a machine without a diaphragm."""
+
+    def __init__(self, words: str, unit: str, size: float) -> None:
+        self.words, self.unit, self.size = words, unit, size
+
+    @property
+    def label(self) -> str:
+        """Name and unit, for an axis or a row."""
+        return f"{self.words} [{self.unit}]"
