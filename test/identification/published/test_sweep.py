@@ -177,6 +177,24 @@ class TestUndetermined:
         np.testing.assert_allclose(found.estimates["mass"][:2], 2.0, rtol=1e-14)
         np.testing.assert_allclose(found.estimates["coulomb_friction"][:2], 3.0, rtol=1e-14)
 
+    def test_one_sample_more_than_parameters(self):
+        """One degree of freedom is not enough, two are."""
+        speed = np.repeat([1.0, 2.0, 3.0], [40, 1, 3])
+        columns = np.random.default_rng(0).standard_normal((44, 2))
+        found = sweep_thresholds(synthetic(columns, columns @ [2.0, 3.0], speed), self.THRESHOLDS)
+        np.testing.assert_array_equal(found.samples, [44, 4, 3])
+        assert not is_unknown(found, 1)
+        assert is_unknown(found, 2)
+
+    @pytest.mark.parametrize(("share", "known"), [(0.8e-10, False), (1.3e-10, True)])
+    def test_a_column_that_depends_on_another(self, share, known):
+        """All but 10⁻¹⁰ of the second column lies along the first."""
+        first, apart = np.ones(40), np.tile([1.0, -1.0], 20)
+        columns = np.column_stack([first, first + share * apart])
+        regression = synthetic(columns, apart, np.ones(40))
+        found = sweep_thresholds(regression, np.array([0.5]))
+        assert is_unknown(found, 0) is not known
+
     def test_no_samples(self):
         columns = np.random.default_rng(0).standard_normal((20, 2))
         found = sweep_thresholds(synthetic(columns, columns[:, 0], np.ones(20)), self.THRESHOLDS)

@@ -42,10 +42,12 @@ class Breakaway(NamedTuple):
     direction: int
 
 
-def _runs(active: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _runs(active: NDArray[np.bool_]) -> list[list[int]]:
     """First and one-past-last index of each run of True."""
-    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
-    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    edges: list[list[int]] = (
+        np.flatnonzero(np.diff(active, prepend=False, append=False)).reshape(-1, 2).tolist()
+    )
+    return edges
 
 
 def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
@@ -101,15 +103,15 @@ def find_breakaways(recording: Recording, settings: IdentificationSettings) -> l
     speed = np.abs(derivatives.velocity)
     noise = velocity_noise(record.white_noise, record.sample_period, window, settings.order)
     moving = speed > max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
-    for begin, end in zip(*_runs(moving), strict=True):
+    for begin, end in _runs(moving):
         # The filter spreads any true motion over a window: a shorter burst is noise.
         moving[begin:end] = end - begin >= window // 2
     still = ~moving
     found = []
-    for begin, end in zip(*_runs(still), strict=True):
+    for begin, end in _runs(still):
         if end - begin < 2 * window or end == still.size:
             continue
-        first_moving = int(end) + derivatives.margin
+        first_moving = end + derivatives.margin
         rest = recording.position[begin + window : first_moving - window // 2]
         level, spread = float(np.median(rest)), float(np.std(rest))
         stretch = recording.position[first_moving - window : first_moving + 2 * window] - level
