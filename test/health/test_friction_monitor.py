@@ -60,9 +60,10 @@ class TestSettings:
         ):
             IdentificationSettings(derivative_window=value)
 
-    def test_no_baseline_and_no_derivative_window_at_first(self):
+    def test_no_baseline_no_derivative_window_and_a_minute_at_first(self):
         baseline = FrictionMonitor(SETTINGS).baseline
         assert (baseline, SETTINGS.identification.derivative_window) == (None, None)
+        assert SETTINGS.window == 60.0
 
 
 class TestIdentification:

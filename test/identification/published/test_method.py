@@ -46,7 +46,7 @@ def estimate(record):
     return published_estimate(record, BENCH_VALVE, SETTINGS)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def result(record):
     return identify_published(record, BENCH_VALVE, SETTINGS)
 

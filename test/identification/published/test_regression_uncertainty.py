@@ -33,7 +33,7 @@ def fit(record):
     return published_fit(record, BENCH_VALVE, SETTINGS)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def uncertainty(record, fit):
     return regression_uncertainty(record, fit)
 

@@ -193,7 +193,7 @@ class TestUndetermined:
         columns = np.column_stack([first, first + share * apart])
         regression = synthetic(columns, apart, np.ones(40))
         found = sweep_thresholds(regression, np.array([0.5]))
-        assert is_unknown(found, 0) is not known
+        assert is_unknown(found, 0) != known
 
     def test_no_samples(self):
         columns = np.random.default_rng(0).standard_normal((20, 2))
@@ -202,6 +202,13 @@ class TestUndetermined:
         assert not is_unknown(found, 0)
         assert is_unknown(found, 1)
         assert is_unknown(found, 2)
+
+    def test_a_force_that_does_not_vary_has_no_share(self):
+        """(18) divides by the spread of the force."""
+        columns = np.random.default_rng(0).standard_normal((20, 2))
+        found = sweep_thresholds(synthetic(columns, np.zeros(20), np.ones(20)), np.array([0.5]))
+        assert np.isnan(found.r_squared[0])
+        assert found.sigma[0] == found.estimates["mass"][0] == 0.0
 
     def test_one_direction_at_the_top(self):
         """Where all fast samples go up, the sign column is the constant column."""
