@@ -161,6 +161,7 @@ class TestOnset:
 
     def test_a_rest_without_noise_ends_at_its_last_sample(self):
         assert _onset(np.array([0.0, 0.0, 0.0, 5.0, 6.0]), 0.0) == 2
+        assert _onset(np.array([0.0, 5.0, 6.0]), 0.0) == 0
 
 
 def crept(creep, shake=0.0):
@@ -191,24 +192,36 @@ def test_four_deviations_of_the_velocity_are_motion(deviations, leaves):
     assert all(abs(one.sample - 299) <= 4 for one in found)
 
 
-@pytest.mark.parametrize(("samples", "onsets"), [(91, [390]), (90, [])])
+@pytest.mark.parametrize(("samples", "onsets"), [(91, [390, 890]), (90, [889])])
 def test_a_rest_is_two_windows_long(samples, onsets):
     """91 samples without a step make 92 equal positions, which hold 92 − 30 = 2·31 windows."""
-    speed = np.repeat([0.1, 0.0, 0.1], [300, samples, 300])
+    speed = np.repeat([0.1, 0.0, 0.1, 0.0, 0.1], [300, samples, 300, 200, 300])
     record = Recording(1e-3, np.ones(speed.size), 1e-3 * np.cumsum(speed))
     assert [one.sample for one in found_in(record)] == onsets
 
 
-@pytest.mark.parametrize(("share", "onsets"), [(0.43, [599]), (0.28, [299, 599])])
-def test_a_burst_shorter_than_half_a_window_is_noise(share, onsets):
-    """A small step in a rest is smoothed to a bump of the speed, Σw high.
+@pytest.mark.parametrize(("speed", "visible"), [(1.4e-3, False), (4e-3, True)])
+def test_an_onset_is_seen_within_two_windows_or_not_at_all(speed, visible):
+    """A creep of 0.08 mm/s in the rest spreads it by 24 µm/√12, 16 of which are 111 µm.
 
-    At 0.43 of its height the bump is 14 samples wide, at 0.28 it is 16; half a window is 15.
+    It ends 12 µm off. The two windows begin with the window that holds the first motion, some 15
+    samples before it: the slow motion gets 12 µm + 48·1.4 µm far, the fast one 12 µm + 48·4 µm.
+    """
+    speeds = np.repeat([0.8e-4, speed, 0.1], [331, 300, 300])
+    found = found_in(Recording(1e-3, np.ones(speeds.size), 1e-3 * np.cumsum(speeds)))
+    assert len(found) == visible
+
+
+@pytest.mark.parametrize(("width", "onsets"), [(13, [600]), (15, [299, 600])])
+def test_a_burst_shorter_than_half_a_window_is_noise(width, onsets):
+    """A small step in a rest is smoothed to a bump of the speed, and half a window is 15.
+
+    The step is as high as makes the bump `width` samples wide at the limit, 1e-3 of the top speed.
     """
     weights = savgol_coeffs(31, 3, deriv=1, delta=1e-3)
-    limit = 1e-3 * 0.1  # of the top speed
-    step = limit / share / np.abs(np.cumsum(weights)).max()
-    position = np.repeat([0.0, step, 0.0], [300, 300, 300])
-    position[600:] = step + 1e-4 * np.arange(1, 301)
-    found = found_in(Recording(1e-3, np.ones(900), position))
+    bump = np.sort(np.abs(np.convolve(weights, np.repeat([0.0, 0.5, 1.0], [60, 1, 60]), "valid")))
+    step = 1e-3 * 0.1 / bump[-width - 1 : -width + 1].mean()
+    position = np.repeat([0.0, 0.5 * step, step], [300, 1, 600])
+    position[601:] += 1e-4 * np.arange(1, 301)
+    found = found_in(Recording(1e-3, np.ones(901), position))
     assert [one.sample for one in found] == onsets

@@ -88,16 +88,16 @@ def test_fit(uncertainty, sliding):
 
 
 def covariance_of(scatter):
-    """Three coordinates, of which the second scatters `scatter` times as much."""
+    """Four coordinates, of which the second scatters `scatter` times as much, the last little."""
     generator = np.random.default_rng(0)
-    slope = generator.standard_normal((90, 3)) / [1.0, scatter, 1.0]
+    slope = generator.standard_normal((90, 4)) / [1.0, scatter, 1.0, 0.01]
     return block_covariance(
         EstimatingEquation.of_least_squares(slope, generator.standard_normal(90)), 9
     )
 
 
 class TestVerdicts:
-    NAMES = ("viscous_friction", "coulomb_friction", "spring_constant")
+    NAMES = ("viscous_friction", "coulomb_friction", "spring_constant", "spring_preload")
 
     def of(self, fit, scatter=1.0, strokes=10, **fixed):
         covariance = covariance_of(scatter)
@@ -108,7 +108,7 @@ class TestVerdicts:
     def test_by_the_interval_of_each(self, fit):
         found, covariance = self.of(fit, scatter=1e3)
         assert list(found) == list(fit.estimate.values)
-        one, gradient = found["coulomb_friction"], np.array([0.0, 1.0, 0.0])
+        one, gradient = found["coulomb_friction"], np.array([0.0, 1.0, 0.0, 0.0])
         assert one.name == "coulomb_friction"
         assert one.value == fit.estimate.coulomb_friction
         assert one.standard_error == covariance.standard_error(gradient)
@@ -119,11 +119,12 @@ class TestVerdicts:
     def test_no_interval_is_finer_than_the_smoothing(self, fit):
         """5·10⁻⁴ of a value, 2·10⁻⁴ of a spring constant."""
         found, covariance = self.of(fit)
-        for name, share in (("viscous_friction", 5e-4), ("spring_constant", 2e-4)):
+        shares = {"viscous_friction": 5e-4, "spring_constant": 2e-4, "spring_preload": 5e-4}
+        for name, share in shares.items():
             one, value = found[name], fit.estimate.values[name]
             assert (one.verdict, one.reason) == (Verdict.IDENTIFIED, "")
             assert one.half_width == share * value
-            gradient = np.eye(3)[self.NAMES.index(name)]
+            gradient = np.eye(4)[self.NAMES.index(name)]
             assert one.standard_error == covariance.standard_error(gradient)
 
     def test_few_strokes_make_weak(self, fit):
@@ -142,7 +143,6 @@ class TestVerdicts:
         for name, reason in (
             ("static_friction", NO_SLIP),
             ("mass", "the record does not determine it"),
-            ("spring_preload", "the record does not determine it"),
         ):
             one = self.of(fit)[0][name]
             assert (one.name, one.verdict, one.reason) == (name, Verdict.NOT_IDENTIFIABLE, reason)

@@ -210,6 +210,16 @@ class TestUndetermined:
         assert np.isnan(found.r_squared[0])
         assert found.sigma[0] == found.estimates["mass"][0] == 0.0
 
+    def test_the_share_of_a_small_force(self):
+        """A power of two changes the unit of the force, and nothing else."""
+        columns = np.random.default_rng(0).standard_normal((20, 2))
+        force = columns[:, 0] ** 2
+        one, other = (
+            sweep_thresholds(synthetic(columns, unit * force, np.ones(20)), np.array([0.5]))
+            for unit in (1.0, 2.0**-20)
+        )
+        assert 0 < one.r_squared[0] == other.r_squared[0]
+
     def test_one_direction_at_the_top(self):
         """Where all fast samples go up, the sign column is the constant column."""
         generator = np.random.default_rng(0)
@@ -247,3 +257,9 @@ def test_a_sample_at_the_threshold_is_not_above_it():
     regression = synthetic(columns, columns[:, 0], speed)
     found = sweep_thresholds(regression, np.array([1.0, np.nextafter(2.0, 0.0), 2.0, 3.0]))
     np.testing.assert_array_equal(found.samples, [20, 20, 10, 0])
+
+
+def test_a_single_estimate_is_completed_by_single_values():
+    regression = synthetic(np.ones((4, 2)), np.ones(4), np.ones(4))
+    found = regression.complete(np.array([2.0, 3.0]))
+    assert found == dict(zip(REGRESSED, [2.0, 3.0, 0.0, 0.0, 0.0], strict=True))

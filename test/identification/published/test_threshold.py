@@ -130,12 +130,12 @@ def test_residual_against_information(sigma, log_information, chosen):
     assert choose_threshold(one_parameter(sigma, log_information), 31) == chosen
 
 
-@pytest.mark.parametrize(("residual", "chosen"), [(0.8e-12, 0), (1.2e-12, 1)])
+@pytest.mark.parametrize(("residual", "chosen"), [(0.8e-11, 0), (1.2e-11, 1)])
 def test_a_residual_below_rounding_is_none(residual, chosen):
-    """10⁻¹² of the largest, 1 N: what is smaller does not count, and the information decides."""
+    """10⁻¹² of the largest, 10 N: what is smaller does not count, and the information decides."""
     sweep = replace(
         one_parameter((1.0, 1.0), (0.0, 0.0)),
-        sigma=np.array([residual, 0.5e-12, 1.0]),
+        sigma=np.array([residual, 0.5e-11, 10.0]),
         log_information=np.array([0.1, 0.0, 0.0]),
     )
     assert choose_threshold(sweep, 31) == chosen

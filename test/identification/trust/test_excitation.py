@@ -292,6 +292,12 @@ def test_a_tenth_of_the_pressure_must_be_explained(share, passes):
         refusal(require_related_signals, strokes_explaining(share))
 
 
+def test_the_share_is_told_in_whole_percent():
+    unrelated = strokes_explaining(0.0945)
+    assert 0.0942 < _followed(unrelated)[1] < 0.0949
+    assert "explain 9 % of the pressure" in refusal(require_related_signals, unrelated)
+
+
 def test_a_stem_against_the_pressure():
     assert refusal(require_related_signals, strokes(slope=-2e6)) == (
         "the stem moves against the pressure: invert the position, so that it grows in the "
