@@ -38,6 +38,10 @@ class TestDeadBand:
         )
         assert dead_band(found, Valve(1.0, travel=0.5)) == 0.25
 
+    def test_of_a_soft_spring(self, with_values):
+        found = with_values(coulomb_friction=0.25, static_friction=0.25, spring_constant=0.5)
+        assert dead_band(found, Valve(1.0, travel=2.0)) == 0.5
+
     @pytest.mark.parametrize("spring", [0.0, -1.0])
     def test_there_is_none_without_a_spring(self, with_values, spring):
         assert math.isnan(dead_band(with_values(spring_constant=spring), BENCH_VALVE))
@@ -207,6 +211,13 @@ class TestUnknownFriction:
             "coulomb friction is -20 ± 3 N, and friction is above zero: check the direction of "
             "both signals"
         )
+
+    def test_zero_is_a_friction_without_an_interval_of_its_ratio(self, with_values):
+        """0 times the baseline; without an interval no limit counts as passed."""
+        found = diagnose(with_values(coulomb_friction=0.0), BENCH_VALVE, BASELINE)
+        assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
+        assert found.ratio.value == 0.0
+        assert found.message.startswith("friction perhaps collapsed: ")
 
 
 class TestModelDoubt:

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from valve_friction_ros.health import (
@@ -59,12 +60,20 @@ class TestSettings:
         ):
             IdentificationSettings(derivative_window=value)
 
-    def test_no_baseline_and_no_derivative_window_at_first(self):
+    def test_no_baseline_no_derivative_window_and_a_minute_at_first(self):
         baseline = FrictionMonitor(SETTINGS).baseline
         assert (baseline, SETTINGS.identification.derivative_window) == (None, None)
+        assert SETTINGS.window == 60.0
 
 
 class TestIdentification:
+    def test_input_is_the_buffer_and_the_settings(self, loose_record):
+        monitor = FrictionMonitor(SETTINGS)
+        feed(monitor, loose_record)
+        snapshot, settings = monitor.input()
+        assert settings is SETTINGS
+        np.testing.assert_array_equal(snapshot.recording().position, loose_record.position)
+
     def test_a_full_buffer_gives_what_the_record_gives(self, loose_record):
         monitor = FrictionMonitor(SETTINGS)
         feed(monitor, loose_record)
@@ -169,6 +178,21 @@ class TestInternalError:
             "internal error: a bug; before: no estimate: nothing has been identified yet"
         )
 
+    @pytest.mark.parametrize(
+        ("times", "level", "signal"),
+        [
+            (1.0, Level.WARN, StatusSignal.CHECK_FUNCTION),
+            (1.5, Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
+        ],
+    )
+    def test_the_ratio_stays(self, result, times, level, signal):
+        monitor = compared_with(Baseline(coulomb_friction(result).value / times))
+        monitor.accept(result, START)
+        ratio = monitor.diagnosis().ratio
+        monitor.fail("internal error: a bug")
+        found = monitor.diagnosis()
+        assert (found.level, found.status_signal, found.ratio) == (level, signal, ratio)
+
     def test_an_alarm_stays(self, result):
         monitor = compared_with(Baseline(coulomb_friction(result).value / 3))
         monitor.accept(result, START)
@@ -220,10 +244,12 @@ class TestBaseline:
     def test_needs_a_friction(self, with_values, coulomb):
         monitor = compared_with(Baseline(100.0))
         monitor.accept(with_values(coulomb_friction=coulomb), START)
-        with pytest.raises(
-            RefusalError, match=f"^a coulomb friction of {coulomb:.4g} N cannot be a baseline"
-        ):
+        with pytest.raises(RefusalError) as refusal:
             monitor.result_as_baseline()
+        assert str(refusal.value) == (
+            f"a coulomb friction of {coulomb:.4g} N cannot be a baseline: check the direction of "
+            "both signals, then identify again"
+        )
         assert monitor.baseline == Baseline(100.0)
 
     @pytest.mark.parametrize("before", [None, Baseline(100.0)])

@@ -132,7 +132,7 @@ def dead_band(result: Result, valve: Valve) -> float:
     """
     values = result.values
     if not values["spring_constant"] > 0:
-        return float("nan")
+        return math.nan
     coulomb_friction, static_friction = values["coulomb_friction"], values["static_friction"]
     if math.isnan(static_friction):
         static_friction = coulomb_friction

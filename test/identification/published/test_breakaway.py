@@ -2,13 +2,20 @@
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_coeffs
 
 from valve_friction_ros.identification import (
     IdentificationSettings,
     published_estimate,
 )
-from valve_friction_ros.identification.published.breakaway import find_breakaways
+from valve_friction_ros.identification.published.breakaway import (
+    _last_within,
+    _onset,
+    _runs,
+    find_breakaways,
+)
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
+from valve_friction_ros.signals.noise import position_noise, velocity_noise
 
 SETTINGS = IdentificationSettings()
 
@@ -98,3 +105,111 @@ def test_from_rest_under_noise(seed):
     (found,) = found_in(SensorNoise(position=10e-6, seed=seed).applied_to(clean))
     assert found.direction == 1
     assert abs(found.sample - 299) <= 5
+
+
+@pytest.mark.parametrize(
+    ("active", "runs"),
+    [
+        ([0, 1, 1, 0, 1], [(1, 3), (4, 5)]),
+        ([1, 0, 0, 1, 0], [(0, 1), (3, 4)]),
+        ([1, 1], [(0, 2)]),
+        ([0, 0], []),
+    ],
+)
+def test_runs(active, runs):
+    assert [tuple(run) for run in _runs(np.array(active, dtype=bool))] == runs
+
+
+def test_the_last_sample_within_a_mark():
+    """A displacement may pass the mark and return; 10⁻¹² m beyond a mark are rounding."""
+    assert _last_within(np.array([0.0, 2.0, 1.0, 3.0]), 1.0) == 2
+    assert _last_within(np.array([2.0, 3.0]), 1.0) == -1
+    assert _last_within(np.array([0.9e-12, 1.2e-12]), 0.0) == 0
+
+
+def grown(start, power, samples):
+    return np.maximum(np.arange(samples) - start, 0.0) ** power
+
+
+class TestOnset:
+    """The spread is chosen so that 4 and 16 of it are passed after whole samples."""
+
+    def test_of_a_growing_force(self):
+        """(t − 10)² is 4·25 at t = 20 and 16·25 at t = 30; what follows does not matter."""
+        displacement = grown(10, 2, 40)
+        assert _onset(displacement, 25.0) == 10
+        displacement[31:] += 1e4
+        assert _onset(displacement, 25.0) == 10
+
+    def test_after_a_slip_jump(self):
+        """t − 10 is 4·2.5 at t = 20 and 16·2.5 at t = 50."""
+        assert _onset(grown(10, 1, 60), 2.5) == 10
+
+    def test_in_the_first_sample(self):
+        assert _onset(grown(0, 2, 30), 25.0) == 0
+
+    @pytest.mark.parametrize("start", [-1, -5])
+    def test_before_the_record_is_none(self, start):
+        assert _onset(grown(start, 2, 30), 25.0) is None
+
+    def test_displaced_from_the_first_sample_is_none(self):
+        assert _onset(101.0 + grown(0, 1, 400), 25.0) is None
+
+    def test_a_second_mark_that_is_not_passed_is_none(self):
+        assert _onset(grown(10, 2, 31), 25.0) is None
+        assert _onset(grown(10, 2, 32), 25.0) == 10
+
+    def test_a_rest_without_noise_ends_at_its_last_sample(self):
+        assert _onset(np.array([0.0, 0.0, 0.0, 5.0, 6.0]), 0.0) == 2
+        assert _onset(np.array([0.0, 5.0, 6.0]), 0.0) == 0
+
+
+def crept(creep, shake=0.0):
+    """A rest, 100 samples of creep at `creep` m/s, a rest of 40, and a motion at 0.1 m/s.
+
+    The rest of 40 is shorter than two windows of 31. The shake is one that the derivative does
+    not see: every other sample up.
+    """
+    speed = np.repeat([0.0, creep, 0.0, 0.1], [300, 100, 40, 300])
+    place = 1e-3 * np.cumsum(speed) + shake * (np.arange(speed.size) % 2)
+    return Recording(1e-3, np.ones(speed.size), place)
+
+
+@pytest.mark.parametrize(("share", "onset"), [(0.8e-3, 439), (1.2e-3, 299)])
+def test_a_thousandth_of_the_top_speed_is_motion(share, onset):
+    """Slower, the creep is part of the rest; faster, the rest after it is too short for one."""
+    (found,) = found_in(crept(share * 0.1))
+    assert abs(found.sample - onset) <= 1
+
+
+@pytest.mark.parametrize(("deviations", "leaves"), [(3.6, False), (4.4, True)])
+def test_four_deviations_of_the_velocity_are_motion(deviations, leaves):
+    """Slower, the creep is part of the rest, whose spread then hides what follows."""
+    shake = 1e-4
+    noise = position_noise(crept(0.0, shake).position)
+    found = found_in(crept(deviations * velocity_noise(noise, 1e-3, 31, 3), shake))
+    assert len(found) == leaves
+    assert all(abs(one.sample - 299) <= 4 for one in found)
+
+
+@pytest.mark.parametrize(("samples", "onsets"), [(91, [390, 890]), (90, [889])])
+def test_a_rest_is_two_windows_long(samples, onsets):
+    """91 samples without a step make 92 equal positions, which hold 92 − 30 = 2·31 windows."""
+    speed = np.repeat([0.1, 0.0, 0.1, 0.0, 0.1], [300, samples, 300, 200, 300])
+    record = Recording(1e-3, np.ones(speed.size), 1e-3 * np.cumsum(speed))
+    assert [one.sample for one in found_in(record)] == onsets
+
+
+@pytest.mark.parametrize(("width", "onsets"), [(13, [600]), (15, [299, 600])])
+def test_a_burst_shorter_than_half_a_window_is_noise(width, onsets):
+    """A small step in a rest is smoothed to a bump of the speed, and half a window is 15.
+
+    The step is as high as makes the bump `width` samples wide at the limit, 1e-3 of the top speed.
+    """
+    weights = savgol_coeffs(31, 3, deriv=1, delta=1e-3)
+    bump = np.sort(np.abs(np.convolve(weights, np.repeat([0.0, 0.5, 1.0], [60, 1, 60]), "valid")))
+    step = 1e-3 * 0.1 / bump[-width - 1 : -width + 1].mean()
+    position = np.repeat([0.0, 0.5 * step, step], [300, 1, 600])
+    position[601:] += 1e-4 * np.arange(1, 301)
+    found = found_in(Recording(1e-3, np.ones(901), position))
+    assert [one.sample for one in found] == onsets

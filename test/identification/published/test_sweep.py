@@ -177,6 +177,24 @@ class TestUndetermined:
         np.testing.assert_allclose(found.estimates["mass"][:2], 2.0, rtol=1e-14)
         np.testing.assert_allclose(found.estimates["coulomb_friction"][:2], 3.0, rtol=1e-14)
 
+    def test_one_sample_more_than_parameters(self):
+        """One degree of freedom is not enough, two are."""
+        speed = np.repeat([1.0, 2.0, 3.0], [40, 1, 3])
+        columns = np.random.default_rng(0).standard_normal((44, 2))
+        found = sweep_thresholds(synthetic(columns, columns @ [2.0, 3.0], speed), self.THRESHOLDS)
+        np.testing.assert_array_equal(found.samples, [44, 4, 3])
+        assert not is_unknown(found, 1)
+        assert is_unknown(found, 2)
+
+    @pytest.mark.parametrize(("share", "known"), [(0.8e-10, False), (1.3e-10, True)])
+    def test_a_column_that_depends_on_another(self, share, known):
+        """All but 10⁻¹⁰ of the second column lies along the first."""
+        first, apart = np.ones(40), np.tile([1.0, -1.0], 20)
+        columns = np.column_stack([first, first + share * apart])
+        regression = synthetic(columns, apart, np.ones(40))
+        found = sweep_thresholds(regression, np.array([0.5]))
+        assert is_unknown(found, 0) != known
+
     def test_no_samples(self):
         columns = np.random.default_rng(0).standard_normal((20, 2))
         found = sweep_thresholds(synthetic(columns, columns[:, 0], np.ones(20)), self.THRESHOLDS)
@@ -184,6 +202,23 @@ class TestUndetermined:
         assert not is_unknown(found, 0)
         assert is_unknown(found, 1)
         assert is_unknown(found, 2)
+
+    def test_a_force_that_does_not_vary_has_no_share(self):
+        """(18) divides by the spread of the force."""
+        columns = np.random.default_rng(0).standard_normal((20, 2))
+        found = sweep_thresholds(synthetic(columns, np.zeros(20), np.ones(20)), np.array([0.5]))
+        assert np.isnan(found.r_squared[0])
+        assert found.sigma[0] == found.estimates["mass"][0] == 0.0
+
+    def test_the_share_of_a_small_force(self):
+        """A power of two changes the unit of the force, and nothing else."""
+        columns = np.random.default_rng(0).standard_normal((20, 2))
+        force = columns[:, 0] ** 2
+        one, other = (
+            sweep_thresholds(synthetic(columns, unit * force, np.ones(20)), np.array([0.5]))
+            for unit in (1.0, 2.0**-20)
+        )
+        assert 0 < one.r_squared[0] == other.r_squared[0]
 
     def test_one_direction_at_the_top(self):
         """Where all fast samples go up, the sign column is the constant column."""
@@ -222,3 +257,9 @@ def test_a_sample_at_the_threshold_is_not_above_it():
     regression = synthetic(columns, columns[:, 0], speed)
     found = sweep_thresholds(regression, np.array([1.0, np.nextafter(2.0, 0.0), 2.0, 3.0]))
     np.testing.assert_array_equal(found.samples, [20, 20, 10, 0])
+
+
+def test_a_single_estimate_is_completed_by_single_values():
+    regression = synthetic(np.ones((4, 2)), np.ones(4), np.ones(4))
+    found = regression.complete(np.array([2.0, 3.0]))
+    assert found == dict(zip(REGRESSED, [2.0, 3.0, 0.0, 0.0, 0.0], strict=True))

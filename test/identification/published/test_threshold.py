@@ -1,5 +1,7 @@
 """The choice of the threshold on the plateau of the sweep."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from valve_friction_ros.identification import (
     sweep_thresholds,
 )
 from valve_friction_ros.identification.published.regression import force_balance_regression
+from valve_friction_ros.identification.published.sweep import Sweep
 from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, SquareWave
 from valve_friction_ros.signals import differentiate
@@ -90,7 +93,49 @@ def test_refuses_where_no_step_has_enough_samples(bench_record):
     record = bench_record("high", SquareWave(), 20.8)
     sweep = swept(record)
     longer = int(sweep.samples[0]) // sweep.free + 1
-    with pytest.raises(RefusalError, match="no threshold leaves enough moving samples") as refusal:
+    with pytest.raises(RefusalError) as refusal:
         choose_threshold(sweep, longer)
-    assert "5 parameters" in str(refusal.value)
+    assert str(refusal.value) == (
+        "no threshold leaves enough moving samples to determine 5 parameters: "
+        "record more strokes, or fix a parameter"
+    )
     choose_threshold(sweep, longer - 1)
+
+
+def one_parameter(sigma, log_information):
+    """A sweep of three thresholds with 40 samples each; the third is unknown."""
+    steps, unknown = np.arange(1.0, 4.0), np.full(3, np.nan)
+    return Sweep(
+        steps,
+        {"mass": unknown},
+        np.array([*sigma, np.nan]),
+        unknown,
+        np.full(3, 40),
+        np.array([*log_information, np.nan]),
+        1,
+    )
+
+
+@pytest.mark.parametrize(
+    ("sigma", "log_information", "chosen"),
+    [
+        ((1.0, 1.0), (0.0, 0.1), 1),
+        ((1.0, 1.2), (0.0, 0.1), 0),  # 2·ln 1.2 is 0.36
+        ((1.0, 1.2), (0.0, 0.4), 1),
+        ((0.0, 0.0), (0.0, 0.1), 1),
+        ((0.0, 0.0), (0.1, 0.0), 0),
+    ],
+)
+def test_residual_against_information(sigma, log_information, chosen):
+    assert choose_threshold(one_parameter(sigma, log_information), 31) == chosen
+
+
+@pytest.mark.parametrize(("residual", "chosen"), [(0.8e-11, 0), (1.2e-11, 1)])
+def test_a_residual_below_rounding_is_none(residual, chosen):
+    """10⁻¹² of the largest, 10 N: what is smaller does not count, and the information decides."""
+    sweep = replace(
+        one_parameter((1.0, 1.0), (0.0, 0.0)),
+        sigma=np.array([residual, 0.5e-11, 10.0]),
+        log_information=np.array([0.1, 0.0, 0.0]),
+    )
+    assert choose_threshold(sweep, 31) == chosen

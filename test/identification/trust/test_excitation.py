@@ -227,6 +227,20 @@ def test_rests_and_other_sample_periods_do_not_matter():
     assert _followed(rest) == pytest.approx(_followed(clean), rel=1e-9)
 
 
+@pytest.mark.parametrize(("share", "counts"), [(0.045, False), (0.055, True)])
+def test_a_twentieth_of_the_top_speed_is_motion(share, counts):
+    """A creep in which the pressure does anything."""
+    clean = strokes(friction=0.0)
+    creep = share * np.abs(np.diff(clean.position)).max() * np.arange(1, 101)
+    found = _followed(
+        record(
+            np.concatenate([clean.position, clean.position[-1] + creep]),
+            np.concatenate([clean.pressure, 1e5 * np.random.default_rng(1).random(100)]),
+        )
+    )
+    assert (found != pytest.approx(_followed(clean), rel=1e-9)) is counts
+
+
 def test_what_two_blocks_make_up_for_is_left_out():
     """A pressure that is high in one block and low in the next is the same on their average."""
     clean = strokes(friction=0.0)
@@ -260,17 +274,28 @@ def test_unrelated_signals():
     )
 
 
-@pytest.mark.parametrize(("share", "passes"), [(0.12, True), (0.08, False)])
-def test_a_tenth_of_the_pressure_must_be_explained(share, passes):
+def strokes_explaining(share, slope=2e6):
+    """Strokes with as much scatter as leaves this share of the pressure explained."""
     scatter = 1e4
     for _ in range(40):  # more scatter explains less
-        found = _followed(strokes(scatter))[1]
+        found = _followed(strokes(scatter, slope))[1]
         scatter *= np.sqrt(found / share)
     assert found == pytest.approx(share, abs=0.005)
+    return strokes(scatter, slope)
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.12, True), (0.08, False)])
+def test_a_tenth_of_the_pressure_must_be_explained(share, passes):
     if passes:
-        require_related_signals(strokes(scatter))
+        require_related_signals(strokes_explaining(share))
     else:
-        refusal(require_related_signals, strokes(scatter))
+        refusal(require_related_signals, strokes_explaining(share))
+
+
+def test_the_share_is_told_in_whole_percent():
+    unrelated = strokes_explaining(0.0945)
+    assert 0.0942 < _followed(unrelated)[1] < 0.0949
+    assert "explain 9 % of the pressure" in refusal(require_related_signals, unrelated)
 
 
 def test_a_stem_against_the_pressure():
@@ -278,10 +303,15 @@ def test_a_stem_against_the_pressure():
         "the stem moves against the pressure: invert the position, so that it grows in the "
         "direction in which pressure pushes the stem"
     )
-    # Where less than half is explained, the sign is chance.
-    scattered = strokes(scatter=1.8e4, slope=-2e6)
-    assert 0.1 < _followed(scattered)[1] < 0.5
-    require_related_signals(scattered)
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.48, True), (0.52, False)])
+def test_where_less_than_half_is_explained_the_sign_is_chance(share, passes):
+    turned = strokes_explaining(share, slope=-2e6)
+    if passes:
+        require_related_signals(turned)
+    else:
+        assert "moves against the pressure" in refusal(require_related_signals, turned)
 
 
 @pytest.mark.parametrize(("samples", "share"), [(11, None), (9, 11), (3, 33)])

@@ -1,9 +1,12 @@
 """Limits that all methods share."""
 
+import math
+
 import pytest
 
 from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.identification.trust.limits import (
+    FALL_SPEED,
     finest_half_share,
     too_few_strokes,
 )
@@ -30,3 +33,8 @@ def test_three_strokes_are_enough():
 )
 def test_no_interval_is_finer(name, bias, share):
     assert finest_half_share(name, IdentificationSettings(position_bias=bias)) == share
+
+
+def test_friction_may_fall_up_to_twice_the_stribeck_velocity_of_graphite():
+    """v_s = 3.26 mm/s; exp(−(v/v_s)²) has fallen to e⁻⁴ at twice that."""
+    assert math.isclose(FALL_SPEED, 2 * 3.26e-3, rel_tol=0.01)

@@ -144,6 +144,18 @@ def test_a_block_with_nearly_all_the_information_counts_as_if_with_95_percent():
     np.testing.assert_allclose(found.contributions[:, 0], expected, rtol=1e-9)
 
 
+def test_a_block_with_negative_information_counts_as_if_with_none():
+    """As above; two halves of a noisy slope may differ in sign, and then the share is negative."""
+    one, two = np.array([1.0, *[2.0] * 7]), np.array([-3.0, *[2.0] * 7])
+    first, second = np.random.default_rng(2).standard_normal((2, 8))
+    shares = np.maximum(one * two / (one @ two), 0.0)
+    assert shares[0] == 0.0
+    expected = (one * second + two * first) / (2 * (one @ two)) / np.sqrt(1 - shares)
+    equation = EstimatingEquation((one[:, None], two[:, None]), (first, second))
+    found = block_covariance(equation, 1).contributions[:, 0]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
 def random_equation(samples, free, seed):
     generator = np.random.default_rng(seed)
     slope = generator.standard_normal((samples, free))

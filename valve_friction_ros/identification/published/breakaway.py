@@ -42,11 +42,12 @@ class Breakaway(NamedTuple):
     direction: int
 
 
-def runs_of(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs_of(active: NDArray[np.bool_]) -> list[list[int]]:
     """First and one-past-last index of each run of True."""
-    edges = np.diff(np.concatenate(([0], active.view(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return list(zip(starts.tolist(), ends.tolist(), strict=True))
+    edges: list[list[int]] = (
+        np.flatnonzero(np.diff(active, prepend=False, append=False)).reshape(-1, 2).tolist()
+    )
+    return edges
 
 
 def _last_within(displacement: NDArray[np.float64], mark: float) -> int:

@@ -48,6 +48,4 @@ def regression_uncertainty(record: MeasuredRecord, fit: PublishedFit) -> Regress
     covariance = block_covariance(equation, stroke)
     force = regression.force[moving]
     share = 1 - float(np.linalg.norm(residual[moving]) / np.linalg.norm(force - force.mean()))
-    return RegressionUncertainty(
-        regression.names, covariance, share, max(residual.size // max(stroke, 1), 1)
-    )
+    return RegressionUncertainty(regression.names, covariance, share, residual.size // stroke)

@@ -181,7 +181,7 @@ def read_stem(
     last = force.size - 2
     for cell in range(cells.size):
         place = cells[cell] - shift
-        step = min(max(int(math.floor(place)), 0), last)
+        step = min(max(math.floor(place), 0), last)
         share = place - step
         share = min(share, 1.0)
         readings[cell] = positions[step] + share * (positions[step + 1] - positions[step])

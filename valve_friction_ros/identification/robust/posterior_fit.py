@@ -108,7 +108,7 @@ def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.
     root = np.sqrt(np.maximum(values, 1e-15 * values[-1]))
     shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
     back = (vectors * root) @ turned
-    return (back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T
+    return np.asarray((back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T, dtype=np.float64)
 
 
 class _Problem:
