@@ -25,18 +25,38 @@ class Method(Protocol):
         """Identify a record; raise RefusalError if it does not determine the friction."""
 
 
+BEST = "best"
+"""Name of the choice between ``robust`` and ``refined``."""
+
+
+def identify_best(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
+    """Identify with ``robust``; with ``refined`` where the settings ask for what only that has.
+
+    These are a machine without a spring, a known position bias and a known static friction. The
+    result names the method that was used. It raises RefusalError as that method does.
+    """
+    chosen = settings or IdentificationSettings()
+    if robust.has_no_place_for(chosen):
+        return refined.identify_refined(recording, valve, chosen)
+    return robust.identify_robust(recording, valve, chosen)
+
+
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
+        BEST: identify_best,
+        robust.METHOD: robust.identify_robust,
         refined.METHOD: refined.identify_refined,
         published.METHOD: published.identify_published,
         signature.METHOD: signature.identify_signature,
-        robust.METHOD: robust.identify_robust,
     }
 )
-"""``refined``: most accurate; ``published``: the paper's model 1; ``signature``: its model 2;
-``robust``: experimental, for records of a plant with imperfections."""
+"""``best``: ``robust`` wherever it applies; ``robust``: with the imperfections of a plant in the
+fit; ``refined``: the Karnopp model alone; ``published``: the paper's model 1; ``signature``: its
+model 2."""
 
-DEFAULT_METHOD = refined.METHOD
+DEFAULT_METHOD = BEST
 
 FORMER_METHODS: Mapping[str, str] = MappingProxyType(
     {"sweep": refined.METHOD, "force_balance": signature.METHOD}
@@ -76,9 +96,9 @@ def identify(
     settings : IdentificationSettings, optional
         What is known beforehand, and the settings of the sweep.
     method : str
-        ``refined``, the most accurate, with intervals; ``published``, the paper's model 1;
-        ``signature``, the paper's model 2, from a slow triangular wave; or ``robust``,
-        experimental, with the imperfections of a plant in the fit.
+        ``best``; ``robust``, with the imperfections of a plant in the fit; ``refined``, with the
+        Karnopp model alone; ``published``, the paper's model 1; or ``signature``, the paper's
+        model 2, from a slow triangular wave.
 
     Returns
     -------

@@ -30,6 +30,9 @@ class Recording:
         The samples at their own stamps, where those are not the grid.
     driven_by : Drive
         What `drive` is.
+    gap : str
+        Refusal of a method that needs an unbroken record; empty for an unbroken one. In a gap the
+        samples are interpolated.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class Recording:
     start_time: float = 0.0
     stamped: StampedRecord | None = field(default=None, repr=False)
     driven_by: Drive = Drive.PRESSURE
+    gap: str = ""
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not make a recording, and freeze them."""

@@ -28,7 +28,7 @@ from valve_friction_ros.records.units import (
     Unit,
 )
 from valve_friction_ros.streams.samples import Samples
-from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
+from valve_friction_ros.streams.uniform_grid import uniform_recording
 
 __all__ = ["KNOWN_UNITS", "CsvColumns", "CsvFormat", "CsvUnits", "drive_column", "read_csv"]
 
@@ -191,7 +191,7 @@ def read_csv(
     ValueError
         If the file cannot be read or holds an impossible value: file, row, cause and remedy.
     RefusalError
-        If there is a gap, or only one sample.
+        If there is only one sample.
     """
     form, stretch = form or CsvFormat(), stretch or Stretch()
     columns, units = form.columns, form.units
@@ -206,12 +206,14 @@ def read_csv(
     position = _position_unit(path, units.position, valve).to_si(table.columns[columns.position])
     try:
         return uniform_recording(
-            Samples(stamps, drive), Samples(stamps, position), (name, columns.position), driven_by
+            Samples(stamps, drive),
+            Samples(stamps, position),
+            (name, columns.position),
+            driven_by,
+            lambda gap: (
+                f"{table.place(gap.sample, columns.time)}: gap of {gap.seconds:.3g} s: use a "
+                "stretch of the record without it"
+            ),
         )
-    except GapError as gap:
-        raise RefusalError(
-            f"{table.place(gap.sample, columns.time)}: gap of {gap.seconds:.3g} s: use a stretch "
-            "of the record without it"
-        ) from None
     except RefusalError as refusal:
         raise RefusalError(f"{path}: {refusal}") from None

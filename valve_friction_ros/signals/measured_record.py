@@ -121,4 +121,5 @@ def measured(recording: Recording) -> MeasuredRecord:
         recording.position,
         recording.start_time,
         driven_by=recording.driven_by,
+        gap=recording.gap,
     )

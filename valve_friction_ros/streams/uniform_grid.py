@@ -1,5 +1,8 @@
 """Two stamped signals of any rates on one uniform time grid."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
@@ -8,7 +11,7 @@ from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.streams.samples import Samples
 
-__all__ = ["GapError", "uniform_recording"]
+__all__ = ["Gap", "uniform_recording"]
 
 _LARGEST_GAP = 10
 """Sampling periods of a signal above which a pause is a gap; shorter pauses are interpolated.
@@ -21,33 +24,48 @@ _ON_GRID = 1e-3
 Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, below any noise."""
 
 
-class GapError(RefusalError):
-    """A gap of `seconds` before a `sample`; `what` is the refusal without its remedy."""
+@dataclass(frozen=True)
+class Gap:
+    """A pause of `seconds` in signal `name`, before its `sample`, `since_start` s after the first.
 
-    def __init__(self, name: str, samples: Samples, sample: int) -> None:
-        self.sample = sample
-        self.seconds = float(samples.stamps[sample] - samples.stamps[sample - 1]) / 1e9
-        since_start = float(samples.stamps[sample - 1] - samples.stamps[0]) / 1e9
-        self.what = (
-            f"gap of {self.seconds:.3g} s in {name}, {since_start:.3f} s after its first sample"
+    As text it is a refusal with its remedy.
+    """
+
+    name: str
+    sample: int
+    seconds: float
+    since_start: float
+
+    @property
+    def what(self) -> str:
+        """The refusal without its remedy."""
+        return (
+            f"gap of {self.seconds:.3g} s in {self.name}, {self.since_start:.3f} s after its "
+            "first sample"
         )
-        super().__init__(
-            f"{self.what}: use a record without a gap, or clear the buffer and record again"
-        )
+
+    def __str__(self) -> str:
+        """Return the refusal."""
+        return f"{self.what}: use a record without a gap, or clear the buffer and record again"
 
 
-def _checked(name: str, samples: Samples) -> int:
-    """Return the median sampling period in ns; refuse a signal that is empty or has a gap."""
+def _gap(name: str, samples: Samples, period: int) -> Gap | None:
+    """Return the longest gap of a signal, if it has one."""
+    pauses = np.diff(samples.stamps)
+    longest = int(np.argmax(pauses))
+    if pauses[longest] <= _LARGEST_GAP * period:
+        return None
+    since_start = float(samples.stamps[longest] - samples.stamps[0]) / 1e9
+    return Gap(name, longest + 1, float(pauses[longest]) / 1e9, since_start)
+
+
+def _period(name: str, samples: Samples) -> int:
+    """Return the median sampling period in ns; refuse a signal that is empty."""
     if samples.stamps.size == 0:
         raise RefusalError(f"no samples of {name}: check that it is published, and on this topic")
     if samples.stamps.size == 1:
         raise RefusalError(f"only one sample of {name}: check that it is sampled continuously")
-    pauses = np.diff(samples.stamps)
-    period = int(np.median(pauses))
-    longest = int(np.argmax(pauses))
-    if pauses[longest] > _LARGEST_GAP * period:
-        raise GapError(name, samples, longest + 1)
-    return period
+    return int(np.median(np.diff(samples.stamps)))
 
 
 def uniform_recording(
@@ -55,6 +73,7 @@ def uniform_recording(
     position: Samples,
     names: tuple[str, str] = ("actuator_pressure", "stem_state"),
     driven_by: Drive = Drive.PRESSURE,
+    refusal_of: Callable[[Gap], str] = str,
 ) -> Recording:
     """Put drive and stem position on the time grid of the stem position.
 
@@ -73,21 +92,23 @@ def uniform_recording(
         Names of the two signals in a refusal.
     driven_by : Drive
         What `drive` is.
+    refusal_of : callable
+        Puts a gap into words.
 
     Returns
     -------
     Recording
         Its `start_time` is the stamp of its first sample, s; `stamped` holds the samples where
-        their stamps are not the grid.
+        their stamps are not the grid. `gap` names the longest pause of more than ten periods.
 
     Raises
     ------
     RefusalError
-        If a signal is empty or has a gap of more than ten of its periods (a `GapError`), or the
-        two do not overlap in time.
+        If a signal is empty, or the two do not overlap in time.
     """
-    _checked(names[0], drive)
-    period = _checked(names[1], position)
+    period_of_drive = _period(names[0], drive)
+    period = _period(names[1], position)
+    gap = _gap(names[0], drive, period_of_drive) or _gap(names[1], position, period)
     begin = max(drive.stamps[0], position.stamps[0])
     end = min(drive.stamps[-1], position.stamps[-1])
     inside = position.stamps[(position.stamps >= begin) & (position.stamps <= end)]
@@ -110,6 +131,7 @@ def uniform_recording(
         start_time=float(origin) / 1e9,
         stamped=_at_own_stamps(drive, position, int(origin), period, driven_by),
         driven_by=driven_by,
+        gap="" if gap is None else refusal_of(gap),
     )
 
 

@@ -11,8 +11,8 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.identification.published.breakaway import (
     _last_within,
     _onset,
-    _runs,
     find_breakaways,
+    runs_of,
 )
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
 from valve_friction_ros.signals.noise import position_noise, velocity_noise
@@ -117,7 +117,7 @@ def test_from_rest_under_noise(seed):
     ],
 )
 def test_runs(active, runs):
-    assert [tuple(run) for run in _runs(np.array(active, dtype=bool))] == runs
+    assert [tuple(run) for run in runs_of(np.array(active, dtype=bool))] == runs
 
 
 def test_the_last_sample_within_a_mark():

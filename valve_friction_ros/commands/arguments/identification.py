@@ -21,8 +21,9 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=[*METHODS],
         default=DEFAULT_METHOD,
-        help="refined, published: several fast strokes; signature: two periods or more "
-        "of a slow triangle; robust: records of a plant, experimental (%(default)s)",
+        help="best: robust wherever it applies; robust: imperfections of a plant in the fit; "
+        "refined: the Karnopp model alone; published: the paper's model 1; signature: model 2, two "
+        "periods or more of a slow triangle (%(default)s)",
     )
     parser.add_argument(
         "--fix",
@@ -48,7 +49,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         "--timing-uncertainty",
         type=float,
         metavar="S",
-        help="standard deviation in s of each lag between the signals, for the method robust; "
+        help="standard deviation in s of each lag between the signals, of the method robust; "
         f"by default {TIMING_UNCERTAINTY:g}",
     )
     parser.add_argument(

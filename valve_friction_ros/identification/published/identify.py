@@ -20,6 +20,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_enough_samples,
     require_motion,
     require_two_directions,
+    require_unbroken,
 )
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -148,6 +149,7 @@ def published_fit(
 ) -> PublishedFit:
     """Identify as `published_estimate` does, and return the regression too."""
     warnings: list[str] = []
+    require_unbroken(record)
     require_enough_samples(record, settings.published_window)
     derivatives = record.derivatives(settings.published_window, settings.order)
     require_motion(record)

@@ -32,6 +32,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_stem_between_stops,
     require_travel,
     require_two_directions,
+    require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
 from valve_friction_ros.identification.trust.verdict import Parameter
@@ -85,6 +86,7 @@ def identify_refined(
     """
     settings = settings or IdentificationSettings()
     record = measured(recording)
+    require_unbroken(record)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
     require_two_directions(record, settings.published_window)

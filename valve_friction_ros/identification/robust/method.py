@@ -28,7 +28,7 @@ from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import measured
 
-__all__ = ["METHOD", "TIMING_UNCERTAINTY", "identify_robust"]
+__all__ = ["METHOD", "TIMING_UNCERTAINTY", "has_no_place_for", "identify_robust"]
 
 METHOD = "robust"
 """Name of this method."""
@@ -46,8 +46,7 @@ def identify_robust(
 
     The most probable model is found where each imperfection (lags, curved spring, friction that
     changes, …) has a Gaussian prior about zero. An imperfection that the record does not determine
-    widens every interval that depends on it. Experimental: a lag on a square wave can still give
-    confidently wrong numbers.
+    widens every interval that depends on it.
 
     Parameters
     ----------
@@ -72,7 +71,8 @@ def identify_robust(
         If the record does not determine the friction; the message names cause and remedy.
     """
     settings = settings or IdentificationSettings()
-    _require_fit(settings)
+    if unfit := has_no_place_for(settings):
+        raise RefusalError(f"the method robust has no place for {unfit}: use the method refined")
     _require_record(recording, valve, settings)
     record = _stamped(recording)
     fit = search(fitted_record(record, valve), _prior(settings))
@@ -112,14 +112,13 @@ def identify_robust(
     )
 
 
-def _require_fit(settings: IdentificationSettings) -> None:
-    """Refuse settings that this fit has no place for."""
+def has_no_place_for(settings: IdentificationSettings) -> str:
+    """Return the setting that this fit has no place for; empty if there is none."""
     if settings.fixed.get("spring_constant") == 0.0:
-        raise RefusalError("the robust fit needs a spring: use the method refined")
+        return "a machine without a spring"
     if settings.position_bias is not None:
-        raise RefusalError("the robust fit takes no position bias: use the method refined")
-    if "static_friction" in settings.fixed:
-        raise RefusalError("the robust fit takes no fixed F_s: use the method refined")
+        return "a known position bias"
+    return "a known static friction" if "static_friction" in settings.fixed else ""
 
 
 def _require_record(recording: Recording, valve: Valve, settings: IdentificationSettings) -> None:

@@ -27,6 +27,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_motion,
     require_related_signals,
     require_travel,
+    require_unbroken,
 )
 from valve_friction_ros.identification.trust.jackknife import Jackknife, jackknife
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
@@ -123,6 +124,7 @@ def identify_signature(
     if settings.fixed.get("spring_constant") == 0:
         raise RefusalError("the force balance needs a spring: use the method refined")
     record = measured(recording)
+    require_unbroken(record)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
     require_travel(record, valve)

@@ -21,6 +21,7 @@ __all__ = [
     "require_stem_between_stops",
     "require_travel",
     "require_two_directions",
+    "require_unbroken",
 ]
 
 _LEAST_WINDOWS = 10
@@ -107,6 +108,12 @@ def require_enough_samples(recording: Recording, window: int) -> None:
             f"the record is too short: {len(recording)} samples ({recording.duration:.3g} s), "
             f"at least {least} are needed; record longer or sample faster"
         )
+
+
+def require_unbroken(recording: Recording) -> None:
+    """Refuse a recording with a gap."""
+    if recording.gap:
+        raise RefusalError(recording.gap)
 
 
 def require_motion(recording: Recording) -> None:

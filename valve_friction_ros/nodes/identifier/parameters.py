@@ -9,6 +9,7 @@ from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     FIXABLE,
     METHODS,
+    TIMING_UNCERTAINTY,
     UNITS,
     IdentificationSettings,
 )
@@ -87,9 +88,9 @@ CHANGEABLE = (
     ParameterSpec(
         "method",
         DEFAULT_METHOD,
-        "Method of identification [-]: refined, for several fast strokes; published, where refined "
-        "starts from; signature, for two periods of a slow triangle within the window; robust, "
-        "experimental, for jittered stamps and other imperfections of a plant",
+        "Method of identification [-]: best, robust wherever it applies; robust, with the "
+        "imperfections of a plant in the fit; refined, with the Karnopp model alone; published, "
+        "where refined starts from; signature, for two periods of a slow triangle in the window",
         choices=tuple(METHODS),
     ),
     ParameterSpec(
@@ -98,6 +99,13 @@ CHANGEABLE = (
         "Length d of the derivative window [samples], odd; 0: 31 for the published estimate, and "
         "chosen from the noise of each record for the refined result",
         (0, 100_001),
+    ),
+    ParameterSpec(
+        "timing_uncertainty",
+        math.nan,
+        "Standard deviation of each lag between the signals [s]: clocks, damping of transmitters, "
+        f"a volume before the diaphragm; .nan: {TIMING_UNCERTAINTY:g}, a plant without special "
+        "care; 0: the signals surely belong together",
     ),
     ParameterSpec(
         "polynomial_order", _DEFAULTS.order, "Order n of the derivative polynomial [-]", (2, 20)
@@ -158,6 +166,7 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
             fixed={name: value for name, value in fixed.items() if value is not None},
             position_bias=optional(values["position_bias"]),
             assumed_mass=values["assumed_mass"],
+            timing_uncertainty=optional(values["timing_uncertainty"]),
         ),
         method=values["method"],
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),

@@ -10,7 +10,7 @@ from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, Top
 from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.streams.joint_position import joint_position, only_joint
 from valve_friction_ros.streams.record_buffer import RecordBuffer
-from valve_friction_ros.streams.uniform_grid import GapError, uniform_recording
+from valve_friction_ros.streams.uniform_grid import uniform_recording
 
 __all__ = ["ValveFeed"]
 
@@ -112,7 +112,9 @@ class ValveFeed:
                 f"bad samples: {snapshot.causes()}: use a stretch of the record without them"
             )
         names = (str(self._topics.pressure), str(self._topics.stem))
-        try:
-            return uniform_recording(snapshot.pressure, snapshot.position, names)
-        except GapError as gap:
-            raise RefusalError(f"{gap.what}: use a stretch of the record without it") from None
+        return uniform_recording(
+            snapshot.pressure,
+            snapshot.position,
+            names,
+            refusal_of=lambda gap: f"{gap.what}: use a stretch of the record without it",
+        )
