@@ -185,20 +185,20 @@ def run_stem(
     grip: _Signal = None,
     anew: _Signal = None,
     leaving: _Signal = None,
-) -> None:
+) -> int:
     """Step through `forces` (actuator less preload, N) from the state at sample 0.
 
     Rest and sliding over several samples take short cuts; `advance_stem` steps all samples between
     them, and so every sample with an event. `grip` (N) is added to the Coulomb and the static
     friction of each sample. Where `anew` is a number, the stem is set to that place (m) and to the
-    velocity `leaving` (m/s).
+    velocity `leaving` (m/s). The samples that took no short cut are counted and returned.
     """
     up, down = sliding_map(upward, period), sliding_map(downward, period)
     steps_up, steps_down = chord_ladder(upward, period), chord_ladder(downward, period)
     is_quick = has_short_cut(upward, period) and has_short_cut(downward, period)
     falls = upward.stribeck_velocity > 0.0
     sample = 0
-    for _ in range(forces.size):
+    for stepped in range(forces.size):
         at, velocity = positions[sample], velocities[sample]
         side = 1.0 if velocity > 0 else -1.0
         way = upward if velocity > 0 else downward
@@ -215,7 +215,7 @@ def run_stem(
             slide = up if velocity > 0 else down
             sample = _slide_on(sample, side, way, slide, forces, grip, anew, positions, velocities)
         if sample == forces.size - 1:
-            return
+            return stepped
         if anew is not None and leaving is not None and not np.isnan(anew[sample + 1]):
             positions[sample + 1], velocities[sample + 1] = anew[sample + 1], leaving[sample + 1]
         else:

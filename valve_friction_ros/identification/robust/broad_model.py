@@ -31,6 +31,9 @@ ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
 _LARGEST_COARSENESS = 10.0
 """Of the imperfections but the timing, whose changes are wide already."""
 
+_STEPPED = 30
+"""Time of a step with an event over that of one that takes a short cut."""
+
 _STEP = 1e-5
 """Change of a main coordinate over its size by which to differentiate.
 
@@ -56,7 +59,7 @@ class BroadModel:
 
     and the friction, sliding or at rest, has in addition
 
-        (a·ξ + b·τ)·(F_c + F_v·|ẋ|) + e·F_c·exp(−|ẋ|/3 mm/s) .
+        (a·ξ + b·τ)·F_c + e·F_c·exp(−|ẋ|/3 mm/s) .
 
     Attributes
     ----------
@@ -90,7 +93,6 @@ class BroadModel:
             force,
             slow.place,
             slow.age,
-            slow.speed,
             self.slowness,
             record.anew,
             record.leaving,
@@ -113,6 +115,18 @@ class BroadModel:
         position, velocity = np.empty_like(force), np.empty_like(force)
         drive_stem(self.course(self.record.force), Place(**at), force, position, velocity)
         return Simulated(position, velocity)
+
+    def effort(self, at: Coordinates) -> int:
+        """Return the work of one simulation, in steps that take a short cut."""
+        force = np.empty_like(self.record.force)
+        stepped = drive_stem(
+            self.course(self.record.force),
+            Place(**at),
+            force,
+            np.empty_like(force),
+            np.empty_like(force),
+        )
+        return force.size + _STEPPED * stepped
 
     def readings(self, at: Coordinates) -> NDArray[np.float64]:
         """Return what the stem's sensor would read, m, a value a cell, by each half: (2, c)."""

@@ -34,10 +34,8 @@ class Course(NamedTuple):
         Actuator force, N.
     place, age : ndarray of float, shape (g,)
         Measured position and time, −1 to 1.
-    speed : ndarray of float, shape (g,)
-        Measured speed, m/s.
     slowness : ndarray of float, shape (g,)
-        exp(−speed/`LOW_SPEED`).
+        exp(−|ẋ|/`LOW_SPEED`) of the measured stem.
     anew, leaving : ndarray of float, shape (g,)
         Where the stem is set anew, m, nan elsewhere; its velocity there, m/s.
     """
@@ -49,7 +47,6 @@ class Course(NamedTuple):
     force: NDArray[np.float64]
     place: NDArray[np.float64]
     age: NDArray[np.float64]
-    speed: NDArray[np.float64]
     slowness: NDArray[np.float64]
     anew: NDArray[np.float64]
     leaving: NDArray[np.float64]
@@ -106,8 +103,11 @@ def drive_stem(
     force: NDArray[np.float64],
     positions: NDArray[np.float64],
     velocities: NDArray[np.float64],
-) -> None:
-    """Fill in the force less the preload (N), the positions (m) and the velocities (m/s)."""
+) -> int:
+    """Fill in the force less the preload (N), the positions (m) and the velocities (m/s).
+
+    Return what `run_stem` does.
+    """
     stiff = at.spring_constant * course.stroke
     curved, cubic = at.curvature * stiff, at.cubic * stiff
     drift = at.drift * course.span
@@ -130,8 +130,7 @@ def drive_stem(
             - cubic * place * (square - 0.6)
         )
         trend = at.along_travel * place + at.in_record * age
-        sliding = dry + viscous * course.speed[step]
-        grip[step] = trend * sliding + at.at_low_speed * dry * course.slowness[step]
+        grip[step] = dry * (trend + at.at_low_speed * course.slowness[step])
     side = min(max(at.viscous_asymmetry, -_LARGEST_ASYMMETRY), _LARGEST_ASYMMETRY)
     falling = at.stribeck_velocity if at.slip_force > 0.0 else 0.0
     static = dry + at.slip_force
@@ -142,7 +141,7 @@ def drive_stem(
     if travel < np.inf:
         positions[0] = min(max(at.start_position, 0.0), travel)
     velocities[0] = course.leaving[0]
-    run_stem(
+    return run_stem(
         force,
         course.period,
         upward,

@@ -1,7 +1,7 @@
 """Intervals of the reported numbers, and where they come from."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -115,38 +115,42 @@ def _chance(fit: PosteriorFit) -> float:
     return count + 2.0 * math.sqrt(2.0 * count)
 
 
-def estimated(fit: PosteriorFit) -> dict[str, Estimated]:
-    """Return the reported numbers with their intervals.
+def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
+    """Return the reported numbers with their intervals, of the best fit and its competitors.
 
-    Of the places that the fit came by, those count whose probability chance may have lowered. The
-    one with the least imperfections among them gives the values; the intervals reach to what the
-    others say, the less probable ones less far: along a bent valley the linear model at one place
-    sees too little. Where the residual is more than noise, the interval of the sliding friction
-    also holds what the measured signals alone say (`loop_friction`).
+    Of the places that the best fit came by, and of the ends of the others, those count whose
+    probability chance may have lowered. The one with the least imperfections among them gives the
+    values; the intervals reach to what the others say, the less probable ones less far: along a
+    bent valley the linear model at one place sees too little. Where the residual is more than
+    noise, the interval of the sliding friction also holds what the measured signals alone say
+    (`loop_friction`).
     """
-    costs = [one.misfit / fit.inflation + one.penalty for one in fit.stages]
+    fit = fits[0]
+    stages = [(fit, stage) for stage in fit.stages]
+    stages += [(other, other.stages[-1]) for other in fits[1:]]
+    costs = [stage.misfit / fit.inflation + stage.penalty for _, stage in stages]
     least, chance = min(costs), _chance(fit)
     places = [
-        (stage, cost - least)
-        for stage, cost in zip(fit.stages, costs, strict=True)
+        (*stage, cost - least)
+        for stage, cost in zip(stages, costs, strict=True)
         if cost - least < chance
     ]
-    places.sort(key=lambda place: place[0].penalty)
-    readings = [reported_numbers(fit.model, stage.at) for stage, _ in places]
+    places.sort(key=lambda place: place[1].penalty)
+    readings = [reported_numbers(fit.model, stage.at) for _, stage, _ in places]
     result = {}
     for name in REPORTED:
         first = readings[0][name]
-        width = _half_width(fit, places[0][0], first)
-        for (stage, behind), numbers in zip(places[1:], readings[1:], strict=True):
+        width = _half_width(*places[0][:2], first)
+        for (other, stage, behind), numbers in zip(places[1:], readings[1:], strict=True):
             near = math.sqrt(max(1.0 - behind / chance, 0.0))
             apart = abs(numbers[name].value - first.value)
-            width = max(width, near * (apart + 0.5 * _half_width(fit, stage, numbers[name])))
+            width = max(width, near * (apart + 0.5 * _half_width(other, stage, numbers[name])))
         if name == "sliding_friction":
             lost = fit.model.record.lost / fit.model.record.duration
             width = math.hypot(width, _LOST * lost * abs(first.value))
         if name == "sliding_friction" and fit.inflation > NOISE_LIKE:
-            apart = abs(loop_friction(fit.model, places[0][0].at) - first.value)
+            apart = abs(loop_friction(fit.model, places[0][1].at) - first.value)
             width = math.hypot(width, apart + _LOOP * abs(first.value))
         width = max(width, _FINEST.get(name, _FINEST_OTHER) * abs(first.value))
-        result[name] = Estimated(first.value, width, _budget(fit, places[0][0], first))
+        result[name] = Estimated(first.value, width, _budget(*places[0][:2], first))
     return result

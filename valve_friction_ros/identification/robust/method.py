@@ -75,8 +75,8 @@ def identify_robust(
         raise RefusalError(f"the method robust has no place for {unfit}: use the method refined")
     _require_record(recording, valve, settings)
     record = _stamped(recording)
-    fit = search(fitted_record(record, valve), _prior(settings))
-    numbers = estimated(fit)
+    fits = search(fitted_record(record, valve), _prior(settings))
+    fit, numbers = fits[0], estimated(fits)
     misfit = fit_misfit(fit, numbers)
     if misfit.is_gross:
         raise RefusalError(

@@ -61,7 +61,8 @@ def _weighted(values: NDArray[np.float64], speed: NDArray[np.float64]) -> float:
 def _sliding(model: BroadModel, at: Coordinates) -> ReportedNumber:
     """Return ∫|F_friction|·|dx| / ∫|dx| of the simulated stem."""
     slow = model.record.slow
-    speed = np.abs(model.simulate(at).velocity)
+    velocity = model.simulate(at).velocity
+    speed = np.abs(velocity)
     mean = _weighted(speed, speed)
     place, age = _weighted(slow.place, speed), _weighted(slow.age, speed)
     low = _weighted(np.exp(slow.speed / -3e-3), speed)
@@ -69,18 +70,18 @@ def _sliding(model: BroadModel, at: Coordinates) -> ReportedNumber:
     falling = 0.0
     if at["stribeck_velocity"] > 0:
         falling = _weighted(np.exp(-((speed / at["stribeck_velocity"]) ** 2)), speed)
-    plain = dry + viscous * mean
-    trend = at["along_travel"] * place + at["in_record"] * age
-    value = plain * (1 + trend) + at["at_low_speed"] * dry * low + at["slip_force"] * falling
+    share = 1 + at["along_travel"] * place + at["in_record"] * age + at["at_low_speed"] * low
+    value = dry * share + viscous * mean + at["slip_force"] * falling
     gradient = {
-        "coulomb_friction": 1 + trend + at["at_low_speed"] * low,
-        "viscous_friction": mean * (1 + trend),
-        "along_travel": place * plain,
-        "in_record": age * plain,
+        "coulomb_friction": share,
+        "viscous_friction": mean,
+        "along_travel": place * dry,
+        "in_record": age * dry,
         "at_low_speed": dry * low,
         "slip_force": falling,
     }
-    return ReportedNumber(value, gradient, 0.0)
+    net = abs(float(np.sum(velocity))) / max(float(np.sum(speed)), np.finfo(float).tiny)
+    return ReportedNumber(value, gradient, _ASYMMETRY * dry * net)
 
 
 def reported_numbers(model: BroadModel, at: Coordinates) -> dict[str, ReportedNumber]:

@@ -12,7 +12,7 @@ from valve_friction_ros.identification.robust.fitted_record import (
     FittedRecord,
     set_anew_at_rests,
 )
-from valve_friction_ros.identification.robust.imperfections import deviations
+from valve_friction_ros.identification.robust.imperfections import TIMING, deviations
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, fit
 
 __all__ = ["Prior", "search"]
@@ -43,8 +43,11 @@ A count and not a time, so that the answer does not depend on the machine."""
 _COARSENESS = 100.0
 """Of the derivatives until a fit is near its end."""
 
-_CHORDS = 20
-"""Time of a simulation in which friction falls with speed over that of one in which it does not."""
+_FEWEST_STEPS = 2
+_TRADED = (0.0, 0.35, 0.7, 1.0)
+"""Shares of the whole delay that are given to the viscous friction."""
+
+_SAME_DELAY = 0.1
 
 _TRIED = 2
 _FEW_STEPS = 6
@@ -188,10 +191,13 @@ class _Search:
         model: BroadModel | None = None,
     ) -> PosteriorFit:
         """Fit from a start, and count the work."""
-        start = {**start, **self.known}
-        found = fit(model or self.model, start, names, self.spread, self.centre, steps)
-        slow = _CHORDS if found.at["stribeck_velocity"] > 0 else 1
-        self.work += len(found.stages) * 2 * len(names) * self.model.record.force.size * slow
+        start, model = {**start, **self.known}, model or self.model
+        a_step = 2 * len(names) * model.effort(start)
+        allowed = (_MOST_WORK - self.work) // a_step
+        found = fit(
+            model, start, names, self.spread, self.centre, max(min(steps, allowed), _FEWEST_STEPS)
+        )
+        self.work += len(found.stages) * a_step
         return found
 
     def full(self, start: Coordinates, *more: str) -> PosteriorFit:
@@ -266,6 +272,40 @@ class _Search:
         dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
         return self.full(_nearest(self.model, dead)[0])
 
+    def traded(self, best: PosteriorFit) -> list[PosteriorFit]:
+        """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
+
+        The two trade places along a valley that is too bent for the linear model at its deepest
+        point.
+        """
+        timing = [name for name in TIMING if name in best.names]
+        if not timing or "viscous_friction" not in best.names:
+            return []
+        at, spring = best.at, best.at["spring_constant"]
+        own = at["viscous_friction"] / spring
+        whole = own + sum(at[name] for name in timing)
+        names = tuple(name for name in best.names if name != "viscous_friction")
+        found = []
+        for share in _TRADED:
+            delay = max(share * whole, 0.0)
+            if abs(delay - own) < _SAME_DELAY * max(whole, own):
+                continue
+            lag = at["force_lag"] + own - delay
+            start = {**at, "viscous_friction": spring * delay, "force_lag": lag}
+            found.append(self.fit(start, names, _FEW_STEPS, self.exact))
+        return found
+
+    def all_probable(self) -> list[PosteriorFit]:
+        """Return the most probable fit, and those with which it competes."""
+        best = self.best()
+        others = self.traded(best)
+        nearest = min(others, key=lambda one: one.objective, default=best)
+        if nearest.objective < best.objective - 1.0:
+            deeper = self.fit(nearest.at, best.names, _MORE_STEPS, self.exact)
+            if deeper.objective < best.objective:
+                best, others = deeper, [*others, best]
+        return [best, *others]
+
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
         starts = [{**self.base, **_split(self.sliding, share)} for share in _DRY_SHARES]
@@ -281,8 +321,8 @@ class _Search:
         return best
 
 
-def search(record: FittedRecord, prior: Prior) -> PosteriorFit:
-    """Find the most probable model of a record.
+def search(record: FittedRecord, prior: Prior) -> list[PosteriorFit]:
+    """Find the most probable model of a record, and the ones that compete with it.
 
     The sliding friction of a regression is split into F_c and F_v in several ways; the way whose
     simulated stem is nearest starts a fit of the Karnopp model alone, and that a fit with all
@@ -294,4 +334,4 @@ def search(record: FittedRecord, prior: Prior) -> PosteriorFit:
     RefusalError
         If the stem does not follow the force.
     """
-    return _Search(record, prior).best()
+    return _Search(record, prior).all_probable()

@@ -33,6 +33,11 @@ _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction")
 """What a friction that falls with speed has in other proportions at higher speeds."""
 
 _TWO = 2.0
+_SURE_SLIP = 2.0
+_LEAST_SLIP = 0.03
+"""Slip force over the half width of F_s, and over F_s, above which F_s is reported.
+
+The slip force cannot be negative, so that noise alone makes it positive."""
 
 
 def fit_misfit(fit: PosteriorFit, numbers: Mapping[str, Estimated]) -> Misfit:
@@ -106,5 +111,5 @@ def _slow_doubt(fit: PosteriorFit) -> str:
 
 
 def _slips(fit: PosteriorFit, static: Estimated) -> bool:
-    """Return whether F_s lies above F_c by more than its interval."""
-    return fit.at["slip_force"] > max(static.half_width, 0.01 * static.value)
+    """Return whether F_s lies above F_c by more than what chance and its bound at F_c explain."""
+    return fit.at["slip_force"] > max(_SURE_SLIP * static.half_width, _LEAST_SLIP * static.value)
