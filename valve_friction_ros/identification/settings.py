@@ -56,10 +56,10 @@ class IdentificationSettings:
     assumed_mass : float
         Mass, kg, above zero; used where the record does not determine the mass.
     timing_uncertainty : float, optional
-        Standard deviation, s, of each time by which one signal may lag the other: clocks, damping
-        of transmitters, a volume before the diaphragm. Only the method ``robust`` uses it, by
-        default 0.03 s, a plant without special care; zero, as on the bench, means that the signals
-        certainly belong together.
+        Standard deviation, s, of the whole time by which one signal may lag the other: clocks,
+        damping of transmitters, a volume before the diaphragm. Only the method ``robust`` uses it,
+        by default 0.04 s, a plant without special care; zero, as on the bench, means that the
+        signals certainly belong together.
 
     Raises
     ------

@@ -49,7 +49,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         "--timing-uncertainty",
         type=float,
         metavar="S",
-        help="standard deviation in s of each lag between the signals, of the method robust; "
+        help="standard deviation in s of the whole lag between the signals, of the method robust; "
         f"by default {TIMING_UNCERTAINTY:g}",
     )
     parser.add_argument(

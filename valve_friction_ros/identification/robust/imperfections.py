@@ -4,6 +4,7 @@ Each is a coordinate with a Gaussian prior about zero. Where the record does not
 prior remains, and shows in every interval that depends on it.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -79,8 +80,8 @@ def deviations(
 ) -> dict[str, float]:
     """Return the standard deviation of each prior in the coordinate's own unit.
 
-    Each source of a lag has `timing_uncertainty` for itself: a single slow sensor may be all there
-    is. Without one they are left out.
+    `timing_uncertainty` is that of the whole lag between the signals; its sources share it alike.
+    Without one they are left out.
     """
     own = {name: one.deviation for name, one in IMPERFECTIONS.items()}
     own["mass"] *= assumed_mass
@@ -88,7 +89,7 @@ def deviations(
     own["drift"] *= max(minutes, 0.1)
     for name in TIMING:
         if timing_uncertainty > 0:
-            own[name] *= timing_uncertainty
+            own[name] *= timing_uncertainty / math.sqrt(len(TIMING))
         else:
             del own[name]
     return own

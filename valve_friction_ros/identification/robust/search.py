@@ -61,7 +61,7 @@ class Prior:
     Attributes
     ----------
     timing_uncertainty : float
-        Standard deviation of the time by which one signal may lag the other, s.
+        Standard deviation of the time by which one signal may lag the other in all, s.
     mass : float
         Mass to be expected, kg.
     fixed : mapping of str to float

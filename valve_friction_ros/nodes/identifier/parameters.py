@@ -103,7 +103,7 @@ CHANGEABLE = (
     ParameterSpec(
         "timing_uncertainty",
         math.nan,
-        "Standard deviation of each lag between the signals [s]: clocks, damping of transmitters, "
+        "Standard deviation of the whole lag between the signals [s]: clocks, damping of transmitters, "
         f"a volume before the diaphragm; .nan: {TIMING_UNCERTAINTY:g}, a plant without special "
         "care; 0: the signals surely belong together",
     ),
