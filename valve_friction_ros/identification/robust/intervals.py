@@ -129,7 +129,7 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
     stages = [(fit, stage) for stage in fit.stages]
     stages += [(other, other.stages[-1]) for other in fits[1:]]
     costs = [stage.misfit / fit.inflation + stage.penalty for _, stage in stages]
-    least, chance = min(costs), _chance(fit)
+    least, chance = min(costs), _chance(fit) * fit.inflation
     places = [
         (*stage, cost - least)
         for stage, cost in zip(stages, costs, strict=True)

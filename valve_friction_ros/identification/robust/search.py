@@ -44,10 +44,11 @@ _COARSENESS = 100.0
 """Of the derivatives until a fit is near its end."""
 
 _FEWEST_STEPS = 2
-_TRADED = (0.0, 0.35, 0.7, 1.0)
-"""Shares of the whole delay that are given to the viscous friction."""
-
-_SAME_DELAY = 0.1
+_TRADED = 2
+_TRADED_STEPS = 3
+_IMPROBABLE = 25.0
+"""Steps of half the timing uncertainty along that valley, steps of a fit there, and the rise of the
+sum of squares after which the valley is left."""
 
 _TRIED = 2
 _FEW_STEPS = 6
@@ -150,6 +151,7 @@ class _Search:
 
     def __init__(self, record: FittedRecord, prior: Prior) -> None:
         self.work = 0
+        self.prior = prior
         self.sliding = _sliding(record)
         self.exact = BroadModel(record, self.sliding.spring_constant)
         self.model = replace(self.exact, coarseness=_COARSENESS)
@@ -276,23 +278,34 @@ class _Search:
         """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
 
         The two trade places along a valley that is too bent for the linear model at its deepest
-        point.
+        point. Both ways along it the fit goes as far as the timing is uncertain, or until it is
+        improbable.
         """
-        timing = [name for name in TIMING if name in best.names]
-        if not timing or "viscous_friction" not in best.names:
+        lag = self.prior.timing_uncertainty
+        if lag == 0.0 or "viscous_friction" not in best.names:
             return []
-        at, spring = best.at, best.at["spring_constant"]
-        own = at["viscous_friction"] / spring
-        whole = own + sum(at[name] for name in timing)
-        names = tuple(name for name in best.names if name != "viscous_friction")
+        names = tuple(
+            name
+            for name in best.names
+            if name in (*MAIN, *TIMING, "mass", "slip_force") and name != "viscous_friction"
+        )
         found = []
-        for share in _TRADED:
-            delay = max(share * whole, 0.0)
-            if abs(delay - own) < _SAME_DELAY * max(whole, own):
-                continue
-            lag = at["force_lag"] + own - delay
-            start = {**at, "viscous_friction": spring * delay, "force_lag": lag}
-            found.append(self.fit(start, names, _FEW_STEPS, self.exact))
+        for way in (-0.5, 0.5):
+            last = best
+            for _ in range(_TRADED):
+                own = last.at["viscous_friction"] / last.at["spring_constant"]
+                delay = max(own + way * lag, 0.0)
+                if not (delay != own and self.may_go_on):
+                    break
+                start = {
+                    **last.at,
+                    "viscous_friction": last.at["spring_constant"] * delay,
+                    "force_lag": last.at["force_lag"] + own - delay,
+                }
+                last = self.fit(start, names, _TRADED_STEPS, self.exact)
+                found.append(last)
+                if last.objective - best.objective > _IMPROBABLE * best.inflation**2:
+                    break
         return found
 
     def all_probable(self) -> list[PosteriorFit]:

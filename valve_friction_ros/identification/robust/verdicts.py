@@ -34,7 +34,7 @@ _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction")
 
 _TWO = 2.0
 _SURE_SLIP = 2.0
-_LEAST_SLIP = 0.03
+_LEAST_SLIP = 0.1
 """Slip force over the half width of F_s, and over F_s, above which F_s is reported.
 
 The slip force cannot be negative, so that noise alone makes it positive."""

@@ -103,9 +103,9 @@ CHANGEABLE = (
     ParameterSpec(
         "timing_uncertainty",
         math.nan,
-        "Standard deviation of the whole lag between the signals [s]: clocks, damping of transmitters, "
-        f"a volume before the diaphragm; .nan: {TIMING_UNCERTAINTY:g}, a plant without special "
-        "care; 0: the signals surely belong together",
+        "Standard deviation of the whole lag between the signals [s]: clocks, transmitters, a "
+        f"volume before the diaphragm; .nan: {TIMING_UNCERTAINTY:g}, a plant without special care; "
+        "0: the signals surely belong together",
     ),
     ParameterSpec(
         "polynomial_order", _DEFAULTS.order, "Order n of the derivative polynomial [-]", (2, 20)
