@@ -20,6 +20,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_stem_between_stops,
     require_travel,
     require_two_directions,
+    require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -138,6 +139,7 @@ def _stamped(recording: Recording) -> StampedRecord:
     """Return the samples at their own stamps, or on the grid where there are no others."""
     if recording.stamped is not None:
         return recording.stamped
+    require_unbroken(recording)
     time = recording.time
     return StampedRecord(
         StampedSignal(time, recording.drive),

@@ -44,10 +44,10 @@ _COARSENESS = 100.0
 """Of the derivatives until a fit is near its end."""
 
 _FEWEST_STEPS = 2
-_TRADED = 2
-_TRADED_STEPS = 3
+_TRADED = 4
+_TRADED_STEPS = 6
 _IMPROBABLE = 25.0
-"""Steps of half the timing uncertainty along that valley, steps of a fit there, and the rise of the
+"""Steps of a quarter of the timing uncertainty along that valley, steps of a fit there, and the rise of the
 sum of squares after which the valley is left."""
 
 _TRIED = 2
@@ -290,7 +290,7 @@ class _Search:
             if name in (*MAIN, *TIMING, "mass", "slip_force") and name != "viscous_friction"
         )
         found = []
-        for way in (-0.5, 0.5):
+        for way in (-0.25, 0.25):
             last = best
             for _ in range(_TRADED):
                 own = last.at["viscous_friction"] / last.at["spring_constant"]

@@ -6,9 +6,14 @@ from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS
 from valve_friction_ros.identification.robust.intervals import Budget
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
 
-__all__ = ["found_imperfections", "main_doubt"]
+__all__ = ["found_imperfections", "main_doubt", "slips"]
 
 _SURE = 3.0
+_LEAST_SLIP = 0.1
+"""Slip force over F_s above which there is a slip jump.
+
+The slip force cannot be negative, so that noise alone makes it positive."""
+
 _LEAST = {
     "along_travel": 0.01,
     "in_record": 0.01,
@@ -28,6 +33,8 @@ _SHARE = 0.2
 
 
 def _deviation(fit: PosteriorFit, name: str) -> float:
+    if name not in fit.names:
+        return 0.0
     index = fit.names.index(name)
     return math.sqrt(max(float(fit.stages[-1].covariance[index, index]), 0.0))
 
@@ -47,10 +54,18 @@ def _size(name: str, value: float) -> str:
     return f"{100 * value:.2g} %"
 
 
+def slips(fit: PosteriorFit) -> bool:
+    """Return whether F_s lies above F_c by more than what chance and its bound at F_c explain."""
+    static = fit.at["coulomb_friction"] + fit.at["slip_force"]
+    return fit.at["slip_force"] > max(_SURE * _deviation(fit, "slip_force"), _LEAST_SLIP * static)
+
+
 def found_imperfections(fit: PosteriorFit) -> tuple[str, ...]:
     """Return a sentence for each imperfection that surely is there, the surest first."""
     found = []
     for name in fit.names:
+        if name == "slip_force" and not slips(fit):
+            continue
         least = _LEAST.get(name, 1e-3 if name in TIMING else math.inf)
         value, deviation = fit.at[name], _deviation(fit, name)
         if abs(value) > least and abs(value) > _SURE * deviation:

@@ -7,7 +7,7 @@ import numpy as np
 
 from valve_friction_ros.identification.robust.intervals import NOISE_LIKE, Estimated
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
-from valve_friction_ros.identification.robust.sentences import main_doubt
+from valve_friction_ros.identification.robust.sentences import main_doubt, slips
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.limits import FALL_SPEED, NO_SLIP
 from valve_friction_ros.identification.trust.misfit import Misfit
@@ -33,11 +33,6 @@ _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction")
 """What a friction that falls with speed has in other proportions at higher speeds."""
 
 _TWO = 2.0
-_SURE_SLIP = 2.0
-_LEAST_SLIP = 0.1
-"""Slip force over the half width of F_s, and over F_s, above which F_s is reported.
-
-The slip force cannot be negative, so that noise alone makes it positive."""
 
 
 def fit_misfit(fit: PosteriorFit, numbers: Mapping[str, Estimated]) -> Misfit:
@@ -92,7 +87,7 @@ def fit_verdicts(
                 "inertia is too small a part of the force to be seen; "
                 f"{settings.assumed_mass:g} kg assumed",
             )
-        elif name == "static_friction" and not _slips(fit, one):
+        elif name == "static_friction" and not (slips(fit) and fit.at["slip_force"] > width):
             verdicts[name] = not_identifiable(name, NO_SLIP)
         else:
             verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason)
@@ -108,8 +103,3 @@ def _slow_doubt(fit: PosteriorFit) -> str:
         f"holds up to {top * 1e3:.2g} mm/s, the fastest here: "
         f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
     )
-
-
-def _slips(fit: PosteriorFit, static: Estimated) -> bool:
-    """Return whether F_s lies above F_c by more than what chance and its bound at F_c explain."""
-    return fit.at["slip_force"] > max(_SURE_SLIP * static.half_width, _LEAST_SLIP * static.value)
