@@ -217,7 +217,9 @@ class TestGaps:
             if enough:
                 assert uniform_recording(*signals).gap.startswith(f"gap of 0.09 s in {gappy}")
             else:
-                with pytest.raises(RefusalError, match=rf"^gap of 0\.091 s in {gappy}.*record again$"):
+                with pytest.raises(
+                    RefusalError, match=rf"^gap of 0\.091 s in {gappy}.*record again$"
+                ):
                     uniform_recording(*signals)
 
     def test_a_year_is_refused_before_its_grid_is_made(self):
