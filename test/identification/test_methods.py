@@ -1,6 +1,5 @@
 """The choice of a method, and what each makes of a record with a gap."""
 
-
 import numpy as np
 import pytest
 
