@@ -56,7 +56,7 @@ def read_recording(
     ValueError
         If the source cannot be read, a column is missing, or the bag holds no such valve.
     RefusalError
-        If the samples do not make a record, for example because of a gap.
+        If the samples do not make a record. A gap makes one: see `Recording.gap`.
 
     Examples
     --------

@@ -10,6 +10,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
     identify_refined,
+    identify_robust,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -40,8 +41,10 @@ def healthy():
 
 
 def refused(recording, message, noise=NOISE):
-    with pytest.raises(RefusalError, match=message):
-        identify_refined(noise.applied_to(recording), BENCH_VALVE, SETTINGS)
+    """Both methods that the default chooses from refuse it alike."""
+    for identify in (identify_refined, identify_robust):
+        with pytest.raises(RefusalError, match=message):
+            identify(noise.applied_to(recording), BENCH_VALVE, SETTINGS)
 
 
 def test_the_healthy_record_passes(healthy):

@@ -251,6 +251,11 @@ class TestSensorNoise:
         np.testing.assert_array_equal(seen(1).pressure, seen(1).pressure)
         assert not np.array_equal(seen(1).position, seen(2).position)
 
+    def test_a_gap_stays_one(self, clean):
+        noise = SensorNoise(1e-5, 100.0)
+        assert noise.applied_to(dataclasses.replace(clean, gap="gap of 1 s")).gap == "gap of 1 s"
+        assert noise.applied_to(clean).gap == ""
+
     def test_each_sensor_by_itself(self, clean):
         """The noise of one sensor does not depend on whether the other has any."""
         both = SensorNoise(1e-5, 100.0, 1).applied_to(clean)

@@ -245,8 +245,20 @@ class TestBadSamples:
         messages = [
             message for message in with_pressure() if not 10 < (message[2] - START) / 1e6 < 30
         ]
+        recording = only(write_bag(tmp_path / "bag", messages)).recording()
+        assert recording.gap == (
+            "gap of 0.02 s in /fv_101/actuator_pressure, 0.010 s after its first sample: use a "
+            "stretch of the record without it"
+        )
+        assert len(recording) == 50
+        assert recording.stamped.drive.time.size == 31
+
+    def test_more_gap_than_samples(self, tmp_path):
+        messages = [
+            message for message in with_pressure() if not 10 < (message[2] - START) / 1e6 < 40
+        ]
         assert problem(write_bag(tmp_path / "bag", messages)) == (
-            ", /fv_101: gap of 0.02 s in /fv_101/actuator_pressure, 0.010 s after its first "
+            ", /fv_101: gap of 0.03 s in /fv_101/actuator_pressure, 0.010 s after its first "
             "sample: use a stretch of the record without it"
         )
 

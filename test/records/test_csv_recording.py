@@ -383,19 +383,28 @@ class TestTimes:
     def test_gap(self, write):
         """From row 12 on, the samples come 20 ms later: 21 periods without one."""
         late = TIME + 0.02 * (np.arange(40) >= 10)
-        assert refused(write([HEADER, *rows(late, POSITION, PRESSURE)])) == (
+        record = read_csv(write([HEADER, *rows(late, POSITION, PRESSURE)]), BENCH_VALVE)
+        assert record.gap == (
             "row 12, column 'time_s': gap of 0.021 s: use a stretch of the record without it"
         )
+        assert len(record) == 60
+        np.testing.assert_array_equal(record.stamped.position.value, POSITION)
 
-    def test_a_gap_is_a_refusal_of_the_record(self, write):
-        late = TIME + 0.02 * (np.arange(40) >= 10)
+    def test_more_gap_than_samples_is_a_refusal_of_the_record(self, write):
+        late = TIME + 0.04 * (np.arange(40) >= 10)
+        path = write([HEADER, *rows(late, POSITION, PRESSURE)])
         with pytest.raises(RefusalError):
-            read_csv(write([HEADER, *rows(late, POSITION, PRESSURE)]), BENCH_VALVE)
+            read_csv(path, BENCH_VALVE)
+        assert refused(path) == (
+            "row 12, column 'time_s': gap of 0.041 s: use a stretch of the record without it"
+        )
 
     def test_ten_periods_are_no_gap(self, write):
         late = TIME + 0.009 * (np.arange(40) >= 10)
         path = write([HEADER, *rows(late, POSITION, PRESSURE)])
-        assert len(read_csv(path, BENCH_VALVE)) == 49
+        record = read_csv(path, BENCH_VALVE)
+        assert len(record) == 49
+        assert record.gap == ""
 
     def test_nanoseconds_taken_for_seconds(self, write):
         stamps = 1_700_000_000_000_000_000 + 1e9 * TIME

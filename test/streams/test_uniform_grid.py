@@ -1,5 +1,7 @@
 """Two stamped signals on one grid: exact where it can be, refused where it cannot."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,6 @@ from hypothesis.extra.numpy import arrays
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.streams import Samples, uniform_recording
-from valve_friction_ros.streams.uniform_grid import GapError
 
 EPS = np.finfo(float).eps
 MILLISECOND = 1_000_000
@@ -31,6 +32,15 @@ def pressure(seconds):
 
 def position(seconds):
     return 1e-3 - 4e-4 * seconds
+
+
+def gaps_of(drive, stem, refused=False):
+    """The gap that is put into words."""
+    named = []
+    with pytest.raises(RefusalError) if refused else nullcontext():
+        uniform_recording(drive, stem, refusal_of=lambda gap: named.append(gap) or str(gap))
+    (gap,) = named
+    return gap
 
 
 class TestUniformSignals:
@@ -163,34 +173,82 @@ class TestGaps:
             signal(every(1, 37), pressure), signal(self.with_pause(10), position)
         )
         assert len(record) == 37
+        assert record.gap == ""
         np.testing.assert_allclose(record.position, position(record.time), rtol=16 * EPS)
 
     @pytest.mark.parametrize("gappy", ["actuator_pressure", "stem_state"])
-    def test_more_is_refused_and_found(self, gappy):
+    def test_more_is_named_and_found(self, gappy):
         stamps = self.with_pause(10)
         stamps[8:] += 1
         whole, cut = signal(every(1, 37), pressure), signal(stamps, pressure)
-        with pytest.raises(GapError) as refusal:
-            uniform_recording(*((cut, whole) if gappy == "actuator_pressure" else (whole, cut)))
-        assert str(refusal.value) == (
+        signals = (cut, whole) if gappy == "actuator_pressure" else (whole, cut)
+        found = gaps_of(*signals)
+        assert uniform_recording(*signals).gap == str(found)
+        assert str(found) == (
             f"gap of 0.01 s in {gappy}, 0.007 s after its first sample: use a record without a "
             "gap, or clear the buffer and record again"
         )
-        assert refusal.value.sample == 8
-        assert refusal.value.seconds == 0.010000001
+        assert found.sample == 8
+        assert found.seconds == 0.010000001
+        assert found.share == pytest.approx(10 / 36, rel=1e-6)
+
+    def test_the_samples_around_it_keep_their_stamps(self):
+        stamps = self.with_pause(11)
+        record = uniform_recording(signal(every(1, 38), pressure), signal(stamps, position))
+        assert len(record) == 38
+        np.testing.assert_array_equal(record.stamped.position.time, (stamps - START) / 1e9)
+        np.testing.assert_array_equal(record.stamped.drive.value, record.pressure)
+
+    def test_both_signals_have_one(self):
+        """That of the pressure is named."""
+        cut = self.with_pause(11)
+        record = uniform_recording(signal(cut, pressure), signal(cut, position))
+        assert record.gap.startswith("gap of 0.011 s in actuator_pressure")
+
+    @pytest.mark.parametrize("gappy", ["actuator_pressure", "stem_state"])
+    @pytest.mark.parametrize("pauses", [1, 3])
+    def test_half_of_the_time_at_most(self, gappy, pauses):
+        """90 ms of samples stand beside each pause of 90 ms; one of 91 ms is refused."""
+        whole = signal(every(1, 181 * pauses + 1), pressure)
+        for length, enough in ((90, True), (91, False)):
+            steps = [0] + [1] * 80 * pauses + ([length] + [1] * 10) * pauses
+            cut = signal(START + MILLISECOND * np.cumsum(steps), position)
+            signals = (cut, whole) if gappy == "actuator_pressure" else (whole, cut)
+            if enough:
+                assert uniform_recording(*signals).gap.startswith(f"gap of 0.09 s in {gappy}")
+            else:
+                with pytest.raises(
+                    RefusalError, match=rf"^gap of 0\.091 s in {gappy}.*record again$"
+                ):
+                    uniform_recording(*signals)
+
+    def test_a_year_is_refused_before_its_grid_is_made(self):
+        stamps = np.concatenate((every(1, 500), every(1, 500, 365 * 24 * 3_600_000)))
+        with pytest.raises(RefusalError, match=r"^gap of 3\.15e\+07 s in actuator_pressure"):
+            uniform_recording(signal(stamps, pressure), signal(stamps, position))
+
+    def test_words_of_the_caller(self):
+        record = uniform_recording(
+            signal(self.with_pause(11), pressure),
+            signal(every(1, 38), position),
+            refusal_of=lambda gap: f"{gap.what}: choose a stretch",
+        )
+        assert record.gap == (
+            "gap of 0.011 s in actuator_pressure, 0.007 s after its first sample: choose a stretch"
+        )
 
     def test_of_the_longest(self):
         stamps = np.concatenate((every(1, 8), every(1, 8, 20), every(1, 8, 60), every(1, 8, 80)))
-        with pytest.raises(GapError) as refusal:
-            uniform_recording(signal(stamps, pressure), signal(every(1, 90), position))
-        assert refusal.value.sample == 16
-        assert refusal.value.seconds == 0.033
+        found = gaps_of(signal(stamps, pressure), signal(every(1, 90), position), refused=True)
+        assert found.sample == 16
+        assert found.seconds == 0.033
 
     def test_measured_in_periods_of_the_signal_itself(self):
         """A pause of 50 ms is a gap at 1 kHz, not at 100 Hz."""
         slow = np.delete(every(10, 30), [11, 12, 13, 14])
         record = uniform_recording(signal(slow, pressure), signal(every(1, 291), position))
         assert len(record) == 291
+        assert record.gap == ""
 
 
 class TestTooLittle:

@@ -93,4 +93,5 @@ class SensorNoise:
             recording.pressure + self.pressure * generator.standard_normal(size),
             recording.position + self.position * generator.standard_normal(size),
             recording.start_time,
+            gap=recording.gap,
         )

@@ -191,7 +191,7 @@ def read_csv(
     ValueError
         If the file cannot be read or holds an impossible value: file, row, cause and remedy.
     RefusalError
-        If there is only one sample.
+        If there is only one sample, or gaps take more than half of the time.
     """
     form, stretch = form or CsvFormat(), stretch or Stretch()
     columns, units = form.columns, form.units
@@ -211,7 +211,7 @@ def read_csv(
             (name, columns.position),
             driven_by,
             lambda gap: (
-                f"{table.place(gap.sample, columns.time)}: gap of {gap.seconds:.3g} s: use a "
+                f"{table.entry(gap.sample, columns.time)}: gap of {gap.seconds:.3g} s: use a "
                 "stretch of the record without it"
             ),
         )

@@ -146,11 +146,15 @@ class CsvTable:
         return CsvTable(self.path, self.layout, columns, self.samples[wanted])
 
     def place(self, sample: int, name: str) -> str:
-        """Return file, row (as a spreadsheet counts) and column of an entry."""
+        """Return file, row and column of an entry."""
+        return f"{self.path}: {self.entry(sample, name)}"
+
+    def entry(self, sample: int, name: str) -> str:
+        """Return row (as a spreadsheet counts) and column of an entry."""
         with _opened(self.path) as stream:
             rows = _rows(stream, self.layout)
             row, _ = next(itertools.islice(rows, int(self.samples[sample]), None))
-        return f"{self.path}: row {row}, column {name!r}"
+        return f"row {row}, column {name!r}"
 
     def require_finite(self) -> None:
         """Raise ValueError, with file, row and column, for the first entry that is not finite."""

@@ -18,6 +18,11 @@ _LARGEST_GAP = 10
 
 Chosen: at 100 Hz or faster such a pause is 0.1 s at most, short against a stroke."""
 
+_MOST_MISSING = 0.5
+"""Share of a signal's time in gaps above which no record is built.
+
+More than half of the grid would be interpolated, and the noise, a median, would be zero."""
+
 _ON_GRID = 1e-3
 """Distance of a stamp from the grid, as a share of its period, up to which the stamp is on it.
 
@@ -26,15 +31,16 @@ Chosen: at 1 kHz that is 1 µs, in which a stem at 0.1 m/s moves by 0.1 µm, bel
 
 @dataclass(frozen=True)
 class Gap:
-    """A pause of `seconds` in signal `name`, before its `sample`, `since_start` s after the first.
+    """The longest gap of signal `name`: `seconds` before `sample`, `since_start` s after the first.
 
-    As text it is a refusal with its remedy.
+    All its gaps take a `share` of its time. As text it is a refusal with its remedy.
     """
 
     name: str
     sample: int
     seconds: float
     since_start: float
+    share: float
 
     @property
     def what(self) -> str:
@@ -56,7 +62,8 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
     if pauses[longest] <= _LARGEST_GAP * period:
         return None
     since_start = float(samples.stamps[longest] - samples.stamps[0]) / 1e9
-    return Gap(name, longest + 1, float(pauses[longest]) / 1e9, since_start)
+    share = float(np.sum(pauses[pauses > _LARGEST_GAP * period]) / np.sum(pauses))
+    return Gap(name, longest + 1, float(pauses[longest]) / 1e9, since_start, share)
 
 
 def _period(name: str, samples: Samples) -> int:
@@ -104,11 +111,14 @@ def uniform_recording(
     Raises
     ------
     RefusalError
-        If a signal is empty, or the two do not overlap in time.
+        If a signal is empty, gaps take more than half of its time, or the two do not overlap.
     """
     period_of_drive = _period(names[0], drive)
     period = _period(names[1], position)
-    gap = _gap(names[0], drive, period_of_drive) or _gap(names[1], position, period)
+    either = _gap(names[0], drive, period_of_drive), _gap(names[1], position, period)
+    gaps = [gap for gap in either if gap is not None]
+    if gaps and (most := max(gaps, key=lambda gap: gap.share)).share > _MOST_MISSING:
+        raise RefusalError(refusal_of(most))
     begin = max(drive.stamps[0], position.stamps[0])
     end = min(drive.stamps[-1], position.stamps[-1])
     inside = position.stamps[(position.stamps >= begin) & (position.stamps <= end)]
@@ -131,7 +141,7 @@ def uniform_recording(
         start_time=float(origin) / 1e9,
         stamped=_at_own_stamps(drive, position, int(origin), period, driven_by),
         driven_by=driven_by,
-        gap="" if gap is None else refusal_of(gap),
+        gap=refusal_of(gaps[0]) if gaps else "",
     )
 
 

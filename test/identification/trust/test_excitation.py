@@ -13,8 +13,10 @@ from valve_friction_ros.identification.trust.excitation import (
     require_stem_between_stops,
     require_travel,
     require_two_directions,
+    require_unbroken,
 )
 from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.signals.measured_record import measured
 from valve_friction_ros.signals.noise import position_noise
 
 VALVE = Valve(0.0445, travel=0.02)
@@ -44,6 +46,13 @@ def test_ten_windows_are_enough():
         f"the record is too short: 29 samples ({record(np.zeros(29)).duration:.3g} s), "
         "at least 30 are needed; record longer or sample faster"
     )
+
+
+def test_a_gap_is_refused_in_its_own_words():
+    require_unbroken(record([0.0, 1e-3]))
+    broken = Recording(0.1, [0.0, 0.0], [0.0, 1e-3], gap="gap of 2 s: use another record")
+    assert refusal(require_unbroken, broken) == "gap of 2 s: use another record"
+    assert refusal(require_unbroken, measured(broken)) == "gap of 2 s: use another record"
 
 
 @pytest.mark.parametrize(("share", "moves"), [(1.01, True), (0.99, False)])

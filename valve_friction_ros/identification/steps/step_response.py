@@ -162,7 +162,7 @@ def step_test(
     input_signal : array_like of float, shape (n,)
         Command signal or pressure, any unit.
     position : array_like of float, shape (n,)
-        Stem position, any unit.
+        Stem position, any unit. Take both signals from a recording without a `gap`.
     sample_period : float
         Time between two samples, s.
     starts : sequence of int, optional

@@ -8,7 +8,11 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.identified_model import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.identification.trust.excitation import require_drive, require_motion
+from valve_friction_ros.identification.trust.excitation import (
+    require_drive,
+    require_motion,
+    require_unbroken,
+)
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
@@ -131,8 +135,8 @@ def validate(
     Raises
     ------
     RefusalError
-        If the stem did not move, or the model has no spring: the simulation of such a stem drifts
-        away from the record whatever the friction.
+        If the record has a gap, the stem did not move, or the model has no spring: the simulation
+        of such a stem drifts away from the record whatever the friction.
 
     Examples
     --------
@@ -158,6 +162,7 @@ def validate(
             "record of a valve with a spring"
         )
     record = measured(recording)
+    require_unbroken(record)
     require_motion(record)
     require_drive(record, valve)
     trajectory = simulate(

@@ -1,0 +1,179 @@
+"""The choice of a method, and what each makes of a record with a gap."""
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
+    METHODS,
+    TIMING_UNCERTAINTY,
+    IdentificationSettings,
+    RefusalError,
+    Verdict,
+    identify,
+    identify_refined,
+    identify_robust,
+    validate,
+)
+from valve_friction_ros.identification.refined import method as refined
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    HIGH_FRICTION,
+    Recording,
+    SensorNoise,
+    converter_response,
+    simulate,
+)
+from valve_friction_ros.streams import Samples, uniform_recording
+
+PERIOD = 1e-3
+DURATION = 42.0
+TRUTH = {
+    name: getattr(HIGH_FRICTION, name)
+    for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+}
+ONLY_REFINED = {
+    "a machine without a spring": IdentificationSettings(fixed={"spring_constant": 0.0}),
+    "a known position bias": IdentificationSettings(
+        position_bias=HIGH_FRICTION.spring_preload / HIGH_FRICTION.spring_constant
+    ),
+    "a known static friction": IdentificationSettings(
+        fixed={"static_friction": HIGH_FRICTION.static_friction}
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Random levels, held for 3 s each."""
+    levels = np.random.default_rng(3).uniform(5e4, 1.8e5, round(DURATION / 3))
+    pressure = converter_response(np.repeat(levels, round(3 / PERIOD)), PERIOD)
+    position = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, PERIOD).position
+    return SensorNoise(10e-6, 100.0).applied_to(Recording(PERIOD, pressure, position))
+
+
+def without(recording, begin, end, signals=("drive", "position")):
+    """Lose the samples of `signals` between two times, s."""
+    stamps = np.rint(recording.time * 1e9).astype(np.int64)
+    lost = (recording.time > begin) & (recording.time < end)
+    cut = []
+    for name in ("drive", "position"):
+        kept = ~lost if name in signals else np.full(lost.size, True)
+        cut.append(Samples(stamps[kept], getattr(recording, name)[kept]))
+    return uniform_recording(*cut)
+
+
+@pytest.fixture(scope="module")
+def broken(whole):
+    """The stem moves through the gap."""
+    return without(whole, 14.5, 15.8)
+
+
+@pytest.fixture(scope="module")
+def default(whole):
+    return identify(whole, BENCH_VALVE)
+
+
+class TestBest:
+    def test_it_is_the_default(self, whole, default):
+        assert DEFAULT_METHOD == "best"
+        assert default.method == "robust"
+        assert default.values == pytest.approx(
+            identify_robust(whole, BENCH_VALVE).values, abs=0, nan_ok=True
+        )
+
+    @pytest.mark.parametrize("settings", ONLY_REFINED.values(), ids=ONLY_REFINED)
+    def test_what_only_refined_has(self, whole, monkeypatch, settings):
+        monkeypatch.setattr(refined, "identify_refined", lambda *known: known)
+        assert identify(whole, BENCH_VALVE, settings) == (whole, BENCH_VALVE, settings)
+
+    def test_the_result_names_the_method(self, whole):
+        settings = ONLY_REFINED["a known position bias"]
+        found = identify(whole, BENCH_VALVE, settings)
+        expected = identify_refined(whole, BENCH_VALVE, settings)
+        assert found.method == expected.method == "refined"
+        assert found.values == pytest.approx(expected.values, abs=0, nan_ok=True)
+
+    @pytest.mark.parametrize(("cause", "settings"), ONLY_REFINED.items(), ids=ONLY_REFINED)
+    def test_robust_by_name_refuses_it(self, whole, cause, settings):
+        with pytest.raises(RefusalError) as refusal:
+            identify(whole, BENCH_VALVE, settings, "robust")
+        assert str(refusal.value) == (
+            f"the method robust has no place for {cause}: use the method refined"
+        )
+
+    @pytest.mark.parametrize("name", ["mass", "coulomb_friction", "spring_constant"])
+    def test_other_known_parameters_stay_with_robust(self, whole, name):
+        value = getattr(HIGH_FRICTION, name)
+        found = identify(whole, BENCH_VALVE, IdentificationSettings(fixed={name: value}))
+        assert found.method == "robust"
+        assert found.values[name] == value
+        assert found.parameters[name].verdict.value == "fixed"
+
+
+class TestGap:
+    @pytest.mark.parametrize(
+        "signals", [("drive",), ("position",), ("drive", "position")], ids=["drive", "stem", "both"]
+    )
+    def test_the_default_leaves_it_out(self, whole, default, signals):
+        found = identify(without(whole, 14.5, 15.8, signals), BENCH_VALVE)
+        assert found.method == "robust"
+        for name, true in TRUTH.items():
+            one = found.parameters[name]
+            assert abs(one.value - true) <= one.half_width, name
+        friction = found.parameters["coulomb_friction"]
+        assert friction.verdict is Verdict.IDENTIFIED
+        assert friction.half_width < 0.01 * friction.value
+        assert [note for note in found.warnings if "gap" in note and "left out" in note]
+        assert not [note for note in default.warnings if "gap" in note]
+
+    @pytest.mark.parametrize("method", sorted({*METHODS} - {"best", "robust"}))
+    def test_the_others_refuse_it(self, broken, method):
+        with pytest.raises(RefusalError) as refusal:
+            identify(broken, BENCH_VALVE, method=method)
+        assert (
+            str(refusal.value)
+            == broken.gap
+            == (
+                "gap of 1.3 s in actuator_pressure, 14.500 s after its first sample: use a record "
+                "without a gap, or clear the buffer and record again"
+            )
+        )
+
+    def test_so_does_best_in_the_place_of_refined(self, broken):
+        settings = IdentificationSettings(position_bias=1e-3)
+        with pytest.raises(RefusalError, match=r"^gap of 1.3 s"):
+            identify(broken, BENCH_VALVE, settings)
+
+    def test_no_model_is_validated_through_it(self, broken):
+        with pytest.raises(RefusalError, match=r"^gap of 1.3 s"):
+            validate(broken, BENCH_VALVE, HIGH_FRICTION)
+
+
+class TestTimingUncertainty:
+    def test_without_one_it_is_that_of_a_plant(self, whole, default):
+        settings = IdentificationSettings(timing_uncertainty=TIMING_UNCERTAINTY)
+        named = identify(whole, BENCH_VALVE, settings)
+        assert named.values == pytest.approx(default.values, abs=0, nan_ok=True)
+
+    def test_a_known_timing_narrows_the_intervals(self, whole, default):
+        bench = identify(whole, BENCH_VALVE, IdentificationSettings(timing_uncertainty=0.0))
+        for name, true in TRUTH.items():
+            one = bench.parameters[name]
+            assert one.half_width < default.parameters[name].half_width, name
+            assert abs(one.value - true) <= one.half_width, name
+        assert {share["timing"] for share in bench.evidence["uncertainty_budget"].values()} == {0.0}
+
+    def test_refined_does_not_know_it(self, whole):
+        values = [
+            identify(
+                whole, BENCH_VALVE, IdentificationSettings(timing_uncertainty=timing), "refined"
+            ).values
+            for timing in (0.0, 1.0)
+        ]
+        assert values[0] == pytest.approx(values[1], abs=0, nan_ok=True)
+
+    @pytest.mark.parametrize("impossible", [-1e-3, float("nan"), float("inf")])
+    def test_impossible(self, impossible):
+        with pytest.raises(ValueError, match=r"^timing_uncertainty must"):
+            IdentificationSettings(timing_uncertainty=impossible)
