@@ -31,7 +31,7 @@ def test_every_room_is_drawn(room):
     assert re.search(rf"\b{room}\b", DRAWING)
 
 
-@pytest.mark.parametrize("inner", ["trust", "published", "refined", "signature", "steps"])
+@pytest.mark.parametrize("inner", ["trust", "published", "refined", "robust", "signature", "steps"])
 def test_the_rooms_of_identification_are_drawn(inner):
     assert re.search(rf"\b{inner}\b", DRAWING)
 

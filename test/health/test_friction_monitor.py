@@ -16,8 +16,13 @@ from valve_friction_ros.health import (
     diagnose,
     identify_snapshot,
 )
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify_refined
-from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    RefusalError,
+    identify_refined,
+    identify_robust,
+)
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
 SETTINGS = MonitorSettings(BENCH_VALVE)
 START = 1_700_000_000_000_000_000
@@ -38,10 +43,13 @@ def coulomb_friction(result):
     return result.parameters["coulomb_friction"]
 
 
-def feed(monitor, record):
+def feed(monitor, record, but=()):
+    """Fill the buffer with a record, but for some of its samples."""
     period = round(record.sample_period * 1e9)
     pairs = zip(record.pressure.tolist(), record.position.tolist(), strict=True)
     for step, (pressure, position) in enumerate(pairs):
+        if step in but:
+            continue
         assert monitor.buffer.add_pressure(START + step * period, pressure) is None
         assert monitor.buffer.add_position(START + step * period, position) is None
 
@@ -74,17 +82,34 @@ class TestIdentification:
         assert settings is SETTINGS
         np.testing.assert_array_equal(snapshot.recording().position, loose_record.position)
 
-    def test_a_full_buffer_gives_what_the_record_gives(self, loose_record):
-        monitor = FrictionMonitor(SETTINGS)
+    @pytest.mark.parametrize(
+        ("bias", "method"), [(None, identify_robust), (1.13e-3, identify_refined)]
+    )
+    def test_a_full_buffer_gives_what_the_record_gives(self, loose_record, bias, method):
+        """By the default: ``robust`` wherever it applies, ``refined`` with a position bias."""
+        settings = replaced(identification=IdentificationSettings(position_bias=bias))
+        monitor = FrictionMonitor(settings)
         feed(monitor, loose_record)
-        found = identify_snapshot(monitor.buffer.snapshot(), SETTINGS)
-        expected = identify_refined(loose_record, BENCH_VALVE)
+        found = identify_snapshot(monitor.buffer.snapshot(), settings)
+        expected = method(loose_record, BENCH_VALVE, settings.identification)
+        assert found.method == settings.method_used == expected.method
         assert str(found.parameters) == str(expected.parameters)  # nan is not nan
-        assert found.estimate.values == expected.estimate.values
+        if expected.estimate is not None:
+            assert found.estimate.values == expected.estimate.values
+
+    def test_a_gap_is_refused_only_by_a_method_that_needs_a_whole_record(self, loose_record):
+        monitor = FrictionMonitor(SETTINGS)
+        feed(monitor, loose_record, but=range(400, 475))
+        snapshot = monitor.buffer.snapshot()
+        with pytest.raises(RefusalError, match=r"^gap of 0\.76 s in actuator_pressure"):
+            identify_snapshot(snapshot, replaced(method="refined"))
+        friction = identify_snapshot(snapshot, SETTINGS).parameters["coulomb_friction"]
+        assert friction.interval[0] < LOW_FRICTION.coulomb_friction < friction.interval[1]
 
     def test_by_the_settings(self, loose_record):
         settings = replaced(
-            identification=IdentificationSettings(fixed={"mass": 1.25}, derivative_window=21)
+            identification=IdentificationSettings(fixed={"mass": 1.25}, derivative_window=21),
+            method="refined",
         )
         monitor = FrictionMonitor(settings)
         feed(monitor, loose_record)

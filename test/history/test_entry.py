@@ -47,6 +47,7 @@ def test_a_success(monitor):
     assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)
     assert entry.warnings == result.warnings
     assert (entry.time, entry.valve, entry.refusal) == (START, VALVE, "")
+    assert entry.method == result.method == "robust"
     assert entry.version == __version__
 
 
@@ -67,6 +68,16 @@ def test_a_refusal_of_nothing(monitor):
     monitor.buffer.clear("on request")
     monitor.refuse(RefusalError("no samples"))
     assert entry_of(monitor, VALVE, monitor.buffer.snapshot(), monitor.settings, START).span is None
+
+
+@pytest.mark.parametrize(("bias", "method"), [(None, "robust"), (1.13e-3, "refined")])
+def test_a_refusal_has_the_method_that_would_have_identified(bias, method):
+    """A choice of a method would join in one trend what two methods found."""
+    identification = IdentificationSettings(position_bias=bias)
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, identification))
+    monitor.refuse(RefusalError("no samples"))
+    entry = entry_of(monitor, VALVE, monitor.buffer.snapshot(), monitor.settings, START)
+    assert entry.method == method
 
 
 def test_neither_a_success_nor_a_refusal_or_both():

@@ -9,7 +9,7 @@ from records import quick_record
 
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import MONTH, FrictionPoint, HistoryFile, KeptBaseline, trend_of
-from valve_friction_ros.identification import identify_refined
+from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.nodes.identifier.status import trend_values
 
@@ -17,7 +17,7 @@ NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
 PATIENT = {"input_timeout": 600.0}
 RECORD = quick_record()
-EXPECTED = as_kept(identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
+EXPECTED = as_kept(identify(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
 
 
 @pytest.fixture
@@ -46,6 +46,7 @@ def test_success_and_refusal_are_kept(live, history):
     assert refusal in (entries[0].refusal, entries[1].refusal)
     last = entries[-1]
     assert last.friction == EXPECTED
+    assert last.method == "robust"
     assert (last.span.end - last.span.begin) / 1e9 == pytest.approx(4.99)
     assert last.diagnosis.message == client.statuses[-1][1].message
     assert '"window": 70.0' in last.settings
@@ -70,7 +71,7 @@ class TestBaseline:
         assert float(values["baseline half width [N]"]) == pytest.approx(EXPECTED.half_width)
         shown = live.client.parameters(NODE, "baseline_coulomb_friction")
         assert shown == [EXPECTED.value]
-        (line,) = logged(live, second, "baseline 152.7")
+        (line,) = logged(live, second, f"baseline {EXPECTED.value:.6g}")
         assert "from the history" in line
         assert str(history.path) in line
         live.client.identified(quick_record(HIGH_FRICTION))
@@ -145,20 +146,20 @@ def test_a_history_that_cannot_be_written(live, tmp_path):
     assert history.baseline(VALVE.name).baseline.coulomb_friction == EXPECTED.value
 
 
-def fill(history, drift):
+def fill(history, drift, method):
     """Twenty weeks up to the start, and before them an estimate that differs."""
     baseline = Baseline(141.0, 1.0)
-    history.add(success(START - 365 * DAY, 900.0))
+    history.add(success(START - 365 * DAY, 900.0, method=method))
     begin = START - 20 * 7 * DAY
     history.set_baseline(VALVE, KeptBaseline(baseline, begin + 1, begin))
     for week in range(20):
         day = 7 * week
         friction = 150.0 + drift * day * DAY / MONTH
-        history.add(success(begin + day * DAY, friction, 1.0, baseline=baseline))
+        history.add(success(begin + day * DAY, friction, 1.0, baseline=baseline, method=method))
 
 
 def test_a_drift_is_told_until_a_baseline_is_set(live, history):
-    fill(history, 3.0)
+    fill(history, 3.0, "robust")
     live.start_identifier(PATIENT)
     values = live.client.status_values()
     assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
@@ -172,6 +173,17 @@ def test_a_drift_is_told_until_a_baseline_is_set(live, history):
     values = live.client.status_values()
     assert not [key for key in values if "drift" in key]
     assert math.isclose(float(values["coulomb_friction_ratio"]), 1.0)
+
+
+def test_a_drift_is_that_of_the_method_which_the_settings_call_for(live, history):
+    """Without a position bias the default is robust, with one it is refined."""
+    fill(history, 3.0, "refined")
+    live.start_identifier(PATIENT)
+    assert not [key for key in live.client.status_values() if "drift" in key]
+    assert live.client.set_together(NODE, {"position_bias": 1.13e-3}).successful
+    live.client.trigger("identify")
+    values = live.client.status_values(lambda one: "coulomb_friction_drift" in str(one), "a drift")
+    assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
 
 
 def test_only_a_significant_drift_has_keys():

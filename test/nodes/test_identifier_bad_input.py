@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from live_nodes import SECOND, stamps_of
+from live_nodes import NAMESPACE, SECOND, stamps_of
 from records import quick_record
 
-from valve_friction_ros.identification import identify_refined
+from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
+NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
 STAMPS = stamps_of(RECORD)
 ONE_HOUR = 3600 * SECOND
@@ -151,8 +152,6 @@ BAD_INPUTS = {  # what is published, how many samples of it are taken, words of 
     "pressure repeats": (repeated_pressure, 1000, "actuator_pressure repeats a stamp (1 samples)"),
     "position repeats": (repeated_position, 1000, "stem_state repeats a stamp (1 samples)"),
     "no stamps": (no_stamps, 4, "actuator_pressure repeats a stamp (499 samples)"),
-    "gap": (gap, 850, "gap of 0.76 s in actuator_pressure", "1.490 s after"),
-    "gap of stem": (gap_of_stem, 925, "gap of 0.76 s in stem_state", "1.490 s after"),
     "pressure too high": (bad_pressure(260e3), 999, *OUTSIDE),
     "pressure too low": (bad_pressure(-1.0), 999, *OUTSIDE),
     "only pressure": (only_pressure, 500, "no samples of stem_state"),
@@ -161,14 +160,20 @@ BAD_INPUTS = {  # what is published, how many samples of it are taken, words of 
 }
 
 
+GAPS = {
+    "gap": (gap, 850, "gap of 0.76 s in actuator_pressure"),
+    "gap of stem": (gap_of_stem, 925, "gap of 0.76 s in stem_state"),
+}
+
+
 def identifies_the_next_record(client):
     client.identified(RECORD)
-    expected = identify_refined(RECORD, BENCH_VALVE).values["coulomb_friction"]
+    expected = identify(RECORD, BENCH_VALVE).values["coulomb_friction"]
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
 
 
 def test_the_good_record_is_good():
-    value = identify_refined(RECORD, BENCH_VALVE).values["coulomb_friction"]
+    value = identify(RECORD, BENCH_VALVE).values["coulomb_friction"]
     assert value == pytest.approx(LOW_FRICTION.coulomb_friction, rel=1e-3)
 
 
@@ -183,6 +188,35 @@ def test_is_refused_with_its_cause_and_the_next_record_identifies(client, name):
     values = client.last_values()
     assert values["estimate_valid"] == "false"
     assert values["reason"] == response.message
+    identifies_the_next_record(client)
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_a_gap_costs_the_stretch_around_it(client, name):
+    publish, count, _ = GAPS[name]
+    publish(client)
+    assert client.identified_whole(count)
+    values = client.last_values()
+    assert values["estimate_valid"] == "true"
+    assert values["method"] == "robust"
+    friction, half_width = (
+        float(values[f"coulomb_friction {which}[N]"]) for which in ("", "half width ")
+    )
+    assert abs(friction - LOW_FRICTION.coulomb_friction) < half_width < 0.05 * friction
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_a_gap_is_refused_by_a_method_that_needs_an_unbroken_record(client, name):
+    publish, count, words = GAPS[name]
+    assert client.set_together(NODE, {"method": "refined"}).successful
+    try:
+        publish(client)
+        response = client.identify_all(count)
+    finally:
+        assert client.set_together(NODE, {"method": "best"}).successful
+    assert not response.success, response.message
+    assert words in response.message
+    assert "1.490 s after" in response.message
     identifies_the_next_record(client)
 
 

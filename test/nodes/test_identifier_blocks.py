@@ -8,7 +8,7 @@ from live_nodes import NAMESPACE, STREAM, stamps_of, values_of
 from records import quick_record
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from valve_friction_ros.identification import identify_refined
+from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
 
 OK, WARN = b"\x00", b"\x01"
@@ -54,7 +54,7 @@ def test_the_numbers_are_those_of_the_record(fed):
     send(publisher, ROWS)
     response = client.identify_all(2 * len(RECORD))
     assert response.success, response.message
-    expected = identify_refined(RECORD, BENCH_VALVE)
+    expected = identify(RECORD, BENCH_VALVE)
     assert client.friction("coulomb_friction", "rms") == {
         "coulomb_friction": expected.values["coulomb_friction"],
         "rms": expected.misfit.rms,

@@ -6,7 +6,12 @@ from live_nodes import NAMESPACE, values_of
 from records import quick_record, simulated
 from std_msgs.msg import Float64MultiArray
 
-from valve_friction_ros.identification import UNITS, IdentificationSettings, identify_signature
+from valve_friction_ros.identification import (
+    UNITS,
+    IdentificationSettings,
+    identify,
+    identify_signature,
+)
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, TriangleWave
 
 NODE = f"{NAMESPACE}/identifier"
@@ -26,7 +31,7 @@ def client(shared):
 
 def test_the_choice_is_described(client):
     (descriptor,) = client.describe(NODE, ["method"])
-    assert descriptor.additional_constraints == "one of refined, published, signature, robust"
+    assert descriptor.additional_constraints == "one of best, robust, refined, published, signature"
 
 
 def test_a_signature_is_identified(client):
@@ -66,3 +71,34 @@ def test_the_method_can_be_changed_while_the_node_runs(client):
     client.identified(quick_record())
     assert np.isfinite(client.friction("threshold")["threshold"])
     assert values_of(client.next_status())["method"] == "refined"
+
+
+def test_the_best_is_robust_unless_a_position_bias_is_given(client):
+    assert client.set_together(NODE, {"method": "best"}).successful
+    for bias, used in ((np.nan, "robust"), (1.13e-3, "refined"), (np.nan, "robust")):
+        assert client.set_together(NODE, {"position_bias": bias}).successful
+        client.identified(quick_record())
+        assert values_of(client.next_status())["method"] == used
+        expected = identify(
+            quick_record(),
+            BENCH_VALVE,
+            IdentificationSettings(position_bias=None if np.isnan(bias) else bias),
+        )
+        told = client.friction("coulomb_friction", "threshold")
+        assert told["coulomb_friction"] == expected.values["coulomb_friction"]
+        assert np.isnan(told["threshold"]) == (used == "robust")
+
+
+def test_the_timing_uncertainty_widens_the_intervals(client):
+    """Each lag has a prior of that width; on a square wave the record tells little of the lags."""
+    told = {}
+    for uncertainty in (0.0, 0.2):
+        assert client.set_together(NODE, {"timing_uncertainty": uncertainty}).successful
+        client.identified(quick_record())
+        told[uncertainty] = client.half_widths("viscous_friction")["viscous_friction"]
+        expected = identify(
+            quick_record(), BENCH_VALVE, IdentificationSettings(timing_uncertainty=uncertainty)
+        )
+        assert told[uncertainty] == expected.parameters["viscous_friction"].half_width
+    assert told[0.0] < told[0.2]
+    assert client.set_together(NODE, {"timing_uncertainty": np.nan}).successful

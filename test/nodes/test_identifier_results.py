@@ -215,7 +215,8 @@ def test_signals_of_different_rates(live):
     """
     settings = {"mass": LOW_FRICTION.mass, "limit_velocity": 2e-3}
     wave = SineWave(period=10.0)
-    live.start_identifier({f"fixed.{name}": value for name, value in settings.items()})
+    fixed = {f"fixed.{name}": value for name, value in settings.items()}
+    live.start_identifier({"method": "refined", **fixed})
     client = live.client
 
     milliseconds = np.arange(10_000)

@@ -7,7 +7,8 @@ import pytest
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 
-from valve_friction_ros.model import HIGH_FRICTION, LOW_FRICTION
+from valve_friction_ros.identification import identify
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -44,7 +45,11 @@ def test_baseline_needs_an_estimate(healthy):
     assert not refused.success
     assert "the valve has no result" in refused.message
     assert accepted.success
-    assert "152.7" in accepted.message
+    healthy = identify(quick_record(), BENCH_VALVE).parameters["coulomb_friction"]
+    assert accepted.message == (
+        f"baseline: coulomb_friction {healthy.value:.6g} ± {healthy.half_width:.2g} N"
+    )
+    assert healthy.interval[0] < 152.7 < healthy.interval[1]
 
 
 @pytest.mark.parametrize(
@@ -94,12 +99,20 @@ def test_baseline_is_a_parameter(live):
     assert status.hardware_id == "FV-101/A"
     values = values_of(status)
     assert float(values["coulomb_friction_ratio"]) == pytest.approx(2.02, rel=1e-3)
-    assert float(values["mass published [kg]"]) == 1.0
-    assert "published estimate: the record does not determine the mass" in values["warnings"]
+    assert values["method"] == "robust"
+    assert not [key for key in values if "published" in key]
 
     assert live.client.set_together(NODE, {"baseline_coulomb_friction": 600.0}).successful
     values = live.client.status_values(lambda status: status.level == OK, "OK")
     assert float(values["coulomb_friction_ratio"]) == pytest.approx(1.01, rel=1e-3)
+
+
+def test_published_values_and_their_warnings_stand_beside_the_refined(live):
+    live.start_identifier({"method": "refined"})
+    live.client.identified(quick_record(HIGH_FRICTION))
+    values = live.client.last_values()
+    assert float(values["mass published [kg]"]) == 1.0
+    assert "published estimate: the record does not determine the mass" in values["warnings"]
 
 
 def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):

@@ -5,7 +5,7 @@ from live_nodes import NAMESPACE, START, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
 
-from valve_friction_ros.identification import identify_refined
+from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE
 
 OTHER = "/fv_102"
@@ -37,7 +37,7 @@ def test_each_valve_has_its_own(client):
     assert status.name == f"{NAMESPACE}/identifier: friction"
     response = client.trigger("identify")
     assert response.success, response.message
-    expected = identify_refined(record, BENCH_VALVE).values["coulomb_friction"]
+    expected = identify(record, BENCH_VALVE).values["coulomb_friction"]
     assert client.friction("coulomb_friction") == {"coulomb_friction": expected}
 
     response = client.call(Trigger, f"{OTHER}/identifier/identify", Trigger.Request())

@@ -107,7 +107,7 @@ def test_ctrl_c_during_an_identification(live, tmp_path):
 
 def test_long_identification_loses_no_sample(live, tmp_path):
     """What arrives while an identification runs is taken at once, and identified by the next."""
-    live.start_identifier({"input_timeout": 600.0}, script=SCRIPT)
+    live.start_identifier({"input_timeout": 600.0, "method": "refined"}, script=SCRIPT)
     client = live.client
     whole = simulated(SineWave(period=5.0).sample(np.arange(1000) / 100), 0.01)
     begin, rest = slice(500), slice(500, 1000)

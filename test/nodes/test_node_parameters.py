@@ -17,6 +17,7 @@ CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so
     "pressure_minimum": 3e5,
     "pressure_maximum": -1.0,
     "position_bias": math.inf,
+    "timing_uncertainty": -1.0,
     "baseline_coulomb_friction": 0.0,
     "fixed.mass": -1.0,
     "fixed.coulomb_friction": -1.0,
@@ -44,7 +45,10 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"low_ratio": 1.0}, "low_ratio < 1"),
     ({"assumed_mass": -1.0}, "assumed_mass"),
     ({"position_bias": 1e-3, "fixed.spring_preload": 200.0}, "exclude each other"),
-    ({"method": "guess"}, "there is no method 'guess': choose from refined, published, signature"),
+    (
+        {"method": "guess"},
+        "there is no method 'guess': choose from best, robust, refined, published, signature",
+    ),
     ({"joint": "arm"}, "joint"),
     ({"valve_tag": "FV-102"}, "valve_tag"),
 ]

@@ -55,7 +55,7 @@ def identified(*arguments):
 def numbers_of(answer):
     """What the node publishes, comparable to the last bit, out of what the command prints."""
     parameters = answer["parameters"]
-    figures = {name: answer["evidence"][name] for name in ("threshold", "sigma", "r_squared")}
+    figures = {name: answer["evidence"].get(name) for name in ("threshold", "sigma", "r_squared")}
     figures |= {name: answer[name] for name in ("fit", "rms")}
     published = {f"published {name}": parameters[name]["published"] for name in UNITS}
     values = {name: parameters[name]["value"] for name in UNITS}
@@ -67,6 +67,16 @@ def as_told(numbers):
         name: repr(float("nan") if value is None else float(value))
         for name, value in numbers.items()
     }
+
+
+def told_by(client):
+    """What the node has published of its last result."""
+    return as_told(
+        {
+            **client.friction(*UNITS, "threshold", "sigma", "r_squared", "fit", "rms"),
+            **{f"published {name}": value for name, value in client.published(*UNITS).items()},
+        }
+    )
 
 
 def held(record):
@@ -100,12 +110,7 @@ def run(shared, tmp_path_factory):
     client.send_record(samples)
     client.identified_whole(held(samples))
     client.wait_until(lambda: len(heard) == 2 * len(samples), "the recorder's messages")
-    numbers = as_told(
-        {
-            **client.friction(*UNITS, "threshold", "sigma", "r_squared", "fit", "rms"),
-            **{f"published {name}": value for name, value in client.published(*UNITS).items()},
-        }
-    )
+    numbers = told_by(client)
     recorded = bags.write_bag(folder / "heard", heard)
     (folder / "valve.yaml").write_text(yaml.safe_dump(asdict(BENCH_VALVE)))
     return Run(client, numbers, recorded, folder)
@@ -126,6 +131,17 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
     assert saved.parent == run.folder / "saved"
     assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z", saved.name)
     assert numbers_of(identified(saved, "--valve", saved / "valve.yaml")) == run.numbers
+
+
+def test_the_refined_numbers_and_their_evidence_are_those_of_the_node(run):
+    assert run.client.set_together(IDENTIFIER, {"method": "refined"}).successful
+    assert run.client.trigger("identify").success
+    numbers = told_by(run.client)
+    assert run.client.set_together(IDENTIFIER, {"method": "best"}).successful
+    assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
+    saved = Path(run.client.trigger("save").message)
+    answer = identified(saved, "--valve", saved / "valve.yaml", "--method", "refined")
+    assert numbers_of(answer) == numbers
 
 
 def test_topics_and_stamps_of_a_saved_buffer(run):

@@ -8,12 +8,12 @@ from records import quick_record
 from rosgraph_msgs.msg import Clock
 
 from valve_friction_ros.history import HistoryFile
-from valve_friction_ros.identification import identify_refined
+from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, Recording
 
 NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
-EXPECTED = as_kept(identify_refined(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
+EXPECTED = as_kept(identify(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
 
 
 @pytest.fixture

@@ -17,6 +17,7 @@ from valve_friction_ros.identification import (
     RefusalError,
     Result,
     method_named,
+    method_used,
 )
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
@@ -53,6 +54,11 @@ class MonitorSettings:
         """Refuse impossible windows and unknown methods."""
         method_named(self.method)
         require_positive("window", self.window)
+
+    @property
+    def method_used(self) -> str:
+        """Name of the method that identifies with these settings."""
+        return method_used(self.method, self.identification)
 
 
 class IdentificationInput(NamedTuple):

@@ -107,7 +107,7 @@ class HistoryEntry:
     span : Span or None
         Time of its record; None for an empty buffer.
     method : str
-        Method of the identification.
+        Method of the identification, never a choice of one.
     diagnosis : Diagnosis
         The diagnosis that the operator saw.
     limits : FrictionLimits
@@ -249,7 +249,7 @@ def entry_of(
         time=time,
         valve=valve,
         span=span_of(snapshot),
-        method=settings.method,
+        method=settings.method_used,
         diagnosis=monitor.diagnosis(),
         limits=monitor.settings.limits,
         baseline=monitor.baseline,

@@ -64,5 +64,5 @@ def current_trend(
     Raises HistoryError if the file cannot be read.
     """
     kept = history.baseline(valve)
-    points = history.points(valve, settings.method, kept.since if kept else 0)
+    points = history.points(valve, settings.method_used, kept.since if kept else 0)
     return trend_of(points, baseline, settings.limits)

@@ -9,6 +9,7 @@ from valve_friction_ros.identification.methods import (
     Method,
     identify,
     method_named,
+    method_used,
 )
 from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.published.identify import published_estimate
@@ -83,6 +84,7 @@ __all__ = [
     "identify_robust",
     "identify_signature",
     "method_named",
+    "method_used",
     "parameter_cells",
     "parameter_columns",
     "parameter_mapping",

@@ -13,7 +13,15 @@ from valve_friction_ros.identification.signature import force_balance as signatu
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["DEFAULT_METHOD", "FORMER_METHODS", "METHODS", "Method", "identify", "method_named"]
+__all__ = [
+    "DEFAULT_METHOD",
+    "FORMER_METHODS",
+    "METHODS",
+    "Method",
+    "identify",
+    "method_named",
+    "method_used",
+]
 
 
 class Method(Protocol):
@@ -37,10 +45,8 @@ def identify_best(
     These are a machine without a spring, a known position bias and a known static friction. The
     result names the method that was used. It raises RefusalError as that method does.
     """
-    chosen = settings or IdentificationSettings()
-    if robust.has_no_place_for(chosen):
-        return refined.identify_refined(recording, valve, chosen)
-    return robust.identify_robust(recording, valve, chosen)
+    settings = settings or IdentificationSettings()
+    return METHODS[method_used(BEST, settings)](recording, valve, settings)
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
@@ -62,6 +68,13 @@ FORMER_METHODS: Mapping[str, str] = MappingProxyType(
     {"sweep": refined.METHOD, "force_balance": signature.METHOD}
 )
 """Names that files of earlier versions use, and what they are called now."""
+
+
+def method_used(name: str, settings: IdentificationSettings) -> str:
+    """Return the name of the method that identifies with these settings: ``best`` is a choice."""
+    if name != BEST:
+        return name
+    return refined.METHOD if robust.has_no_place_for(settings) else robust.METHOD
 
 
 def method_named(name: str) -> Method:

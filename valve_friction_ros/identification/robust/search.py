@@ -47,8 +47,8 @@ _FEWEST_STEPS = 2
 _TRADED = 4
 _TRADED_STEPS = 6
 _IMPROBABLE = 25.0
-"""Steps of a quarter of the timing uncertainty along that valley, steps of a fit there, and the rise of the
-sum of squares after which the valley is left."""
+"""Steps of a quarter of the timing uncertainty along that valley, steps of a fit there, and the
+rise of the sum of squares after which the valley is left."""
 
 _TRIED = 2
 _FEW_STEPS = 6

@@ -41,7 +41,8 @@ def _result_values(result: Result, dead_band_share: float) -> dict[str, str]:
     if shown["systematic_misfit"] is not None:
         values["systematic misfit [µm]"] = _number(1e6 * shown["systematic_misfit"])
     values["method"] = shown["method"]
-    values["derivative_window [samples]"] = str(shown["derivative_window"])
+    if shown["derivative_window"]:
+        values["derivative_window [samples]"] = str(shown["derivative_window"])
     for name, unit in _EVIDENCE_UNITS.items():
         if name in shown["evidence"]:
             values[name + unit] = _number(shown["evidence"][name])
