@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.robust.coordinates import MAIN
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.numbers import (
-    REPORTED,
     ReportedNumber,
     loop_friction,
     reported_numbers,
@@ -24,6 +23,10 @@ __all__ = ["NOISE_LIKE", "Budget", "Estimated", "estimated"]
 _QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 NOISE_LIKE = 4.0
 """Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
+
+_WIDEST = 3.0
+"""Half width at another place, over that at the first, up to which it counts: a fit begins at
+places where the linear model says little."""
 
 _LOST = 0.5
 """Share by which the sliding friction of what was lost in gaps may differ from the mean."""
@@ -138,13 +141,15 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
     places.sort(key=lambda place: place[1].penalty)
     readings = [reported_numbers(fit.model, stage.at) for _, stage, _ in places]
     result = {}
-    for name in REPORTED:
-        first = readings[0][name]
-        width = _half_width(*places[0][:2], first)
+    for name, first in readings[0].items():
+        own = width = _half_width(*places[0][:2], first)
         for (other, stage, behind), numbers in zip(places[1:], readings[1:], strict=True):
+            if name not in numbers:
+                continue
             near = math.sqrt(max(1.0 - behind / chance, 0.0))
             apart = abs(numbers[name].value - first.value)
-            width = max(width, near * (apart + 0.5 * _half_width(other, stage, numbers[name])))
+            there = min(_half_width(other, stage, numbers[name]), _WIDEST * own)
+            width = max(width, near * (apart + 0.5 * there))
         if name == "sliding_friction":
             lost = fit.model.record.lost / fit.model.record.duration
             width = math.hypot(width, _LOST * lost * abs(first.value))

@@ -10,17 +10,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.robust.broad_model import BroadModel
 from valve_friction_ros.identification.robust.coordinates import Coordinates
 
-__all__ = ["REPORTED", "ReportedNumber", "loop_friction", "reported_numbers"]
-
-REPORTED = (
-    "mass",
-    "viscous_friction",
-    "coulomb_friction",
-    "static_friction",
-    "spring_constant",
-    "spring_preload",
-    "sliding_friction",
-)
+__all__ = ["ReportedNumber", "loop_friction", "reported_numbers"]
 
 _RECTANGLE = 1.0 / math.sqrt(3.0)
 """Standard deviation of a rectangular distribution over its half width."""
@@ -103,7 +93,7 @@ def reported_numbers(model: BroadModel, at: Coordinates) -> dict[str, ReportedNu
     drift = _RECTANGLE * abs(at["drift"]) * float(np.ptp(model.record.force))
     preload = math.hypot(bow, stiffness * abs(middle), drift, _ASYMMETRY * dry)
     static_gradient = {"coulomb_friction": 1.0, "slip_force": 1.0}
-    return {
+    numbers = {
         "mass": ReportedNumber(at["mass"], {"mass": 1.0}, 0.0),
         "viscous_friction": ReportedNumber(
             at["viscous_friction"], {"viscous_friction": 1.0}, friction * at["viscous_friction"]
@@ -114,6 +104,10 @@ def reported_numbers(model: BroadModel, at: Coordinates) -> dict[str, ReportedNu
         "spring_preload": ReportedNumber(at["spring_preload"], {"spring_preload": 1.0}, preload),
         "sliding_friction": _sliding(model, at),
     }
+    if at["stribeck_velocity"] > 0:
+        speed = at["stribeck_velocity"]
+        numbers["stribeck_velocity"] = ReportedNumber(speed, {"stribeck_velocity": 1.0}, 0.0)
+    return numbers
 
 
 def loop_friction(model: BroadModel, at: Coordinates) -> float:

@@ -124,7 +124,8 @@ class _Problem:
         readings: NDArray[np.float64],
     ) -> None:
         record = model.record
-        self.model, self.at, self.names, self.centre = model, at, names, centre
+        self.model, self.at, self.names = model, at, names
+        self.centre, self.deviations = centre, deviations
         self.residual = record.position - readings
         scaled = self.residual * model.weights
         self.inflation = inflation(scaled.mean(axis=0), stroke_cells(record))
@@ -154,7 +155,7 @@ class _Problem:
             self.at,
             self.jacobian @ inverse @ self.jacobian.T,
             _misfit(self.model, self.residual),
-            float(self.precision @ self.distance**2),
+            self.penalty(self.at),
         )
 
     def step(self, damping: float) -> NDArray[np.float64]:
@@ -167,8 +168,14 @@ class _Problem:
 
     def objective(self, at: Coordinates, readings: NDArray[np.float64]) -> float:
         misfit = _misfit(self.model, self.model.record.position - readings)
-        distance = np.array([at[name] - self.centre.get(name, 0.0) for name in self.names])
-        return float(misfit / self.inflation + self.precision @ distance**2)
+        return misfit / self.inflation + self.penalty(at)
+
+    def penalty(self, at: Coordinates) -> float:
+        """Squared distances from the priors, those of coordinates that are not free among them."""
+        return sum(
+            ((at[name] - self.centre.get(name, 0.0)) / deviation) ** 2
+            for name, deviation in self.deviations.items()
+        )
 
     def moved(self, step: NDArray[np.float64]) -> dict[str, float]:
         there = dict(self.straight)

@@ -30,6 +30,10 @@ _LIMIT_VELOCITIES = (2e-4, 6e-4)
 _SUSPICIOUS = 2.0
 """Inflation of a residual beyond which other starts are tried: half of it is not noise."""
 
+_UNLIKELY = 12.0
+"""Penalty of the priors beyond which other starts are tried: such imperfections together are two
+standard deviations and more above what their number makes usual."""
+
 _START_NOISE = 3.0
 _START_TIME = 5e-3
 """The first position is known to so many deviations of its noise, and to what the stem moves in
@@ -202,9 +206,9 @@ class _Search:
         self.work += len(found.stages) * a_step
         return found
 
-    def full(self, start: Coordinates, *more: str) -> PosteriorFit:
-        """Fit with all imperfections, and those that are named."""
-        names = (*self.all, *more)
+    def full(self, start: Coordinates, names: tuple[str, ...] = ()) -> PosteriorFit:
+        """Fit with all imperfections, or with those that are named."""
+        names = names or self.all
         near = self.fit(start, names, _MORE_STEPS)
         return self.fit(near.at, names, _MORE_STEPS, self.exact)
 
@@ -224,7 +228,8 @@ class _Search:
         """Fit friction that falls as soon as the stem moves."""
         starts = []
         overall = {**self.base, **_overall_spring(self.model.record)}
-        for at in (self.base, full.at, overall):
+        plain = {**self.base, **{name: full.at[name] for name in (*MAIN, *TIMING)}}
+        for at in (self.base, plain, overall):
             total = max(at["coulomb_friction"], 0.1 * self.sliding.friction)
             for share in _SLIP_SHARES:
                 for slip in _SLIPS:
@@ -264,10 +269,17 @@ class _Search:
             for slip in (0.3, 1.0)
             for one in springs
         ]
+        fallen = full.at["slip_force"] + max(full.at["at_low_speed"], 0.1) * self.sliding.friction
+        plain = {name: full.at[name] for name in (*MAIN, "mass")}
+        starts += [
+            {**self.base, **plain, "slip_force": fallen, "stribeck_velocity": speed}
+            for speed in _STRIBECK_SPEEDS
+        ]
         near = _nearest(self.stepwise, starts)[:1]
         names = (*self.main, "slip_force", "stribeck_velocity")
         first = self.fit(near[0], names, _FEW_STEPS, self.stepwise)
-        return self.full(first.at, "stribeck_velocity")
+        others = tuple(name for name in self.all if name != "at_low_speed")
+        return self.full(first.at, (*others, "stribeck_velocity"))
 
     def stopping(self, full: PosteriorFit) -> PosteriorFit:
         """Fit a dead zone of the speed."""
@@ -328,7 +340,8 @@ class _Search:
         if "slip_force" in self.all:
             branches = [self.slipping, self.falling, self.stopping]
         for branch in branches:
-            if best.inflation < _SUSPICIOUS or not self.may_go_on:
+            is_likely = best.inflation < _SUSPICIOUS and best.stages[-1].penalty < _UNLIKELY
+            if is_likely or not self.may_go_on:
                 break
             best = min(best, branch(best), key=lambda one: one.objective)
         return best

@@ -87,7 +87,9 @@ def fit_verdicts(
                 "inertia is too small a part of the force to be seen; "
                 f"{settings.assumed_mass:g} kg assumed",
             )
-        elif name == "static_friction" and not (slips(fit) and fit.at["slip_force"] > width):
+        elif name in ("static_friction", "stribeck_velocity") and not (
+            slips(fit) and fit.at["slip_force"] > width
+        ):
             verdicts[name] = not_identifiable(name, NO_SLIP)
         else:
             verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason)
