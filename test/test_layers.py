@@ -38,7 +38,7 @@ INNER = {
     "identification.trust": set(),
     "identification.published": {"trust"},
     "identification.steps": {"trust"},
-    "identification.robust": {"trust"},
+    "identification.robust": {"trust", "published"},
     "identification.refined": {"trust", "published"},
     "identification.signature": {"trust", "published", "steps"},
     "records.bags": set(),

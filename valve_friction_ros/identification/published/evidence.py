@@ -4,10 +4,25 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.published.identify import published_fit
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import UNITS
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import MeasuredRecord
 
-__all__ = ["sweep_evidence", "sweep_finding", "with_published"]
+__all__ = ["published_beside", "sweep_evidence", "sweep_finding", "with_published"]
+
+
+def published_beside(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
+) -> tuple[Estimate | None, list[str]]:
+    """Run the published method beside another one; its refusal becomes a warning."""
+    try:
+        return published_fit(record, valve, settings).estimate, []
+    except RefusalError as refusal:
+        return None, [f"the published method refused the record: {refusal}"]
 
 
 def sweep_evidence(estimate: Estimate) -> dict[str, float | int]:

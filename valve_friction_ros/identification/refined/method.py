@@ -9,6 +9,7 @@ import numpy as np
 
 from valve_friction_ros.identification.published.estimate import Estimate, possible_model
 from valve_friction_ros.identification.published.evidence import (
+    published_beside,
     sweep_evidence,
     sweep_finding,
     with_published,
@@ -95,7 +96,7 @@ def identify_refined(
     has_spring = settings.fixed.get("spring_constant") != 0.0
     if has_spring:
         require_related_signals(record)
-    published, warnings = _published(record, valve, settings)
+    published, warnings = published_beside(record, valve, settings)
     window = settings.derivative_window or record.fitting_window(settings.order)
     start_settings = replace(settings, derivative_window=window)
     if has_spring:
@@ -195,16 +196,6 @@ def _regressed(
     parameters = regression_verdicts(estimate, regression, settings)
     model = possible_model(estimate)
     return _Outcome(parameters, regression.fit, None, estimate.warnings, model, None)
-
-
-def _published(
-    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
-) -> tuple[Estimate | None, list[str]]:
-    """Run the published method; its refusal becomes a warning."""
-    try:
-        return published_fit(record, valve, settings).estimate, []
-    except RefusalError as refusal:
-        return None, [f"the published method refused the record: {refusal}"]
 
 
 def _finding(outcome: _Outcome, valve: Valve) -> str:

@@ -2,6 +2,12 @@
 
 import numpy as np
 
+from valve_friction_ros.identification.published.evidence import (
+    published_beside,
+    sweep_evidence,
+    sweep_finding,
+    with_published,
+)
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.robust.fitted_record import fitted_record
@@ -27,7 +33,7 @@ from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.measured_record import measured
+from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
 __all__ = ["METHOD", "TIMING_UNCERTAINTY", "has_no_place_for", "identify_robust"]
 
@@ -75,11 +81,13 @@ def identify_robust(
     settings = settings or IdentificationSettings()
     if unfit := has_no_place_for(settings):
         raise RefusalError(f"the method robust has no place for {unfit}: use the method refined")
-    _require_record(recording, valve, settings)
+    uniform = measured(recording)
+    _require_record(uniform, valve, settings)
     record = _stamped(recording)
     fits = search(fitted_record(record, valve), _prior(settings))
     fit, numbers = fits[0], estimated(fits)
     misfit = fit_misfit(fit, numbers)
+    published, beside = published_beside(uniform, valve, settings)
     if misfit.is_gross:
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
@@ -92,24 +100,32 @@ def identify_robust(
         recording=recording,
         valve=valve,
         settings=settings,
-        parameters=fit_verdicts(fit, numbers, settings, misfit),
+        parameters=with_published(fit_verdicts(fit, numbers, settings, misfit), published),
         fit=misfit.fit,
         rms=misfit.rms,
         misfit=misfit,
         derivative_window=0,
-        warnings=(*_doubts(misfit), *found_imperfections(fit), *sampling_remarks(record)),
+        warnings=(
+            *_doubts(misfit),
+            *found_imperfections(fit),
+            *sampling_remarks(record),
+            *beside,
+        ),
         evidence={
+            **({} if published is None else sweep_evidence(published)),
             "uncertainty_budget": {
                 name: {"record": one.budget.record, "timing": one.budget.timing}
                 for name, one in numbers.items()
-            }
+            },
         },
         findings=(
             f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is "
             f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not "
             "noise",
+            *(() if published is None else (sweep_finding(published),)),
         ),
         model=_model(fit),
+        exhibit=published,
         stem=_stem(fit),
     )
 
@@ -123,9 +139,8 @@ def has_no_place_for(settings: IdentificationSettings) -> str:
     return "a known static friction" if "static_friction" in settings.fixed else ""
 
 
-def _require_record(recording: Recording, valve: Valve, settings: IdentificationSettings) -> None:
+def _require_record(record: MeasuredRecord, valve: Valve, settings: IdentificationSettings) -> None:
     """Refuse a record without the motion that determines friction."""
-    record = measured(recording)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
     require_drive(record, valve)
