@@ -102,7 +102,7 @@ class TestResult:
         assert lines[0].split()[:2] == ["parameter", "value"]
         names = [line.split()[0] for line in lines[1 : 1 + len(result.parameters)]]
         assert names == list(result.parameters)
-        assert lines[-1] == f"method refined, fit {100 * result.fit:.2f} %"
+        assert lines[-1] == f"method robust, fit {100 * result.fit:.2f} %"
 
     def test_the_summary_adds_reasons_and_warnings(self, result):
         summary = result.summary()
@@ -156,7 +156,10 @@ def test_methods_return_the_same_type(loose_record, benches):
 
 @pytest.mark.parametrize(
     ("name", "hint"),
-    [("sweep", "it is now called 'refined'"), ("guess", "choose from refined, published")],
+    [
+        ("sweep", "it is now called 'refined'"),
+        ("guess", "choose from best, robust, refined, published"),
+    ],
 )
 def test_an_unknown_method_is_named(loose_record, benches, name, hint):
     with pytest.raises(ValueError, match=f"there is no method '{name}': {hint}"):

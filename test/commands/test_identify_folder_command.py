@@ -74,6 +74,7 @@ def output(tmp_path):
 @pytest.fixture
 def arguments(folder, output, bench_yaml):
     options = ["--output", str(output), "--valve", str(bench_yaml), "--jobs", "1"]
+    options += ["--method", "refined"]
     return ["identify-folder", str(folder), *options]
 
 

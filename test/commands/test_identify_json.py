@@ -89,9 +89,12 @@ class TestProcesses:
         assert re.fullmatch(r"valve_friction identify: \S+record\.csv: .+\n", done.stderr)
 
 
+REFINED = ("--method", "refined")
+
+
 class TestJson:
     def test_the_result_of_the_library(self, printed, quick_csv, result, bench_options):
-        answer = printed(quick_csv, *bench_options)
+        answer = printed(quick_csv, *bench_options, *REFINED)
         assert set(answer) == KEYS
         assert list(answer["parameters"]) == list(UNITS) == list(result.parameters)
         for name, entry in answer["parameters"].items():
@@ -117,7 +120,7 @@ class TestJson:
     def test_the_published_estimate_beside_it(
         self, printed, quick_csv, quick_record, bench_options
     ):
-        answer = printed(quick_csv, *bench_options)
+        answer = printed(quick_csv, *bench_options, *REFINED)
         expected = published_estimate(quick_record, BENCH_VALVE, SETTINGS)
         assert column(answer, "published") == expected.values
         for key in ("threshold", "samples", "sigma", "r_squared"):
@@ -129,7 +132,7 @@ class TestJson:
 
     def test_a_number_without_a_verdict_is_never_shown(self, printed, quick_csv, bench_options):
         """What the record does not tell is null throughout, with the reason beside it."""
-        answer = printed(quick_csv, *bench_options)
+        answer = printed(quick_csv, *bench_options, *REFINED)
         assert {name for name, value in values(answer).items() if value is None} == {
             "mass",
             "static_friction",

@@ -12,6 +12,8 @@ from valve_friction_ros.model import BENCH_VALVE
 POSITION_BIAS = 1.13e-3
 FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
 
+REFINED = ("--method", "refined")
+
 
 class TestOptions:
     def test_fixed_by_value_and_by_name(self, printed, quick_csv, bench_options):
@@ -43,7 +45,9 @@ class TestOptions:
     def test_window_sets_both_and_so_does_the_order(
         self, printed, quick_csv, quick_record, bench_options
     ):
-        answer = printed(quick_csv, *bench_options, "--derivative-window", 15, "--order", 4)
+        answer = printed(
+            quick_csv, *bench_options, *REFINED, "--derivative-window", 15, "--order", 4
+        )
         settings = IdentificationSettings(derivative_window=15, order=4, assumed_mass=1.6)
         assert answer["evidence"]["published_window"] == answer["derivative_window"] == 15
         assert answer["settings"]["order"] == 4
@@ -55,7 +59,7 @@ class TestOptions:
 
     def test_without_it_the_record_chooses_one(self, printed, quick_csv, bench_options):
         """No noise, no need of 31 samples; the published estimate keeps its 31."""
-        answer = printed(quick_csv, *bench_options)
+        answer = printed(quick_csv, *bench_options, *REFINED)
         assert answer["evidence"]["published_window"] == 31
         assert 5 <= answer["derivative_window"] < 31
 
@@ -63,8 +67,8 @@ class TestOptions:
         """Twice the area is twice the force, and so is every parameter; 2 rounds nothing."""
         path = tmp_path / "valve.yaml"
         path.write_text("diaphragm_area: 0.089\npressure_reference: 41740.0\n")
-        once = printed(quick_csv, *bench_options, "--fix", "mass=1.6")
-        twice = printed(quick_csv, "--valve", path, "--fix", "mass=3.2")
+        once = printed(quick_csv, *bench_options, *REFINED, "--fix", "mass=1.6")
+        twice = printed(quick_csv, "--valve", path, *REFINED, "--fix", "mass=3.2")
         doubled = {name: 2 * value for name, value in column(once, "published").items()}
         assert column(twice, "published") == doubled
         assert known(twice) == pytest.approx(
@@ -79,8 +83,8 @@ class TestOptions:
         columns = columns_of(quick_record)
         pressure = columns.pop("pressure_pa")
         path = write_csv(columns | {header: BENCH_VALVE.actuator_force(pressure)}, "force.csv")
-        found = printed(path, "--force-column", header, "--fix", "mass=1.6")
-        expected = printed(quick_csv, *bench_options, "--fix", "mass=1.6")
+        found = printed(path, "--force-column", header, *REFINED, "--fix", "mass=1.6")
+        expected = printed(quick_csv, *bench_options, *REFINED, "--fix", "mass=1.6")
         assert column(found, "published") == column(expected, "published")
         assert column(found, "verdict") == column(expected, "verdict")
         assert known(found) == pytest.approx(known(expected), rel=1e-9)

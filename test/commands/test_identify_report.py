@@ -85,7 +85,7 @@ def require_parameters(page, answer):
 
 
 def test_the_page_holds_all_that_was_found(reported, quick_csv):
-    page, answer = reported(quick_csv, *BASELINE)
+    page, answer = reported(quick_csv, *BASELINE, "--method", "refined")
     page.require_self_contained()
     assert page.said("h1") == ["Friction of record.csv"]
     assert page.said("h2") == [each for each in SECTIONS if each != "Notes" or answer["warnings"]]

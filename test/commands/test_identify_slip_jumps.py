@@ -34,7 +34,7 @@ class TestSlipJumps:
         path = tmp_path / "graphite.yaml"
         geometry = dataclasses.asdict(GRAPHITE_VALVE)
         path.write_text("\n".join(f"{name}: {value}" for name, value in geometry.items()))
-        return ["--valve", path, "--fix", "mass=1.6"]
+        return ["--valve", path, "--fix", "mass=1.6", "--method", "refined"]
 
     @pytest.fixture
     def file_of(self, write_csv, columns_of):
@@ -95,3 +95,16 @@ class TestSlipJumps:
         assert re.search(
             r"note: the stamps of the stem are (99|100|101)(\.\d)? ms late against those", words
         )
+
+    @pytest.mark.parametrize("packing", [SLIPPING, FALLING], ids=["slips", "falls"])
+    def test_with_a_lag_in_the_intervals(self, printed, file_of, options, packing):
+        """The default finds the same packing, and its wider intervals hold the truth."""
+        parameters = printed(file_of(packing), *options[:-2])["parameters"]
+        for name in self.NAMES:
+            low, high = parameters[name]["interval"]
+            assert low < getattr(packing, name) < high, name
+        friction = parameters["coulomb_friction"]
+        assert friction["half_width"] < 0.05 * friction["value"]
+        if packing.stribeck_velocity > 0:
+            low, high = parameters["stribeck_velocity"]["interval"]
+            assert low < packing.stribeck_velocity < high

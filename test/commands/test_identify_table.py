@@ -23,6 +23,7 @@ from valve_friction_ros.model import (
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
 PNG = b"\x89PNG\r\n\x1a\n"
+REFINED = ("--method", "refined")
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +35,7 @@ class TestTable:
     def test_every_parameter_with_interval_and_verdict(
         self, call, result, quick_csv, bench_options
     ):
-        code, out, err = call(quick_csv, *bench_options)
+        code, out, err = call(quick_csv, *bench_options, *REFINED)
         assert (code, err) == (0, "")
         weak = "weak"  # two strokes only
         for name, unit in UNITS.items():
@@ -58,8 +59,8 @@ class TestTable:
         assert "fixed: given" not in out
 
     def test_reasons_fit_and_notes(self, call, printed, result, quick_csv, bench_options):
-        answer = printed(quick_csv, *bench_options)
-        words = " ".join(call(quick_csv, *bench_options)[1].split())
+        answer = printed(quick_csv, *bench_options, *REFINED)
+        words = " ".join(call(quick_csv, *bench_options, *REFINED)[1].split())
         for name, entry in answer["parameters"].items():
             assert f"{name} {entry['verdict']}: {entry['reason']}" in words
         misfit = result.misfit
