@@ -12,7 +12,15 @@ import pytest
 from pages import PNG, PageReader
 
 import valve_friction_ros
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, TriangleWave, simulate
+from valve_friction_ros.identification import TIMING_UNCERTAINTY
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SensorNoise,
+    TriangleWave,
+    simulate,
+)
 
 BASELINE = ["--baseline-coulomb-friction", "100", "--baseline-half-width", "2"]
 WORDS = {
@@ -22,6 +30,7 @@ WORDS = {
     "static_friction": "static friction F_s [N]",
     "spring_constant": "spring constant k [N/m]",
     "spring_preload": "spring preload F_0 [N]",
+    "sliding_friction": "sliding friction [N]",
 }
 SECTIONS = [
     "Parameters",
@@ -99,6 +108,40 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     assert f"valve_friction_ros {valve_friction_ros.__version__}" in software
     assert {"numpy", "scipy", "Python"} < {each.split()[0] for each in software}
     assert page.table("record")["samples"] == ("1000, sampled every 10 ms",)
+
+
+def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_record):
+    """A noisy record: the uncertainty budget of JSON, and nothing that speaks of another method."""
+    noisy = SensorNoise(position=20e-6, pressure=150.0, seed=2).applied_to(quick_record)
+    page, answer = reported(write_csv(columns_of(noisy)))
+    page.require_self_contained()
+    assert answer["method"] == "robust"
+    assert page.table("setting")["method"] == ("robust",)
+    titles = page.said("h2")
+    assert titles.index("Uncertainty budget") == titles.index("Parameters") + 1
+    estimated = {
+        name: entry
+        for name, entry in answer["parameters"].items()
+        if entry["verdict"] in ("identified", "weak")
+    }
+    budget = answer["evidence"]["uncertainty_budget"]
+    table = page.table("standard uncertainty")
+    assert [*table] == [WORDS[name] for name in estimated]
+    for name, entry in estimated.items():
+        by_source = budget[name]
+        assert tuple(map(float, table[WORDS[name]])) == pytest.approx(
+            (by_source["record"], by_source["timing"]), rel=0.05, abs=1e-12
+        )
+        assert entry["half_width"] >= 1.95 * math.hypot(*by_source.values())
+    assert {"sliding friction [N]", WORDS["coulomb_friction"]} <= {*page.table("parameter")}
+    settings = page.table("setting")
+    assert "derivative window" not in settings
+    assert settings["timing uncertainty, standard deviation of the lag between the signals"] == (
+        f"{TIMING_UNCERTAINTY:g} s, by default",
+    )
+    words = page.text.lower()
+    assert "refined" not in words
+    assert "0 samples" not in words.replace("1000 samples", "")
 
 
 def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):

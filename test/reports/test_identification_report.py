@@ -8,6 +8,7 @@ import pytest
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import StemComparison, Verdict
 from valve_friction_ros.identification.published.sweep_drawing import chosen_region
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.reports import (
     Page,
     identification_report,
@@ -68,6 +69,97 @@ def test_the_time_of_a_record_is_told_where_its_clock_is_that_of_the_world(ident
     assert "began" not in rows(identified, "Record")
     mistaken = dataclasses.replace(identified.recording, start_time=1.7e18)
     assert "began" not in of(mistaken)
+
+
+class TestUncertaintyBudget:
+    """Of a method whose evidence holds one, whatever its sources are called."""
+
+    @pytest.fixture
+    def with_budget(self, with_friction):
+        """Function of a budget and settings: the record with them; F_c and k are estimated."""
+
+        def build(budget, **settings):
+            record = with_friction(150.0)
+            result = dataclasses.replace(
+                record.result,
+                evidence={"uncertainty_budget": budget},
+                derivative_window=0,
+                settings=dataclasses.replace(record.result.settings, **settings),
+            )
+            return dataclasses.replace(record, result=result)
+
+        return build
+
+    def test_a_row_an_estimate_and_a_column_a_source(self, with_budget):
+        """What is withheld, as F_s, has no row."""
+        budget = {
+            "coulomb_friction": {"record": 17.31, "timing": 0.7215},
+            "static_friction": {"record": 44.0, "timing": 1.4},
+            "spring_constant": {"record": 1381.9, "timing": 0.0},
+        }
+        (table, words) = section(
+            identification_report(with_budget(budget)), "Uncertainty budget"
+        ).blocks
+        assert [column.title for column in table.columns] == [
+            "standard uncertainty",
+            "by the record",
+            "by the timing",
+        ]
+        assert table.rows == (
+            ("Coulomb friction F_c [N]", "17", "0.72"),
+            ("spring constant k [N/m]", "1382", "0"),
+        )
+        assert words.text.startswith("Where the intervals come from.")
+
+    def test_its_sources_are_those_of_the_method(self, with_budget):
+        told = rows(with_budget({"coulomb_friction": {"weather": 2.0}}), "Uncertainty budget")
+        assert told == {"Coulomb friction F_c [N]": ("2",)}
+
+    def test_a_given_parameter_has_none(self, with_friction):
+        record = with_friction(150.0, 0.0, Verdict.FIXED)
+        result = dataclasses.replace(
+            record.result,
+            evidence={
+                "uncertainty_budget": {
+                    "coulomb_friction": {"record": 1.0},
+                    "spring_constant": {"record": 2.0},
+                }
+            },
+        )
+        told = rows(dataclasses.replace(record, result=result), "Uncertainty budget")
+        assert [*told] == ["spring constant k [N/m]"]
+
+    def test_other_methods_have_none(self, identified):
+        titles = [one.title for one in identification_report(identified).sections]
+        assert "Uncertainty budget" not in titles
+        settings = rows(identified, "Settings and versions")
+        assert not [name for name in settings if name.startswith("timing uncertainty")]
+        assert settings["derivative window"][0].endswith(
+            " samples, chosen from the noise of the record"
+        )
+
+    @pytest.mark.parametrize(
+        ("given", "told"), [(None, "0.04 s, by default"), (0.0, "0 s, as given")]
+    )
+    def test_the_timing_that_it_counts_with(self, with_budget, given, told):
+        record = with_budget({"coulomb_friction": {"record": 1.0}}, timing_uncertainty=given)
+        settings = rows(record, "Settings and versions")
+        (found,) = (value for name, value in settings.items() if name.startswith("timing"))
+        assert found == (told,)
+        assert "derivative window" not in settings  # of no samples
+
+
+@pytest.mark.parametrize(
+    ("systematic", "words"),
+    [
+        (3e-6, "3 µm are not noise, which does not put the model in doubt."),
+        (5e-6, "5 µm are not noise, which puts the model in doubt."),
+    ],
+)
+def test_what_a_misfit_means(with_friction, systematic, words):
+    record = with_friction(150.0, misfit=Misfit(0.99, 9e-6, systematic, 4e-6))
+    (picture,) = section(identification_report(record), "Residual").blocks
+    assert picture.caption.endswith(f" Of 9 µm rms, {words}")
 
 
 def test_notes_of_the_record_come_before_those_of_the_estimate(identified):

@@ -14,6 +14,7 @@ from valve_friction_ros.health import percentage
 from valve_friction_ros.identification import StemComparison
 from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
 from valve_friction_ros.reports.identification_tables import (
+    budget_table,
     friction_table,
     parameter_table,
     record_table,
@@ -30,6 +31,12 @@ _VERDICTS = (
     "not determine the parameter, and no number is shown. Fixed: the value was given."
 )
 _FRICTION = "Friction against its baseline"
+_BUDGET = (
+    "Where the intervals come from. By the record: its noise, what the model leaves of the motion, "
+    "and the imperfections of the valve. By the timing: a lag between the signals. The 95 % "
+    "interval is twice the root of the sum of their squares, or wider where other models are "
+    "nearly as probable."
+)
 _NO_STEM = (
     "The spring is zero or not identifiable, so the stem cannot be simulated: no force returns it. "
     "This report therefore holds neither a comparison nor a residual."
@@ -39,9 +46,10 @@ _NO_STEM = (
 def identification_report(record: IdentifiedRecord) -> Page:
     """Return the page on an identified record: its parameters and the evidence for them.
 
-    The diagnosis in one sentence, then parameters, friction against its baseline, the record, the
-    valve signature, the evidence of the method, the measured against the simulated position, the
-    residual, notes, settings and versions. Parts that a method does not have are left out.
+    The diagnosis in one sentence, then parameters, uncertainty budget, friction against its
+    baseline, the record, the valve signature, the evidence of the method, the measured against the
+    simulated position, the residual, notes, settings and versions. Parts that a method does not
+    have are left out.
     """
     return Page(f"Friction of {record.name}", diagnosis_sentence(record), tuple(_sections(record)))
 
@@ -49,6 +57,8 @@ def identification_report(record: IdentifiedRecord) -> Page:
 def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     result = record.result
     yield Section("Parameters", (parameter_table(record), Paragraph(_VERDICTS)))
+    if budget := budget_table(record):
+        yield Section("Uncertainty budget", (budget, Paragraph(_BUDGET)))
     yield _friction(record)
     yield _record(record)
     yield _signature(record)
@@ -124,8 +134,8 @@ def _residual(record: IdentifiedRecord, comparison: StemComparison) -> Section:
     )
     if misfit is not None:
         caption += (
-            f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are not noise; "
-            f"up to {misfit.tolerated * 1e6:.3g} µm count as chance."
+            f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are not noise, "
+            f"which {'does not put' if misfit.describes else 'puts'} the model in doubt."
         )
     picture = Picture(
         residual_figure(comparison),

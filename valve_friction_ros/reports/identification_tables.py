@@ -13,11 +13,12 @@ import scipy
 
 import valve_friction_ros
 from valve_friction_ros.health import Baseline, dead_band, percentage
-from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.identification import TIMING_UNCERTAINTY, Parameter, Verdict, two_digits
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
 
 __all__ = [
+    "budget_table",
     "friction_table",
     "parameter_table",
     "record_table",
@@ -51,12 +52,19 @@ def _number(value: float | None) -> str:
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
 
 
+def _heading(name: str, one: Mapping[str, Any]) -> str:
+    return f"{_WORDS.get(name, name.replace('_', ' '))} [{one['unit']}]"
+
+
+def _is_estimated(one: Mapping[str, Any]) -> bool:
+    return one["value"] is not None and one["verdict"] != Verdict.FIXED.value
+
+
 def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
-    stated = one["value"] is not None and one["verdict"] != Verdict.FIXED.value
     return (
-        f"{_WORDS.get(name, name.replace('_', ' '))} [{one['unit']}]",
+        _heading(name, one),
         _number(one["value"]),
-        " to ".join(map(_number, one["interval"])) if stated else _NOTHING,
+        " to ".join(map(_number, one["interval"])) if _is_estimated(one) else _NOTHING,
         ": ".join(filter(None, (one["verdict"], one["reason"]))),
         _number(one["published"]),
     )
@@ -76,6 +84,25 @@ def parameter_table(record: IdentifiedRecord) -> Table:
     marked = ([*shown].index("coulomb_friction"),)
     count = 4 + any(one["published"] is not None for one in shown.values())
     return Table(columns[:count], tuple(row[:count] for row in rows), marked=marked)
+
+
+def budget_table(record: IdentifiedRecord) -> Table | None:
+    """Return the standard uncertainty of each estimate by its sources.
+
+    It is None for a method whose evidence holds no ``uncertainty_budget``.
+    """
+    shown = record.result.to_dict()
+    parameters, budget = shown["parameters"], shown["evidence"].get("uncertainty_budget")
+    if not budget:
+        return None
+    sources = [*next(iter(budget.values()))]
+    rows = tuple(
+        (_heading(name, parameters[name]), *(two_digits(one[source]) for source in sources))
+        for name, one in budget.items()
+        if _is_estimated(parameters[name])
+    )
+    headings = tuple(Column(f"by the {source}", is_number=True) for source in sources)
+    return Table((Column("standard uncertainty"), *headings), rows)
 
 
 def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
@@ -145,13 +172,15 @@ def settings_table(record: IdentifiedRecord) -> Table:
     shown = result.to_dict()
     settings = shown["settings"]
     fixed = ", ".join(f"{name} = {value:g}" for name, value in settings["fixed"].items())
+    window = shown["derivative_window"]
     source = "chosen from the noise of the record"
     if settings["derivative_window"] is not None:
         source = "as given"
     bias = settings["position_bias"]
     rows = [
         ("method", shown["method"]),
-        ("derivative window", f"{shown['derivative_window']} samples, {source}"),
+        *([("derivative window", f"{window} samples, {source}")] if window else []),
+        *_timing(shown),
         *(result.drawing.settings or {}).items(),
         ("given parameters", fixed or "none"),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
@@ -174,6 +203,15 @@ def settings_table(record: IdentifiedRecord) -> Table:
         ("software", _versions()),
     ]
     return _pairs(rows, "setting", "value")
+
+
+def _timing(shown: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the timing uncertainty of a method that counts with one."""
+    if "uncertainty_budget" not in shown["evidence"]:
+        return []
+    given = shown["settings"]["timing_uncertainty"]
+    told = f"{TIMING_UNCERTAINTY:g} s, by default" if given is None else f"{given:g} s, as given"
+    return [("timing uncertainty, standard deviation of the lag between the signals", told)]
 
 
 def _versions() -> str:

@@ -43,7 +43,8 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         metavar="SAMPLES",
         help=f"derivative window d, samples; by default {defaults.published_window} for the "
-        "published method, and chosen by the noise of the record for the others",
+        "published method, and chosen by the noise of the record for refined and signature; "
+        "robust takes no derivatives",
     )
     parser.add_argument(
         "--timing-uncertainty",
