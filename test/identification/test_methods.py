@@ -15,7 +15,7 @@ from valve_friction_ros.identification import (
     identify_robust,
     validate,
 )
-from valve_friction_ros.identification.refined import method as refined
+from valve_friction_ros.identification.methods import method_used
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,
@@ -83,9 +83,9 @@ class TestBest:
         )
 
     @pytest.mark.parametrize("settings", ONLY_REFINED.values(), ids=ONLY_REFINED)
-    def test_what_only_refined_has(self, whole, monkeypatch, settings):
-        monkeypatch.setattr(refined, "identify_refined", lambda *known: known)
-        assert identify(whole, BENCH_VALVE, settings) == (whole, BENCH_VALVE, settings)
+    def test_what_only_refined_has(self, whole, settings):
+        assert method_used("best", settings) == "refined"
+        assert identify(whole, BENCH_VALVE, settings).method == "refined"
 
     def test_the_result_names_the_method(self, whole):
         settings = ONLY_REFINED["a known position bias"]
