@@ -34,6 +34,10 @@ _LOST = 0.5
 _LOOP = 0.02
 """Share by which the work of friction by the averaged signals may be off."""
 
+_FAR = 0.5
+"""Share of that work by which a fit may differ from it before it is doubted, however well it
+follows the stem: a lag alone makes up for less."""
+
 _FINEST = {"sliding_friction": 3e-3, "spring_constant": 2e-4}
 _FINEST_OTHER = 5e-4
 """No interval is narrower than this share of its value, however quiet the record is. The speed of
@@ -153,9 +157,11 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
         if name == "sliding_friction":
             lost = fit.model.record.lost / fit.model.record.duration
             width = math.hypot(width, _LOST * lost * abs(first.value))
-        if name == "sliding_friction" and fit.inflation > NOISE_LIKE:
-            apart = abs(loop_friction(fit.model, places[0][1].at) - first.value)
-            width = math.hypot(width, apart + _LOOP * abs(first.value))
+        if name == "sliding_friction":
+            loop = loop_friction(fit.model, places[0][1].at)
+            apart = abs(loop - first.value)
+            if fit.inflation > NOISE_LIKE or apart > _FAR * abs(loop):
+                width = math.hypot(width, apart + _LOOP * abs(first.value))
         width = max(width, _FINEST.get(name, _FINEST_OTHER) * abs(first.value))
         result[name] = Estimated(first.value, width, _budget(*places[0][:2], first))
     return result
