@@ -57,8 +57,11 @@ class Schedule:
         self._skip = None
 
     def values(self) -> dict[str, str]:
-        """Return the values of the diagnostic for the last skip, if there was any."""
-        if self._skip is None:
+        """Return the values of the diagnostic for the last skip, while there is a schedule.
+
+        An identification that was under way when the schedule ended may still skip.
+        """
+        if self._skip is None or self._timer is None:
             return {}
         reason, stamp = self._skip
         age = (self._node.get_clock().now().nanoseconds - stamp) / 1e9
