@@ -2,49 +2,23 @@
 
 import math
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.signals.derivatives import Derivatives, differentiate
+from valve_friction_ros.signals.drive_smoothing import DriveSmoothing, smoothing_of
 from valve_friction_ros.signals.noise import position_noise, quantisation_step
-from valve_friction_ros.signals.smoothing import find_corners, longest_faithful_window
+from valve_friction_ros.signals.smoothing import longest_faithful_window
 
-__all__ = ["DriveSmoothing", "MeasuredRecord", "measured"]
-
-_CORNER_TIME = 0.04
-_CORNER_SAMPLES = 8
-"""Least time, s, and samples over which the slopes on both sides of a corner are compared.
-
-Chosen: short against the 1.3 s lag of the bench's converter; a slope over 8 samples has 0.15 of
-the noise per sample. An absolute time."""
-
-_LONGEST_SMOOTHING = 0.5
-"""Longest smoothing window of the drive, s. Chosen: it bounds the time of the search.
-
-`longest_faithful_window` decides before that where the signal bends. An absolute time."""
+__all__ = ["MeasuredRecord", "measured"]
 
 _LONGEST_DERIVATIVE_WINDOW = 1.0
-"""Longest derivative window, s, and a twentieth of the record at most. Chosen as above."""
+"""Longest derivative window, s, and a twentieth of the record at most.
+
+Chosen: it bounds the time of the search. An absolute time."""
 
 _NO_CORNERS = np.empty(0, dtype=np.intp)
-
-
-class DriveSmoothing(NamedTuple):
-    """Smoothing of the drive, as far as its noise requires.
-
-    Attributes
-    ----------
-    corners : ndarray of int
-        Samples at which the slope of the drive jumps; it is smoothed between them.
-    window : int
-        Window to smooth over, samples; 1 for a noiseless drive.
-    """
-
-    corners: NDArray[np.intp]
-    window: int
 
 
 class MeasuredRecord(Recording):
@@ -72,12 +46,7 @@ class MeasuredRecord(Recording):
     @cached_property
     def drive_smoothing(self) -> DriveSmoothing:
         """Corners of the drive, and the window to smooth it over between them."""
-        period = self.sample_period
-        reach = max(round(_CORNER_TIME / period), _CORNER_SAMPLES)
-        corners = find_corners(self.drive, self.drive_noise, reach)
-        longest = max(round(_LONGEST_SMOOTHING / period), 1)
-        window = longest_faithful_window(self.drive, corners, self.drive_noise, longest)
-        return DriveSmoothing(corners, window)
+        return smoothing_of(self.drive, self.drive_noise, self.sample_period)
 
     @cached_property
     def _faithful_window(self) -> int:

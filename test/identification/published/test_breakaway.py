@@ -12,10 +12,10 @@ from valve_friction_ros.identification.published.breakaway import (
     _last_within,
     _onset,
     find_breakaways,
-    runs_of,
 )
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
 from valve_friction_ros.signals.noise import position_noise, velocity_noise
+from valve_friction_ros.signals.runs import runs_of
 
 SETTINGS = IdentificationSettings()
 

@@ -9,8 +9,9 @@ from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.signals.measured_record import measured
 from valve_friction_ros.signals.noise import velocity_noise
+from valve_friction_ros.signals.runs import runs_of
 
-__all__ = ["Breakaway", "find_breakaways", "runs_of"]
+__all__ = ["Breakaway", "find_breakaways"]
 
 _AT_REST = 4.0
 """A stem rests while its speed is below this many standard deviations of the velocity's noise.
@@ -40,14 +41,6 @@ class Breakaway(NamedTuple):
 
     sample: int
     direction: int
-
-
-def runs_of(active: NDArray[np.bool_]) -> list[list[int]]:
-    """First and one-past-last index of each run of True."""
-    edges: list[list[int]] = (
-        np.flatnonzero(np.diff(active, prepend=False, append=False)).reshape(-1, 2).tolist()
-    )
-    return edges
 
 
 def _last_within(displacement: NDArray[np.float64], mark: float) -> int:

@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.smoothing import (
-    find_corners,
-    longest_faithful_window,
-    smooth_between,
-    smoothing_leverage,
-)
+from valve_friction_ros.signals.drive_smoothing import smoothing_of
+from valve_friction_ros.signals.runs import runs_of
+from valve_friction_ros.signals.smoothing import smooth_between, smoothing_leverage
 from valve_friction_ros.signals.stamped_noise import stamped_noise
 
 __all__ = ["FittedRecord", "SlowView", "fitted_record", "set_anew_at_rests"]
@@ -28,9 +25,6 @@ _MOST_STEPS = 12_500
 """Steps of the simulation in a record; those of a longer record are longer, up to four times."""
 
 _SAMPLES_A_WINDOW = 32
-_CORNER_TIME = 0.04
-_CORNER_SAMPLES = 8
-_LONGEST_SMOOTHING = 0.5
 _SLOW = 0.1
 """Time, s, over which the measured stem is averaged, twice, to evaluate slow terms along it."""
 
@@ -208,9 +202,7 @@ def _smoothed(signal: StampedSignal, grid: NDArray[np.float64]) -> _Smoothed:
     period = float(grid[1] - grid[0])
     whole = np.interp(grid, signal.time, signal.value)
     noise = _noise_on_grid(signal, grid, stamped_noise(signal))
-    corners = find_corners(whole, noise, max(round(_CORNER_TIME / period), _CORNER_SAMPLES))
-    longest = max(round(_LONGEST_SMOOTHING / period), 1)
-    window = longest_faithful_window(whole, corners, noise, longest)
+    corners, window = smoothing_of(whole, noise, period)
     if window == 1:
         return _Smoothed(whole, np.stack([whole, whole]), np.full(grid.size, noise**2), window)
     parts = [np.interp(grid, signal.time[i::2], signal.value[i::2]) for i in (0, 1)]
@@ -292,7 +284,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     finest = min(stem.period, drive.period)
     grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
     pressure = _smoothed(drive, grid)
-    longest = _LONGEST_PERIOD * min(max((end - begin) / (_LONGEST_PERIOD * _MOST_STEPS), 1.0), 4.0)
+    longest = min(max((end - begin) / _MOST_STEPS, _LONGEST_PERIOD), 4.0 * _LONGEST_PERIOD)
     if finest > longest:
         period = finest / math.ceil(finest / longest - 1e-9)
         fine = np.arange(0.0, grid[-1], period, dtype=np.float64)
@@ -360,14 +352,13 @@ def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
     that is simulated at the wrong time then spoils no other. What a place is off by noise is the
     price; the end of a fit does without.
     """
-    still = record.still
-    edges = np.flatnonzero(np.diff(still)) + 1
-    bounds = np.concatenate([[0], edges, [still.size]])
-    positions = np.interp(np.arange(still.size) * record.period, record.time, record.position)
+    positions = np.interp(
+        np.arange(record.force.size) * record.period, record.time, record.position
+    )
     anew = record.anew.copy()
     mean, margin = (max(round(time / record.period), 1) for time in (_REST_MEAN, _REST_MARGIN))
-    for begin, end in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+    for begin, end in runs_of(record.still):
         last = end - margin
-        if still[begin] and last - mean > begin and last > 0:
+        if last - mean > begin and last > 0:
             anew[last] = float(np.mean(positions[last - mean : last]))
     return replace(record, anew=anew)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
+from valve_friction_ros.signals.runs import runs_of
 
 __all__ = ["inflation", "reading_weights", "stroke_cells"]
 
@@ -22,16 +23,13 @@ def reading_weights(record: FittedRecord, spring_constant: float) -> NDArray[np.
     count as one if each has the variance s_x²/n + L·s_F²/k².
     """
     still = record.still[np.rint(record.cells).astype(np.intp)]
-    edges = np.flatnonzero(np.diff(still)) + 1
-    bounds = np.concatenate([[0], edges, [still.size]])
     lasting = np.full(still.size, record.memory)
     variance = record.force_variance.copy()
     reach = math.ceil(record.memory)
-    for begin, end in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-        if still[begin]:
-            at_stop = record.force_variance[max(begin - reach, 0) : begin + reach]
-            variance[begin:end] = np.max(at_stop)
-            lasting[begin:end] = max(end - begin, record.memory)
+    for begin, end in runs_of(still):
+        at_stop = record.force_variance[max(begin - reach, 0) : begin + reach]
+        variance[begin:end] = np.max(at_stop)
+        lasting[begin:end] = max(end - begin, record.memory)
     white = record.noise**2 / record.samples
     weights: NDArray[np.float64] = 1.0 / np.sqrt(white + lasting * variance / spring_constant**2)
     return weights

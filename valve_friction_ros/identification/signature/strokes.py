@@ -7,13 +7,13 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.breakaway import runs_of
 from valve_friction_ros.identification.signature.onset import fit_onset
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.derivatives import differentiate
 from valve_friction_ros.signals.measured_record import measured
 from valve_friction_ros.signals.noise import velocity_noise
+from valve_friction_ros.signals.runs import runs_of
 
 __all__ = ["BreakawayPoint", "SignatureStroke", "Sliding", "find_strokes", "velocity_window"]
 

@@ -44,8 +44,12 @@ class Schedule:
         self._period, self._skip = period, None
 
     def skip(self, reason: str) -> None:
-        """Remember that nothing was identified, and why."""
-        self._skip = reason, self._node.get_clock().now().nanoseconds
+        """Remember that nothing was identified, and why.
+
+        What began before the schedule ended may end after it, and does not count.
+        """
+        if self._timer is not None:
+            self._skip = reason, self._node.get_clock().now().nanoseconds
 
     def stall(self) -> None:
         """Remember that nothing new has come; an older reason for a skip still holds."""
@@ -57,11 +61,8 @@ class Schedule:
         self._skip = None
 
     def values(self) -> dict[str, str]:
-        """Return the values of the diagnostic for the last skip, while there is a schedule.
-
-        An identification that was under way when the schedule ended may still skip.
-        """
-        if self._skip is None or self._timer is None:
+        """Return the values of the diagnostic for the last skip, if there was any."""
+        if self._skip is None:
             return {}
         reason, stamp = self._skip
         age = (self._node.get_clock().now().nanoseconds - stamp) / 1e9
