@@ -21,11 +21,12 @@ __all__ = ["PosteriorFit", "Stage", "fit"]
 
 _DAMPINGS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 0.03, 0.3, 3.0)
 _SHORTER = (1.0, 0.5, 0.2)
-_WORTH = 0.02
+_WORTH = 0.1
 """Fall of the sum of squares, in variances, below which a step is not worth taking."""
 
 _LARGEST_CHANGE = 0.5
 _LEAST_COMMON = 0.01
+_BLOCK = 512
 _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
 
 
@@ -93,9 +94,14 @@ class PosteriorFit:
 
 
 def _misfit(model: BroadModel, residual: NDArray[np.float64]) -> float:
-    """Sum the products of both halves' residuals: noise of the pressure adds nothing to it."""
+    """Sum the products of both halves' residuals: noise of the pressure adds nothing to it.
+
+    Where the simulated stems of both halves go different ways, their products may be below zero;
+    the squares of their mean, less what noise explains of them, are then the measure.
+    """
     even, odd = residual * model.weights
-    return float(even @ odd)
+    mean = 0.5 * (even + odd)
+    return max(float(np.sum(even * odd)), float(np.sum(mean**2)) - mean.size)
 
 
 def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,6 +115,15 @@ def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.
     shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
     back = (vectors * root) @ turned
     return np.asarray((back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T, dtype=np.float64)
+
+
+def _products(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Multiply a matrix by its transpose, block by block.
+
+    For larger ones NumPy's library starts threads, which wait for one another on a busy machine.
+    """
+    blocks = np.array_split(rows, max(rows.shape[1] // _BLOCK, 1), axis=1)
+    return np.asarray(np.sum([block @ block.T for block in blocks], axis=0))
 
 
 class _Problem:
@@ -136,13 +151,14 @@ class _Problem:
         self.jacobian = jacobian(at, names)
         size = np.abs(np.diag(self.jacobian))
         even, odd = model.sensitivity(at, names, readings) * model.weights
-        own = 0.5 * (even @ even.T + odd @ odd.T)
+        same, apart = _products(even + odd), _products(even - odd)
+        own, cross = 0.25 * (same + apart), 0.25 * (same - apart)
         diagonal = np.diag(own) / self.inflation + self.precision * size**2
         self.scale = np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), 1.0)
         outer = np.outer(self.scale, self.scale) * self.inflation
-        information = _common(own / outer, 0.5 * (even @ odd.T + odd @ even.T) / outer)
+        information = _common(own / outer, cross / outer)
         self.curvature = information + np.diag(self.precision * size**2 / self.scale**2)
-        gradient = 0.5 * (even @ scaled[1] + odd @ scaled[0]) / self.inflation
+        gradient = 0.5 * np.sum(even * scaled[1] + odd * scaled[0], axis=1) / self.inflation
         self.slope = (gradient - self.precision * size * self.distance) / self.scale
         self.straight = straight(at, names)
         lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.robust.broad_model import ABSENT, BroadModel
 from valve_friction_ros.identification.robust.coordinates import MAIN, Coordinates
 from valve_friction_ros.identification.robust.fitted_record import (
@@ -14,14 +13,16 @@ from valve_friction_ros.identification.robust.fitted_record import (
 )
 from valve_friction_ros.identification.robust.imperfections import TIMING, deviations
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, fit
+from valve_friction_ros.identification.robust.starts import (
+    lagging,
+    nearest,
+    overall_spring,
+    sliding,
+    split,
+    splits,
+)
 
 __all__ = ["Prior", "search"]
-
-_SLIDING = 0.15
-"""Share of the top speed above which a stem surely slides."""
-
-_DRY_SHARES = (0.3, 0.5, 0.7, 0.85, 0.95, 1.0)
-"""Shares of the sliding friction to start F_c from; the rest is viscous."""
 
 _SLIP_SHARES = (0.35, 0.55, 0.75, 0.9)
 _SLIPS = (0.15, 0.4, 0.8)
@@ -39,8 +40,8 @@ _START_TIME = 5e-3
 """The first position is known to so many deviations of its noise, and to what the stem moves in
 such a time (s) and in that by which its sensor may be late."""
 
-_MOST_WORK = 40_000_000
-"""Steps of simulations after which no other branch begins: about two seconds of a processor.
+_MOST_WORK = 20_000_000
+"""Steps of simulations after which no other branch begins: about one and a half seconds of a processor.
 
 A count and not a time, so that the answer does not depend on the machine."""
 
@@ -78,85 +79,13 @@ class Prior:
     fixed: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class _Sliding:
-    """A regression over the steps at which the stem surely slides.
-
-    Attributes
-    ----------
-    friction : float
-        Sliding friction at the mean speed, N.
-    speed : float
-        That speed, m/s.
-    spring_constant, spring_preload : float
-        The spring.
-    """
-
-    friction: float
-    speed: float
-    spring_constant: float
-    spring_preload: float
-
-
-def _sliding(record: FittedRecord) -> _Sliding:
-    """Regress the averaged force on the side of motion, the velocity, the position and 1."""
-    slow = record.slow
-    fast = slow.speed > _SLIDING * np.quantile(slow.speed, 0.98)
-    position = slow.lowest + 0.5 * (slow.place + 1.0) * slow.range
-    columns = np.column_stack(
-        [np.sign(slow.velocity), slow.velocity, position, np.ones_like(position)]
-    )[fast]
-    scale = np.max(np.abs(columns), axis=0)
-    solution = np.linalg.lstsq(columns / scale, slow.force[fast], rcond=1e-6)[0] / scale
-    dry, viscous, spring, preload = solution.tolist()
-    speed = float(np.mean(slow.speed[fast]))
-    if not spring > 0:
-        raise RefusalError(
-            "the stem does not follow the force: check that both signals belong to this valve, "
-            "their directions and their units"
-        )
-    return _Sliding(max(dry + viscous * speed, 1.0), speed, spring, preload)
-
-
-def _overall_spring(record: FittedRecord) -> dict[str, float]:
-    """Return the spring by which force and position have the same spread.
-
-    A hysteresis loop widens the force and the position alike, whatever the friction does.
-    """
-    position = record.slow.lowest + 0.5 * (record.slow.place + 1.0) * record.slow.range
-    spring = float(np.std(record.slow.force) / np.std(position))
-    preload = float(np.mean(record.slow.force) - spring * np.mean(position))
-    return {"spring_constant": spring, "spring_preload": preload}
-
-
-def _split(sliding: _Sliding, share: float) -> dict[str, float]:
-    """Split the sliding friction into F_c and F_v."""
-    return {
-        "coulomb_friction": share * sliding.friction,
-        "viscous_friction": max(1.0 - share, 0.02) * sliding.friction / sliding.speed,
-    }
-
-
-def _nearest(model: BroadModel, starts: Sequence[Coordinates]) -> list[Coordinates]:
-    """Sort starts by the distance of their simulated stem from the measured one.
-
-    The mean magnitude counts: a single jump at the wrong time says little of a start.
-    """
-
-    def distance(start: Coordinates) -> float:
-        residual = model.record.position - model.readings(start)
-        return float(np.sum(np.abs(residual * model.weights)))
-
-    return sorted(starts, key=distance)
-
-
 class _Search:
     """The fits of one record."""
 
     def __init__(self, record: FittedRecord, prior: Prior) -> None:
         self.work = 0
         self.prior = prior
-        self.sliding = _sliding(record)
+        self.sliding = sliding(record)
         self.exact = BroadModel(record, self.sliding.spring_constant)
         self.model = replace(self.exact, coarseness=_COARSENESS)
         self.stepwise = replace(self.model, record=set_anew_at_rests(record))
@@ -171,6 +100,7 @@ class _Search:
             float(record.leaving[0])
         )
         self.main = tuple(name for name in MAIN if name not in self.known)
+        self.timing = tuple(name for name in TIMING if name in self.spread)
         self.all = (
             *self.main,
             *(
@@ -185,7 +115,7 @@ class _Search:
             "spring_constant": self.sliding.spring_constant,
             "spring_preload": self.sliding.spring_preload,
             "start_position": record.start,
-            **_split(self.sliding, 0.9),
+            **split(self.sliding, 0.9),
             **self.known,
         }
 
@@ -219,7 +149,7 @@ class _Search:
 
     def from_moves(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
         """Fit each move for itself, from the nearest starts; then the whole from the best."""
-        near = _nearest(self.stepwise, starts)[:_TRIED]
+        near = nearest(self.stepwise, starts)[:_TRIED]
         apart = [self.fit(one, names, _MORE_STEPS, self.stepwise) for one in near]
         best = min(apart, key=lambda one: one.objective)
         return self.fit(best.at, names, _MORE_STEPS)
@@ -227,7 +157,7 @@ class _Search:
     def slipping(self, full: PosteriorFit) -> PosteriorFit:
         """Fit friction that falls as soon as the stem moves."""
         starts = []
-        overall = {**self.base, **_overall_spring(self.model.record)}
+        overall = {**self.base, **overall_spring(self.model.record)}
         plain = {**self.base, **{name: full.at[name] for name in (*MAIN, *TIMING)}}
         for at in (self.base, plain, overall):
             total = max(at["coulomb_friction"], 0.1 * self.sliding.friction)
@@ -243,7 +173,7 @@ class _Search:
                         }
                     )
         names = (*self.main, "slip_force")
-        near = _nearest(self.model, starts)[:_TRIED]
+        near = nearest(self.model, starts)[:_TRIED]
         trials = [self.fit(one, names, _MORE_STEPS) for one in near]
         if self.may_go_on:
             trials.append(self.from_moves(starts, names))
@@ -253,13 +183,13 @@ class _Search:
     def falling(self, full: PosteriorFit) -> PosteriorFit:
         """Fit friction that falls over a range of speeds."""
         spring = {name: full.at[name] for name in ("spring_constant", "spring_preload")}
-        springs = (spring, _overall_spring(self.model.record))
+        springs = (spring, overall_spring(self.model.record))
         top = float(np.quantile(self.model.record.slow.speed, 0.98))
         starts = [
             {
                 **self.base,
                 **one,
-                **_split(self.sliding, share),
+                **split(self.sliding, share),
                 "slip_force": slip * share * self.sliding.friction,
                 "stribeck_velocity": speed,
             }
@@ -275,7 +205,7 @@ class _Search:
             {**self.base, **plain, "slip_force": fallen, "stribeck_velocity": speed}
             for speed in _STRIBECK_SPEEDS
         ]
-        near = _nearest(self.stepwise, starts)[:1]
+        near = nearest(self.stepwise, starts)[:1]
         names = (*self.main, "slip_force", "stribeck_velocity")
         first = self.fit(near[0], names, _FEW_STEPS, self.stepwise)
         others = tuple(name for name in self.all if name != "at_low_speed")
@@ -284,7 +214,7 @@ class _Search:
     def stopping(self, full: PosteriorFit) -> PosteriorFit:
         """Fit a dead zone of the speed."""
         dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
-        return self.full(_nearest(self.model, dead)[0])
+        return self.full(nearest(self.model, dead)[0])
 
     def traded(self, best: PosteriorFit) -> list[PosteriorFit]:
         """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
@@ -324,18 +254,22 @@ class _Search:
         """Return the most probable fit, and those with which it competes."""
         best = self.best()
         others = self.traded(best)
-        nearest = min(others, key=lambda one: one.objective, default=best)
-        if nearest.objective < best.objective - 1.0:
-            deeper = self.fit(nearest.at, best.names, _MORE_STEPS, self.exact)
+        lowest = min(others, key=lambda one: one.objective, default=best)
+        if lowest.objective < best.objective - 1.0:
+            deeper = self.fit(lowest.at, best.names, _MORE_STEPS, self.exact)
             if deeper.objective < best.objective:
                 best, others = deeper, [*others, best]
         return [best, *others]
 
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
-        starts = [{**self.base, **_split(self.sliding, share)} for share in _DRY_SHARES]
-        plain = self.fit(_nearest(self.model, starts)[0], self.main, _FEW_STEPS)
-        best = self.full(plain.at)
+        starts = splits(self.sliding, self.base)
+        plain = self.fit(nearest(self.model, starts)[0], self.main, _FEW_STEPS).at
+        if self.timing:
+            lags = [plain, *lagging(plain, self.prior.timing_uncertainty)]
+            lagged = nearest(self.model, lags)[0]
+            plain = self.fit(lagged, (*self.main, *self.timing), _FEW_STEPS).at
+        best = self.full(plain)
         branches = [self.stopping]
         if "slip_force" in self.all:
             branches = [self.slipping, self.falling, self.stopping]
