@@ -13,7 +13,6 @@ from valve_friction_ros.identification.robust.coordinates import (
     straight,
 )
 from valve_friction_ros.identification.robust.driven_stem import (
-    LOW_SPEED,
     Course,
     Place,
     drive_stem,
@@ -82,6 +81,12 @@ class BroadModel:
         """One over the effective deviation of each reading, 1/m."""
         return reading_weights(self.record, self.usual_spring)
 
+    @cached_property
+    def foreseen_difference(self) -> float:
+        """Sum of the squares of half the difference of both halves' weighted readings, by noise."""
+        shares = self.weights**2 * self.record.force_variance
+        return float(np.sum(shares)) / self.usual_spring**2
+
     def course(self, force: NDArray[np.float64]) -> Course:
         """Return what drives the stem, and the slow terms along it."""
         record, slow = self.record, self.record.slow
@@ -93,15 +98,10 @@ class BroadModel:
             force,
             slow.place,
             slow.age,
-            self.slowness,
+            slow.slowness,
             record.anew,
             record.leaving,
         )
-
-    @cached_property
-    def slowness(self) -> NDArray[np.float64]:
-        """exp(−speed/`LOW_SPEED`) at each step."""
-        return np.exp(self.record.slow.speed / -LOW_SPEED)
 
     @cached_property
     def halves(self) -> tuple[Course, Course]:

@@ -10,10 +10,7 @@ from valve_friction_ros.model.compiled import compiled
 from valve_friction_ros.model.stem_motion import Dynamics
 from valve_friction_ros.model.stem_run import run_stem
 
-__all__ = ["LOW_SPEED", "Course", "Place", "drive_stem", "read_stem"]
-
-LOW_SPEED = 3e-3
-"""Speed, m/s, below which packings are known to hold faster: the v_s published for graphite."""
+__all__ = ["Course", "Place", "drive_stem", "read_stem"]
 
 _LEAST_LAG = 1e-9
 _LARGEST_ASYMMETRY = 0.9
@@ -35,7 +32,7 @@ class Course(NamedTuple):
     place, age : ndarray of float, shape (g,)
         Measured position and time, −1 to 1.
     slowness : ndarray of float, shape (g,)
-        exp(−|ẋ|/`LOW_SPEED`) of the measured stem.
+        Share of the friction at rest that is left at the measured speed.
     anew, leaving : ndarray of float, shape (g,)
         Where the stem is set anew, m, nan elsewhere; its velocity there, m/s.
     """

@@ -12,11 +12,12 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.drive_smoothing import smoothing_of
+from valve_friction_ros.signals.holds import without_repeats
 from valve_friction_ros.signals.runs import runs_of
 from valve_friction_ros.signals.smoothing import smooth_between, smoothing_leverage
 from valve_friction_ros.signals.stamped_noise import stamped_noise
 
-__all__ = ["FittedRecord", "SlowView", "fitted_record", "set_anew_at_rests"]
+__all__ = ["LOW_SPEED", "FittedRecord", "SlowView", "fitted_record", "set_anew_at_rests"]
 
 _LONGEST_PERIOD = 5e-3
 """Longest step of the simulation, s: within it a corner of the pressure may lie."""
@@ -27,6 +28,13 @@ _MOST_STEPS = 12_500
 _SAMPLES_A_WINDOW = 32
 _SLOW = 0.1
 """Time, s, over which the measured stem is averaged, twice, to evaluate slow terms along it."""
+
+LOW_SPEED = 3e-3
+"""Speed, m/s, below which packings are known to hold faster: the v_s published for graphite."""
+
+_CALM = 1e-3
+"""Noise of the speed, over `LOW_SPEED`, for which it is averaged longer: through a friction that
+falls with speed, the simulated stem would follow the noise of the measured one."""
 
 _GAP_PERIODS = 10
 _GAP_TIME = 0.05
@@ -62,6 +70,8 @@ class SlowView:
         Time, −1 at the beginning and 1 at the end.
     speed : ndarray of float
         Speed, m/s.
+    slowness : ndarray of float
+        exp(−speed/`LOW_SPEED`), the speed averaged until its noise hardly counts.
     force : ndarray of float
         Actuator force, N, averaged like the stem.
     lowest, highest : float
@@ -71,6 +81,7 @@ class SlowView:
     place: NDArray[np.float64]
     age: NDArray[np.float64]
     speed: NDArray[np.float64]
+    slowness: NDArray[np.float64]
     velocity: NDArray[np.float64]
     force: NDArray[np.float64]
     lowest: float
@@ -271,16 +282,17 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     RefusalError
         If the signals have too little time in common.
     """
-    begin = max(record.drive.time[0], record.position.time[0])
-    end = min(record.drive.time[-1], record.position.time[-1])
-    inside = (record.position.time >= begin) & (record.position.time <= end)
+    sampled, measured = without_repeats(record.drive), without_repeats(record.position)
+    begin = max(sampled.time[0], measured.time[0])
+    end = min(sampled.time[-1], measured.time[-1])
+    inside = (measured.time >= begin) & (measured.time <= end)
     if np.count_nonzero(inside) < _FEWEST:
         raise RefusalError(
             f"the two signals share {np.count_nonzero(inside)} positions: their clocks differ, or "
             f"the record is too short; at least {_FEWEST} are needed"
         )
-    stem = StampedSignal(record.position.time[inside] - begin, record.position.value[inside])
-    drive = StampedSignal(record.drive.time - begin, record.drive.value)
+    stem = StampedSignal(measured.time[inside] - begin, measured.value[inside])
+    drive = StampedSignal(sampled.time - begin, sampled.value)
     finest = min(stem.period, drive.period)
     grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
     pressure = _smoothed(drive, grid)
@@ -317,7 +329,12 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
         stem_noise,
         np.interp(time, grid, pressure.variance) * valve.force_per_drive**2,
         max(pressure.window * finest / (_MEMORY * period), 1.0),
-        _slow_view(grid, np.interp(grid, time, position), force, period),
+        _slow_view(
+            np.interp(grid, time, position),
+            force,
+            period,
+            stem_noise * math.sqrt((end - begin) / used.size),
+        ),
         valve.travel,
         float(np.count_nonzero(lost)) * period,
         _line(stem, stem_noise, float(stem.time[0]))[0],
@@ -325,19 +342,23 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
 
 
 def _slow_view(
-    grid: NDArray[np.float64],
-    position: NDArray[np.float64],
-    force: NDArray[np.float64],
-    period: float,
+    position: NDArray[np.float64], force: NDArray[np.float64], period: float, density: float
 ) -> SlowView:
+    """Average stem and force, given at each step; `density` is the stem's noise, m·√s.
+
+    Averaged twice over T, the speed has the noise √2·density/T^1.5.
+    """
     length = max(round(_SLOW / period), 1)
     stem = _averaged_twice(position, length)
     velocity = np.gradient(stem, period)
+    calm = (math.sqrt(2.0) * density / (_CALM * LOW_SPEED)) ** (2.0 / 3.0)
+    calmer = _averaged_twice(velocity, round(calm / period)) if calm > _SLOW else velocity
     lowest, highest = float(stem.min()), float(stem.max())
     return SlowView(
         (2.0 * stem - lowest - highest) / max(highest - lowest, np.finfo(float).tiny),
-        2.0 * grid / grid[-1] - 1.0,
+        np.linspace(-1.0, 1.0, stem.size),
         np.abs(velocity),
+        np.exp(-np.abs(calmer) / LOW_SPEED),
         velocity,
         _averaged_twice(force, length),
         lowest,

@@ -55,7 +55,7 @@ def _sliding(model: BroadModel, at: Coordinates) -> ReportedNumber:
     speed = np.abs(velocity)
     mean = _weighted(speed, speed)
     place, age = _weighted(slow.place, speed), _weighted(slow.age, speed)
-    low = _weighted(np.exp(slow.speed / -3e-3), speed)
+    low = _weighted(slow.slowness, speed)
     dry, viscous = at["coulomb_friction"], at["viscous_friction"]
     falling = 0.0
     if at["stribeck_velocity"] > 0:
