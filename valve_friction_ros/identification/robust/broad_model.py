@@ -33,6 +33,11 @@ _LARGEST_COARSENESS = 10.0
 _STEPPED = 30
 """Time of a step with an event over that of one that takes a short cut."""
 
+_SWINGING = 2e-3
+_OVER_SWING = 1e-3
+"""A delay F_v/k, s, below which a stem may swing, and the change by which to differentiate there:
+through the swings a small one means nothing."""
+
 _STEP = 1e-5
 """Change of a main coordinate over its size by which to differentiate.
 
@@ -152,6 +157,8 @@ class BroadModel:
         """Return the change of a straight coordinate by which to differentiate."""
         spring = max(at["spring_constant"], 1e-6)
         dry = max(abs(at["coulomb_friction"]), 1e-6) / spring
+        if name == "viscous_friction" and at[name] / spring < _SWINGING:
+            return _OVER_SWING
         if name == "slip_force":
             return IMPERFECTIONS[name].step * dry
         if name in TIMING:

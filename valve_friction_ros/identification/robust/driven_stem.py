@@ -109,6 +109,7 @@ def drive_stem(
     curved, cubic = at.curvature * stiff, at.cubic * stiff
     drift = at.drift * course.span
     viscous, dry = at.viscous_friction, at.coulomb_friction
+    bent = at.spring_constant * at.presliding
     force[:] = course.force
     if at.force_lag > _LEAST_LAG:
         _lag(force, at.force_lag, course.period)
@@ -130,6 +131,7 @@ def drive_stem(
         grip[step] = dry * (trend + at.at_low_speed * course.slowness[step])
     side = min(max(at.viscous_asymmetry, -_LARGEST_ASYMMETRY), _LARGEST_ASYMMETRY)
     falling = at.stribeck_velocity if at.slip_force > 0.0 else 0.0
+    dry += bent  # the reading of a sliding stem is off by the bristle's bend
     static = dry + at.slip_force
     spring, zone, travel = at.spring_constant, at.limit_velocity, course.travel
     upward = Dynamics(at.mass, viscous * (1.0 + side), dry, static, spring, zone, travel, falling)
@@ -164,7 +166,8 @@ def read_stem(
     positions, velocities = np.empty_like(force), np.empty_like(force)
     drive_stem(course, at, force, positions, velocities)
     if at.presliding != 0.0:
-        full = at.coulomb_friction + at.slip_force + 1e-9
+        bent = at.spring_constant * at.presliding
+        full = at.coulomb_friction + bent + at.slip_force + 1e-9
         for step in range(force.size):
             held = math.copysign(1.0, velocities[step])
             if velocities[step] == 0.0:
