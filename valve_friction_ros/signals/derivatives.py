@@ -32,7 +32,11 @@ class Averaging(NamedTuple):
 
     def mean(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the same mean of another signal, shape (n,), as shape (n − d + 1,)."""
-        return np.convolve(signal, self.weights, "valid")
+        return np.asarray(np.convolve(signal, self.weights, "valid"), dtype=np.float64)
+
+    def slope_gain(self, sample_period: float) -> float:
+        """Deviation of the slope of a mean over that of white noise of the signal, 1/s."""
+        return float(np.linalg.norm(np.gradient(self.weights))) / sample_period
 
 
 class Derivatives(NamedTuple):
@@ -145,7 +149,7 @@ def averaging(
     return Averaging(
         np.convolve(position, first, "valid") / sample_period,
         np.convolve(position, second, "valid") / sample_period**2,
-        np.convolve(inner, _BETWEEN_SAMPLES),
+        np.asarray(np.convolve(inner, _BETWEEN_SAMPLES), dtype=np.float64),
         float(np.linalg.norm(first)) / sample_period,
         float(np.linalg.norm(second)) / sample_period**2,
     )

@@ -6,8 +6,10 @@ the parameters. Only the regression is left. A derivative over a window is a mea
 does not bias the mass.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,7 @@ from valve_friction_ros.identification.trust.uncertainty import (
     worst_case,
 )
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.derivatives import Averaging
 from valve_friction_ros.signals.measured_record import MeasuredRecord
 
 __all__ = ["AveragedBalance", "averaged_balance"]
@@ -33,7 +36,7 @@ _CHANGE = 0.25
 
 Chosen: the growth of F_c that raises the first alarm (`FrictionLimits`)."""
 
-_UNEXPLAINED = _CHANGE / np.sqrt(12.0)
+_UNEXPLAINED = _CHANGE / math.sqrt(12.0)
 """Systematic misfit over the friction that is tolerated: the standard deviation of a friction that
 changes evenly by `_CHANGE`."""
 
@@ -45,6 +48,12 @@ _MOVING_SHARE = 0.05
 
 _CHANCE = 2.0
 """Standard deviations of a covariance of noise that are chance: 5 % exceed them."""
+
+_NOISE_MARGIN = 2.0
+"""Noise of the sensors that the residual may hold, over its estimate.
+
+Chosen: residuals of simulated machines are up to 1.7 times the estimate, which knows white noise
+only."""
 
 _DELAY, _ASYMMETRY = "delay", "asymmetry"
 """Imperfections in every fit: a force that acts late (each holds its value for a sampling period at
@@ -111,7 +120,7 @@ class AveragedBalance:
         """Half width of the first free parameter over its value; infinite where it has none."""
         name = self.names[0]
         value = self.values.get(name, 0.0)
-        return self.half_width(name) / value if value > 0 else np.inf
+        return self.half_width(name) / value if value > 0 else math.inf
 
     def standard_error(self, name: str) -> float:
         """Scatter of a free parameter between the strokes."""
@@ -139,86 +148,119 @@ def averaged_balance(
     AveragedBalance
         Raises RefusalError if no threshold leaves enough moving samples.
     """
-    period, order = record.sample_period, settings.order
-    derivatives = record.derivatives(window, order)
-    margin, velocity = derivatives.margin, derivatives.velocity
-    speed = np.abs(velocity)
-    everywhere = np.pad(velocity, margin, mode="edge")
-    direction = np.sign(everywhere)
-    motion = record.averaging(window, order)
-    force = motion.mean(valve.actuator_force(record.drive))
-    regressors = {
-        "mass": motion.acceleration,
-        "coulomb_friction": motion.mean(direction),
-        "viscous_friction": motion.velocity,
-        "spring_constant": motion.mean(record.position),
-        "spring_preload": np.ones_like(force),
+    averaged = _Averaged.of(record, valve, settings, window)
+    sweep, chosen = chosen_step(averaged.regression, settings, window)
+    regression, motion = averaged.regression, averaged.motion
+    names = regression.names
+    moving = regression.speed > float(sweep.thresholds[chosen])
+    columns, force = regression.columns * moving[:, None], regression.force * moving
+    estimates = _solved(columns, force)
+    values = {name: float(each) for name, each in regression.complete(estimates).items()}
+    residual = columns @ estimates - force
+    equation = EstimatingEquation.of_least_squares(columns, residual)
+    stroke = stroke_length(np.cumsum(averaged.velocity * moving))
+    samples, rms = int(moving.sum()), float(np.linalg.norm(residual) / np.sqrt(moving.sum()))
+    drive_noise = valve.force_per_drive * record.drive_noise
+    noise = {
+        "mass": motion.acceleration_gain * record.position_noise,
+        "viscous_friction": motion.velocity_gain * record.position_noise,
+        _DELAY: motion.slope_gain(record.sample_period) * drive_noise,
     }
-    if settings.position_bias is not None:
-        del regressors["spring_preload"]
-    fixed = {name: value for name, value in settings.fixed.items() if name in REGRESSED}
-    left = force - sum(
-        (value * regressors.pop(name) for name, value in fixed.items() if name in regressors),
-        np.zeros_like(force),
+    expected = math.hypot(
+        values["mass"] * noise["mass"], float(np.linalg.norm(motion.weights)) * drive_noise
     )
-    either = motion.mean(np.abs(everywhere))
-    usual = either[speed > _MOVING_SHARE * speed.max()].mean()
-    extra = {_ASYMMETRY: either - usual, _DELAY: np.gradient(force, period)}
-    names = (*regressors, *extra)
-    columns = np.column_stack([*regressors.values(), *extra.values()])
-    regression = ForceBalanceRegression(names, columns, left, speed, fixed, settings.position_bias)
-    sweep, chosen = chosen_step(regression, settings, window)
-    moving = speed > float(sweep.thresholds[chosen])
-    estimates = np.array([_solved(columns[moving], left[moving])]).ravel()
-    residual = (columns @ estimates - left) * moving
-    equation = EstimatingEquation.of_least_squares(columns * moving[:, None], residual)
-    stroke = stroke_length(np.cumsum(velocity * moving))
-    covariance = block_covariance(equation, stroke)
-    samples, rms = int(moving.sum()), float(np.sqrt(np.mean(residual[moving] ** 2)))
-    shared = _lasting(residual, moving, window, rms)
-    noise = np.zeros(len(names))
-    for name, gain in (
-        ("mass", motion.acceleration_gain),
-        ("viscous_friction", motion.velocity_gain),
-    ):
-        if name in names:
-            noise[names.index(name)] = gain * record.position_noise
-    change_of_force = np.linalg.norm(np.gradient(motion.weights)) / period
-    noise[names.index(_DELAY)] = change_of_force * float(
-        np.ptp(valve.actuator_force(np.array([0.0, record.drive_noise])))
-    )
-    inverse = np.linalg.pinv(equation.curvature) * 2
-    falling = motion.mean(
-        direction * np.exp(-np.abs(everywhere) / (_FALL_SPEED_SHARE * speed.max()))
-    )
-    place = record.position - record.position[margin:-margin][moving].mean()
-    along = motion.mean(direction * place)
+    unexplained = math.sqrt(max(rms**2 - (_NOISE_MARGIN * expected) ** 2, 0.0))
+    shared = max(_lasting(residual, moving, window, rms), unexplained)
+    falling = _solved(np.column_stack([columns, averaged.falling * moving]), force)[:-1]
+    scale = np.sqrt(np.diag(equation.curvature))
+    scale[scale == 0] = 1.0
+    inverse = 2 * np.linalg.pinv(equation.curvature / np.outer(scale, scale))
     systematic = (
         np.sqrt(np.diag(worst_case(equation.curvature, samples, shared)))
-        + np.abs(inverse) @ noise * samples * rms
-        + np.abs(
-            _solved(np.column_stack([columns, falling])[moving], left[moving])[:-1] - estimates
-        )
+        + np.abs(inverse / np.outer(scale, scale))
+        @ np.array([noise.get(name, 0.0) for name in names])
+        * samples
+        * rms
+        + np.abs(falling - estimates)
     )
-    named = regression.complete(estimates)
-    values = {name: float(value) for name, value in named.items()}
-    friction = values["coulomb_friction"] * motion.mean(direction)
+    friction = values["coulomb_friction"] * averaged.direction
     friction += values["viscous_friction"] * motion.velocity
-    tolerated = _UNEXPLAINED * float(np.sqrt(np.mean(friction[moving] ** 2)))
-    spread = left[moving] - left[moving].mean()
-    fit = 1 - float(np.linalg.norm(residual[moving]) / np.linalg.norm(spread))
+    tolerated = _UNEXPLAINED * float(np.linalg.norm(friction * moving) / math.sqrt(samples))
+    spread = regression.force[moving] - regression.force[moving].mean()
+    fit = 1 - float(np.linalg.norm(residual) / np.linalg.norm(spread))
+    trend = _certain_last(np.column_stack([columns, averaged.along * moving]), force, stroke)
+    change = trend * float(np.ptp(record.position)) / abs(values["coulomb_friction"] or math.inf)
     return AveragedBalance(
         values,
         names,
-        covariance,
+        block_covariance(equation, stroke),
         systematic,
         Misfit(fit, rms, shared, tolerated, "N"),
         residual.size // stroke,
         window,
-        _change(np.column_stack([columns, along]) * moving[:, None], left * moving, stroke)
-        * float(np.ptp(record.position))
-        / abs(values["coulomb_friction"] or np.inf),
+        change,
     )
+
+
+class _Averaged(NamedTuple):
+    """The regression of the averaged terms, and what tests it.
+
+    `direction` is the averaged sign of the velocity, `falling` the shape of a friction that falls
+    with the speed, `along` that of one that grows along the travel.
+    """
+
+    regression: ForceBalanceRegression
+    motion: Averaging
+    velocity: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    falling: NDArray[np.float64]
+    along: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls, record: MeasuredRecord, valve: Valve, settings: IdentificationSettings, window: int
+    ) -> "_Averaged":
+        """Average every term of the force balance like the acceleration."""
+        derivatives = record.derivatives(window, settings.order)
+        velocity, speed = derivatives.velocity, np.abs(derivatives.velocity)
+        everywhere = np.pad(velocity, derivatives.margin, mode="edge")
+        sign, top = np.sign(everywhere), float(speed.max())
+        motion = record.averaging(window, settings.order)
+        force = motion.mean(valve.actuator_force(record.drive))
+        direction = motion.mean(sign)
+        regressors = {
+            "mass": motion.acceleration,
+            "coulomb_friction": direction,
+            "viscous_friction": motion.velocity,
+            "spring_constant": motion.mean(record.position),
+            "spring_preload": np.ones_like(force),
+        }
+        if settings.position_bias is not None:
+            del regressors["spring_preload"]
+        fixed = {name: value for name, value in settings.fixed.items() if name in REGRESSED}
+        left = force.copy()
+        for name in fixed.keys() & regressors.keys():
+            left -= fixed[name] * regressors.pop(name)
+        either = motion.mean(np.abs(everywhere))
+        usual = float(either[speed > _MOVING_SHARE * top].mean())
+        regressors[_ASYMMETRY] = either - usual
+        regressors[_DELAY] = np.gradient(force, record.sample_period)
+        place = record.position - record.position.mean()
+        return cls(
+            ForceBalanceRegression(
+                tuple(regressors),
+                np.column_stack([*regressors.values()]),
+                left,
+                speed,
+                fixed,
+                settings.position_bias,
+            ),
+            motion,
+            velocity,
+            direction,
+            motion.mean(sign * np.exp(-np.abs(everywhere) / (_FALL_SPEED_SHARE * top))),
+            motion.mean(sign * place),
+        )
 
 
 def _solved(columns: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -244,7 +286,7 @@ def _lasting(
     return float(np.sqrt(max(covariance - _CHANCE * rms**2 * np.sqrt(window / count), 0.0)))
 
 
-def _change(columns: NDArray[np.float64], target: NDArray[np.float64], stroke: int) -> float:
+def _certain_last(columns: NDArray[np.float64], target: NDArray[np.float64], stroke: int) -> float:
     """Coefficient of the last column; 0 where its interval holds 0."""
     solved = _solved(columns, target)
     equation = EstimatingEquation.of_least_squares(columns, columns @ solved - target)
