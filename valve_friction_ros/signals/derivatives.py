@@ -36,7 +36,8 @@ class Averaging(NamedTuple):
 
     def slope_gain(self, sample_period: float) -> float:
         """Deviation of the slope of a mean over that of white noise of the signal, 1/s."""
-        return float(np.linalg.norm(np.gradient(self.weights))) / sample_period
+        slopes = np.convolve(self.weights, [0.5, 0.0, -0.5])
+        return float(np.linalg.norm(slopes)) / sample_period
 
 
 class Derivatives(NamedTuple):
@@ -147,8 +148,8 @@ def averaging(
     inner = np.cumsum(np.cumsum(second))[:-2]
     first = np.convolve(inner, [0.5, 0.0, -0.5])
     return Averaging(
-        np.convolve(position, first, "valid") / sample_period,
-        np.convolve(position, second, "valid") / sample_period**2,
+        np.asarray(np.convolve(position, first, "valid") / sample_period, dtype=np.float64),
+        np.asarray(np.convolve(position, second, "valid") / sample_period**2, dtype=np.float64),
         np.asarray(np.convolve(inner, _BETWEEN_SAMPLES), dtype=np.float64),
         float(np.linalg.norm(first)) / sample_period,
         float(np.linalg.norm(second)) / sample_period**2,

@@ -22,6 +22,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_two_directions,
     require_unbroken,
 )
+from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
@@ -164,6 +165,7 @@ def published_fit(
     derivatives = record.derivatives(settings.published_window, settings.order)
     require_motion(record)
     require_drive(record, valve)
+    require_plausible_units(record, valve, settings)
     require_two_directions(record, settings.published_window)
     force = valve.actuator_force(record.drive)
     regression = force_balance_regression(force, record.position, derivatives, settings)

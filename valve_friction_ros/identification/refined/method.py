@@ -36,6 +36,10 @@ from valve_friction_ros.identification.trust.excitation import (
     require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.plausible_units import (
+    require_plausible_units,
+    time_remarks,
+)
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -91,6 +95,7 @@ def identify_refined(
     settings = settings or IdentificationSettings()
     record = measured(recording)
     require_unbroken(record)
+    require_plausible_units(record, valve, settings)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
     require_two_directions(record, settings.published_window)
@@ -185,7 +190,7 @@ def _refined(
         refinement_verdicts(refinement, misfit, settings),
         misfit.fit,
         misfit,
-        warnings,
+        [*time_remarks(record, valve), *warnings],
         problem.model(refinement.coordinates),
         StemComparison(conditioned.sample_period, conditioned.position, refinement.simulated),
     )

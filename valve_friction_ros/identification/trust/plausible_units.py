@@ -13,13 +13,15 @@ import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
+from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.measured_record import measured
+from valve_friction_ros.signals.derivatives import Derivatives
+from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
-__all__ = ["position_unit", "require_plausible_units", "require_valve_units", "time_remarks"]
+__all__ = ["position_question", "require_plausible_units", "require_valve_units", "time_remarks"]
 
 
 class _Quantity(NamedTuple):
@@ -50,11 +52,26 @@ _POSITION = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "µm": 1e-6}
 _STIFFNESS = _Quantity("N/m", (1e3, 1e8), (5e3, 2e7), {"N/mm": 1e3, "kN/m": 1e3, "N/cm": 1e2})
 """Spring constant: 0.2 bar on 30 cm² over 60 mm to 4 bar on 2800 cm² over 15 mm, with margin."""
 
-_SPEED = _Quantity("m/s", (0.0, 0.5), (1e-4, 0.3), {"min": 1 / 60, "s": 1e-3})
+_SPEED = _Quantity("m/s", (0.0, 0.5), (1e-4, 0.3), {"min read as s": 1 / 60, "s read as ms": 1e-3})
 """Top speed: the fastest valves (anti-surge, with boosters) take 0.3 s for 100 mm."""
 
-_TIME_CONSTANT = _Quantity("s", (0.0, 5.0), (1e-3, 2.0), {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9})
+_TRIP_SPEED = 5.0
+"""Speed, m/s, that even a spring that slams a valve shut does not reach."""
+
+_TIME_CONSTANT = _Quantity("s", (0.0, 10.0), (1e-3, 2.0), {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9})
 """F_v/k, in which a stem follows a step of pressure: 0.02 to 0.4 s for the paper's packings."""
+
+_ORDER = 3
+_MOVING_SHARE = 0.05
+"""Order of the derivatives, and speed over the top speed from which the stem counts as moving.
+Chosen: as in the other checks of a record."""
+
+_OUTSIDE = 0.05
+"""Distance beyond the travel, over the travel, up to which the time is judged; `require_travel`
+refuses a longer one."""
+
+_LEAST_SAMPLES = 100
+"""Samples below which the time is not judged. Chosen: other checks refuse such a record."""
 
 _PERCENT = (20.0, 105.0)
 """Highest value of a signal in percent. Chosen: lower ones have an ordinary unit too."""
@@ -65,7 +82,7 @@ def require_plausible_units(
 ) -> None:
     """Refuse a record or a valve in which a quantity is beyond every control valve.
 
-    A machine without a spring, or with a force as its drive, is not judged.
+    A machine without a spring, one with a force as its drive, and a dead sensor are not judged.
 
     Raises
     ------
@@ -73,9 +90,9 @@ def require_plausible_units(
         With the quantity, and the unit in which it would be ordinary.
     """
     if (
-        recording.driven_by is not Drive.PRESSURE
-        or valve.driven_by is not Drive.PRESSURE
+        not _is_valve(recording, valve)
         or settings.fixed.get("spring_constant") == 0.0
+        or np.ptp(recording.drive) == 0
     ):
         return
     try:
@@ -85,13 +102,20 @@ def require_plausible_units(
     pressure = float(np.abs(recording.drive).max())
     if problem := _beyond("the pressure reaches", pressure, _PRESSURE):
         raise RefusalError(problem)
-    if not np.isfinite(valve.travel):
-        place = float(np.abs(recording.position).max())
-        if place > _TRAVEL.possible[1]:
-            raise RefusalError(
-                f"the stem position reaches {place:.4g} m, further than any valve: "
-                + _question(position_unit(place, _TRAVEL.ordinary[1]), "m")
-            )
+    place = float(np.abs(recording.position).max())
+    if not np.isfinite(valve.travel) and place > _TRAVEL.possible[1]:
+        raise RefusalError(
+            f"the stem position reaches {place:.4g} m, further than any valve: "
+            + position_question(place, _TRAVEL.ordinary[1])
+        )
+    if len(recording) > _LEAST_SAMPLES and place <= (1 + _OUTSIDE) * valve.travel:
+        speed, constant = _top_speed(recording), _least_time_constant(recording)
+        for problem in (
+            _beyond("the stem moves at", speed, _SPEED._replace(possible=(0.0, _TRIP_SPEED))),
+            _beyond("the stem lags behind the pressure by", constant, _TIME_CONSTANT),
+        ):
+            if problem:
+                raise RefusalError(problem)
 
 
 def require_valve_units(valve: Valve, known: Mapping[str, float]) -> None:
@@ -118,39 +142,55 @@ def require_valve_units(valve: Valve, known: Mapping[str, float]) -> None:
             raise ValueError(problem)
 
 
-def position_unit(place: float, travel: float) -> tuple[str, ...]:
-    """Name the units in which a position that reads `place` m lies within the travel, m."""
-    units = [unit for unit, size in _POSITION.items() if 0.01 <= place * size / travel <= 1.05]
-    return (*units, *_percent(place))
+def position_question(place: float, travel: float) -> str:
+    """Ask for the unit in which a position that reads `place` m lies within the travel, m."""
+    units = [unit for unit, size in _POSITION.items() if 0.1 <= place * size / travel <= 1.05]
+    return _question((*units, *_percent(place)), "m")
 
 
-def time_remarks(recording: Recording, parameters: Mapping[str, Parameter]) -> tuple[str, ...]:
-    """Question the unit of time where a stem is faster or slower than that of any valve.
-
-    Parameters
-    ----------
-    recording : Recording
-        Drive and position of a valve with a spring.
-    parameters : mapping of str to Parameter
-        Identified; a time constant is judged only where the whole interval of it is beyond.
-
-    Returns
-    -------
-    tuple of str
-        Warnings.
-    """
-    if recording.driven_by is not Drive.PRESSURE:
+def time_remarks(recording: Recording, valve: Valve) -> tuple[str, ...]:
+    """Question the unit of time of a stem that is faster than most valves can be."""
+    if not _is_valve(recording, valve):
         return ()
+    return tuple(filter(None, [_beyond("the stem moves at", _top_speed(recording), _SPEED)]))
+
+
+def _is_valve(recording: Recording, valve: Valve) -> bool:
+    return recording.driven_by is Drive.PRESSURE and valve.driven_by is Drive.PRESSURE
+
+
+def _velocity(recording: Recording) -> tuple[MeasuredRecord, Derivatives]:
     record = measured(recording)
-    window = 31
-    velocity = np.abs(record.derivatives(window, 3).velocity)
-    remarks = [_beyond("the stem moves at", float(np.quantile(velocity, 0.999)), _SPEED)]
-    friction, spring = (parameters[name] for name in ("viscous_friction", "spring_constant"))
-    least = (friction.value - friction.half_width) / (spring.value + spring.half_width)
-    if least > _TIME_CONSTANT.possible[1]:
-        slow = friction.value / spring.value
-        remarks.append(_beyond("the stem follows a step of pressure in", slow, _TIME_CONSTANT))
-    return tuple(remark for remark in remarks if remark)
+    return record, record.derivatives(record.fitting_window(_ORDER), _ORDER)
+
+
+def _top_speed(recording: Recording) -> float:
+    return float(np.quantile(np.abs(_velocity(recording)[1].velocity), 0.999))
+
+
+def _least_time_constant(recording: Recording) -> float:
+    """Low end of the interval of F_v/k, s, from pressure = k·x + F_v·ẋ ± F_c; 0 without one."""
+    record, derivatives = _velocity(recording)
+    velocity, place, pressure = (
+        derivatives.velocity,
+        derivatives.inner(record.position),
+        derivatives.inner(record.drive),
+    )
+    moving = np.abs(velocity) > _MOVING_SHARE * np.abs(velocity).max()
+    columns = np.column_stack(
+        [velocity, place - place.mean(), np.sign(velocity), np.ones_like(velocity)]
+    )
+    columns /= np.linalg.norm(columns, axis=0)[None, :]
+    sizes = np.linalg.norm(velocity), np.linalg.norm(place - place.mean())
+    columns *= moving[:, None]
+    solved = np.linalg.lstsq(columns, pressure * moving, rcond=None)[0]
+    equation = EstimatingEquation.of_least_squares(columns, columns @ solved - pressure * moving)
+    covariance = block_covariance(equation, stroke_length(np.cumsum(velocity * moving)))
+    viscous, spring = (
+        (solved[index] + sign * covariance.half_width(np.eye(4)[index])) / sizes[index]
+        for index, sign in ((0, -1), (1, 1))
+    )
+    return float(viscous / spring) if viscous > 0 and solved[1] > 0 and spring > 0 else 0.0
 
 
 def _beyond(words: str, value: float, quantity: _Quantity) -> str:
@@ -164,11 +204,11 @@ def _beyond(words: str, value: float, quantity: _Quantity) -> str:
         if quantity.ordinary[0] <= value * size <= quantity.ordinary[1]
     ]
     if quantity is _PRESSURE:
-        units += _percent(value)
+        units.extend(_percent(value))
     return (
         f"{words} {value:.4g} {quantity.unit}, {'less' if value < low else 'more'} than in any "
         f"control valve ({low:.4g} to {high:.4g} {quantity.unit}): "
-        + _question(units, "s" if quantity in (_SPEED, _TIME_CONSTANT) else quantity.unit)
+        + _question(units, "" if quantity.unit == "m/s" else quantity.unit)
     )
 
 
@@ -178,4 +218,6 @@ def _percent(value: float) -> tuple[str, ...]:
 
 def _question(units: Iterable[str], read_as: str) -> str:
     named = " or ".join(units)
-    return f"{named} read as {read_as}?" if named else f"check its unit ({read_as})"
+    if not named:
+        return "check the unit"
+    return f"{named} read as {read_as}?" if read_as else f"{named}?"
