@@ -67,8 +67,8 @@ _MOVING_SHARE = 0.05
 Chosen: as in the other checks of a record."""
 
 _OUTSIDE = 0.05
-"""Distance beyond the travel, over the travel, up to which the time is judged; `require_travel`
-refuses a longer one."""
+"""Distance beyond the travel, over the travel, up to which a record is judged; `require_travel`
+refuses a longer one, as where the signals are swapped."""
 
 _LEAST_SAMPLES = 100
 """Samples below which the time is not judged. Chosen: other checks refuse such a record."""
@@ -99,16 +99,18 @@ def require_plausible_units(
         require_valve_units(valve, settings.fixed)
     except ValueError as error:
         raise RefusalError(str(error)) from None
+    place = float(np.abs(recording.position).max())
+    if place > (1 + _OUTSIDE) * valve.travel:
+        return
     pressure = float(np.abs(recording.drive).max())
     if problem := _beyond("the pressure reaches", pressure, _PRESSURE):
         raise RefusalError(problem)
-    place = float(np.abs(recording.position).max())
     if not np.isfinite(valve.travel) and place > _TRAVEL.possible[1]:
         raise RefusalError(
             f"the stem position reaches {place:.4g} m, further than any valve: "
             + position_question(place, _TRAVEL.ordinary[1])
         )
-    if len(recording) > _LEAST_SAMPLES and place <= (1 + _OUTSIDE) * valve.travel:
+    if len(recording) > _LEAST_SAMPLES:
         speed, constant = _top_speed(recording), _least_time_constant(recording)
         for problem in (
             _beyond("the stem moves at", speed, _SPEED._replace(possible=(0.0, _TRIP_SPEED))),
