@@ -49,6 +49,9 @@ _MOVING_SHARE = 0.05
 _CHANCE = 2.0
 """Standard deviations of a covariance of noise that are chance: 5 % exceed them."""
 
+_MOST_STROKES = 500
+"""Most strokes for their scatter. Chosen: noise makes any number of them, and memory is finite."""
+
 _NOISE_MARGIN = 2.0
 """Noise of the sensors that the residual may hold, over its estimate.
 
@@ -159,6 +162,7 @@ def averaged_balance(
     residual = columns @ estimates - force
     equation = EstimatingEquation.of_least_squares(columns, residual)
     stroke = stroke_length(np.cumsum(averaged.velocity * moving))
+    stroke = max(stroke, residual.size // _MOST_STROKES)
     samples, rms = int(moving.sum()), float(np.linalg.norm(residual) / np.sqrt(moving.sum()))
     drive_noise = valve.force_per_drive * record.drive_noise
     noise = {

@@ -66,6 +66,9 @@ _MOVING_SHARE = 0.05
 """Order of the derivatives, and speed over the top speed from which the stem counts as moving.
 Chosen: as in the other checks of a record."""
 
+_MOST_BLOCKS = 200
+"""Most blocks for a scatter. Chosen: noise makes any number of strokes, and memory is finite."""
+
 _OUTSIDE = 0.05
 """Distance beyond the travel, over the travel, up to which a record is judged; `require_travel`
 refuses a longer one, as where the signals are swapped."""
@@ -187,7 +190,8 @@ def _least_time_constant(recording: Recording) -> float:
     columns *= moving[:, None]
     solved = np.linalg.lstsq(columns, pressure * moving, rcond=None)[0]
     equation = EstimatingEquation.of_least_squares(columns, columns @ solved - pressure * moving)
-    covariance = block_covariance(equation, stroke_length(np.cumsum(velocity * moving)))
+    stroke = stroke_length(np.cumsum(velocity * moving))
+    covariance = block_covariance(equation, max(stroke, velocity.size // _MOST_BLOCKS))
     viscous, spring = (
         (solved[index] + sign * covariance.half_width(np.eye(4)[index])) / sizes[index]
         for index, sign in ((0, -1), (1, 1))
