@@ -51,7 +51,8 @@ class TestRealMachine:
             assert entry["value"] == pytest.approx(value, rel=0.02) or low < value < high, name
             assert entry["verdict"] in ("identified", "weak")
         assert values(answer)["spring_constant"] == 0.0
-        assert {answer[key] for key in ("rms", "systematic_misfit", "model_describes")} == {None}
+        assert {answer[key] for key in ("rms", "systematic_misfit")} == {None}
+        assert answer["model_describes"] is True
         assert 0.9 < answer["fit"] < 1.0
         assert answer["parameters"]["spring_constant"]["verdict"] == "fixed"
         assert answer["evidence"]["published_window"] == 31

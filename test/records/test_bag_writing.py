@@ -65,7 +65,7 @@ def test_topics_joint_and_stamps(tmp_path, buffer):
         valve.recording()
 
 
-@pytest.mark.parametrize("valve", [BENCH_VALVE, GRAPHITE_VALVE, Valve(1e-6, travel=float("inf"))])
+@pytest.mark.parametrize("valve", [BENCH_VALVE, GRAPHITE_VALVE, Valve(0.5, -1e-6, float("inf"))])
 def test_the_valve_is_described(tmp_path, buffer, valve):
     description = read_valve_file(write(tmp_path, buffer, valve=valve) / VALVE_FILE)
     assert description.valve == valve

@@ -219,7 +219,7 @@ def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
         return diagnosis
     doubt = (
         "the Karnopp model does not describe this valve "
-        f"({misfit.systematic * 1e6:.3g} µm of misfit); {diagnosis.message}"
+        f"({misfit.words} of misfit); {diagnosis.message}"
     )
     if diagnosis.level >= Level.WARN:
         return replace(diagnosis, message=doubt)

@@ -241,7 +241,7 @@ def entry_of(
             "fit": Fit(
                 result.fit,
                 result.rms,
-                math.nan if result.misfit is None else result.misfit.systematic,
+                math.nan if result.misfit is None else result.misfit.of_stem,
             ),
             "warnings": result.warnings,
         }

@@ -43,6 +43,7 @@ from valve_friction_ros.identification.steps.step_response import (
 )
 from valve_friction_ros.identification.steps.validation import Validation, validate
 from valve_friction_ros.identification.trust.misfit import Misfit, percentage
+from valve_friction_ros.identification.trust.plausible_units import require_valve_units
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS
 
@@ -91,6 +92,7 @@ __all__ = [
     "percentage",
     "plain",
     "published_estimate",
+    "require_valve_units",
     "step_test",
     "sweep_panels",
     "sweep_thresholds",

@@ -78,7 +78,8 @@ class Result:
     rms : float
         Root mean square of simulated minus measured position, m; nan where no stem is simulated.
     misfit : Misfit or None
-        A test of the model; None in a method without one.
+        A test of the model, by the stem or, without a spring, by the force; None in a method
+        without one.
     derivative_window : int
         Derivative window that was used, samples; 0 in a method without derivatives.
     warnings : tuple of str
@@ -170,7 +171,7 @@ class Result:
             },
             "fit": rendering.plain(self.fit),
             "rms": rendering.plain(self.rms),
-            "systematic_misfit": None if misfit is None else rendering.plain(misfit.systematic),
+            "systematic_misfit": None if misfit is None else rendering.plain(misfit.of_stem),
             "model_describes": None if misfit is None else misfit.describes,
             "derivative_window": self.derivative_window,
             "evidence": rendering.plain(self.evidence),

@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.identification import FIXABLE, require_valve_units
 from valve_friction_ros.model import KarnoppParameters, Valve
 
 __all__ = ["ValveFile", "read_valve_file"]
@@ -125,6 +125,7 @@ def read_valve_file(path: Path) -> ValveFile:
         known = {name: value for name, value in numbers.items() if name in FIXABLE}
         _require_possible(known)
         valve = Valve(**{name: value for name, value in numbers.items() if name in _GEOMETRY})
+        require_valve_units(valve, known)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     return ValveFile(valve, MappingProxyType(known))

@@ -98,9 +98,10 @@ def _doubt(record: IdentifiedRecord) -> str:
     misfit = record.result.misfit
     if misfit is None or misfit.describes:
         return ""
+    explained = "force" if math.isnan(misfit.of_stem) else "stem's motion"
     return (
         "use this with caution, because the model does not describe this valve "
-        f"({misfit.systematic * 1e6:.3g} µm of the stem's motion remain unexplained): "
+        f"({misfit.words} of the {explained} remain unexplained): "
     )
 
 

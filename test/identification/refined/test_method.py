@@ -157,7 +157,7 @@ class TestRealMachine:
         assert verdicts["coulomb_friction"] in shown
         assert verdicts["static_friction"] is Verdict.NOT_IDENTIFIABLE
         assert verdicts["spring_constant"] is Verdict.FIXED
-        assert found.misfit is None
+        assert found.misfit.describes
         assert found.stem is None
         assert found.fit > 0.9
 

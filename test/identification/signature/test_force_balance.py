@@ -223,7 +223,7 @@ class TestContradictions:
         ("fixed", "cause"),
         [
             (
-                {"spring_constant": 1.0},
+                {"spring_constant": 1500.0},
                 "a static friction of -.* N, and friction is above zero",
             ),
             ({"spring_preload": 9000.0}, "does not reproduce the record"),

@@ -22,11 +22,12 @@ from valve_friction_ros.identification.trust.excitation import (
     require_two_directions,
     require_unbroken,
 )
+from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
-__all__ = ["PublishedFit", "published_estimate", "published_fit"]
+__all__ = ["PublishedFit", "chosen_step", "published_estimate", "published_fit"]
 
 _MASS_TOLERANCE = 0.25
 """Relative change of a regressed mass with half the derivative window, up to which it is kept.
@@ -42,9 +43,19 @@ class PublishedFit(NamedTuple):
     estimate: Estimate
     regression: ForceBalanceRegression
 
+    @property
+    def share_of_force(self) -> float:
+        """Share of the moving stem's force that is reproduced, 1 − |residual| / |force − mean|."""
+        regression = self.regression
+        moving = regression.speed > self.estimate.threshold
+        values = np.array([self.estimate.values[name] for name in regression.names])
+        force = regression.force[moving]
+        left = regression.columns[moving] @ values - force
+        return 1 - float(np.linalg.norm(left) / np.linalg.norm(force - force.mean()))
 
-def _sweep(
-    regression: ForceBalanceRegression, settings: IdentificationSettings
+
+def chosen_step(
+    regression: ForceBalanceRegression, settings: IdentificationSettings, window: int
 ) -> tuple[Sweep, int]:
     """Sweep the thresholds (8), or a fixed threshold; return the sweep and the chosen step."""
     given = settings.fixed.get("limit_velocity")
@@ -54,7 +65,7 @@ def _sweep(
         step = float(regression.speed.max()) / settings.resolution
         thresholds = step * np.arange(1, settings.steps + 1)
     sweep = sweep_thresholds(regression, thresholds)
-    return sweep, choose_threshold(sweep, settings.published_window)
+    return sweep, choose_threshold(sweep, window)
 
 
 def _mass_by_shorter_window(
@@ -154,10 +165,11 @@ def published_fit(
     derivatives = record.derivatives(settings.published_window, settings.order)
     require_motion(record)
     require_drive(record, valve)
+    require_plausible_units(record, valve, settings)
     require_two_directions(record, settings.published_window)
     force = valve.actuator_force(record.drive)
     regression = force_balance_regression(force, record.position, derivatives, settings)
-    sweep, chosen = _sweep(regression, settings)
+    sweep, chosen = chosen_step(regression, settings, settings.published_window)
     if "mass" not in settings.fixed:
         reason = _why_mass_is_unknown(
             float(sweep.estimates["mass"][chosen]),
@@ -170,7 +182,7 @@ def published_fit(
             )
             settings = replace(settings, fixed={**settings.fixed, "mass": settings.assumed_mass})
             regression = regression.fixing("mass", settings.assumed_mass)
-            sweep, chosen = _sweep(regression, settings)
+            sweep, chosen = chosen_step(regression, settings, settings.published_window)
     values = {name: float(column[chosen]) for name, column in sweep.estimates.items()}
     threshold = float(sweep.thresholds[chosen])
     for name, value in values.items():

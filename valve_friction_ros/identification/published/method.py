@@ -10,9 +10,6 @@ from valve_friction_ros.identification.published.evidence import (
     with_published,
 )
 from valve_friction_ros.identification.published.identify import published_fit
-from valve_friction_ros.identification.published.regression_uncertainty import (
-    regression_uncertainty,
-)
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
@@ -63,7 +60,7 @@ def identify_published(
         valve=valve,
         settings=settings,
         parameters=with_published(parameters, estimate),
-        fit=regression_uncertainty(record, found).fit,
+        fit=found.share_of_force,
         rms=math.nan,
         misfit=None,
         derivative_window=settings.published_window,

@@ -7,22 +7,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from valve_friction_ros.identification.published.estimate import Estimate, possible_model
+from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.published.evidence import (
     published_beside,
     sweep_evidence,
     sweep_finding,
     with_published,
 )
-from valve_friction_ros.identification.published.identify import PublishedFit, published_fit
-from valve_friction_ros.identification.published.regression_uncertainty import (
-    regression_uncertainty,
+from valve_friction_ros.identification.published.identify import published_fit
+from valve_friction_ros.identification.refined.averaged_balance import (
+    AveragedBalance,
+    averaged_balance,
 )
-from valve_friction_ros.identification.published.verdicts import regression_verdicts
 from valve_friction_ros.identification.refined.model_selection import with_demanded
 from valve_friction_ros.identification.refined.model_test import misfit_of
 from valve_friction_ros.identification.refined.output_error import SLIP, START, OutputError
-from valve_friction_ros.identification.refined.verdicts import refinement_verdicts
+from valve_friction_ros.identification.refined.verdicts import balance_verdicts, refinement_verdicts
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -36,6 +36,10 @@ from valve_friction_ros.identification.trust.excitation import (
     require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.plausible_units import (
+    require_plausible_units,
+    time_remarks,
+)
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -50,6 +54,9 @@ _START_TIME = 0.02
 """Time, s, over which the median position is the first guess of the start position.
 
 Chosen: 20 samples at 1 kHz. The start position is refined, so only convergence depends on this."""
+
+_LEAST_WINDOWS = 20
+"""Windows in a record whose window is chosen. Chosen, as for the other derivatives: a twentieth."""
 
 METHOD = "refined"
 """Name of this method."""
@@ -88,6 +95,7 @@ def identify_refined(
     settings = settings or IdentificationSettings()
     record = measured(recording)
     require_unbroken(record)
+    require_plausible_units(record, valve, settings)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
     require_two_directions(record, settings.published_window)
@@ -103,11 +111,11 @@ def identify_refined(
         mass = settings.fixed.get("mass", settings.assumed_mass)
         start_settings = replace(start_settings, fixed={**settings.fixed, "mass": mass})
     start = published_fit(record, valve, start_settings)
-    outcome = (
-        _refined(record, valve, settings, start.estimate)
-        if has_spring
-        else _regressed(record, start, start_settings)
-    )
+    if has_spring:
+        outcome = _refined(record, valve, settings, start.estimate)
+    else:
+        balance = _balance(record, valve, settings, window)
+        outcome, window = _regressed(balance, settings), balance.window
     estimate = published or start.estimate
     beside = () if published is None else published.warnings
     notes = [f"published estimate: {warning}" for warning in beside]
@@ -118,7 +126,7 @@ def identify_refined(
         settings=settings,
         parameters=with_published(outcome.parameters, published),
         fit=outcome.fit,
-        rms=math.nan if outcome.misfit is None else outcome.misfit.rms,
+        rms=math.nan if outcome.stem is None else outcome.misfit.rms,
         misfit=outcome.misfit,
         derivative_window=window,
         warnings=tuple(dict.fromkeys([*warnings, *outcome.warnings, *notes])),
@@ -134,11 +142,11 @@ def identify_refined(
 
 
 class _Outcome(NamedTuple):
-    """Outcome of a refinement or, without a spring, of a regression."""
+    """Outcome of a refinement or, without a spring, of the averaged force balance."""
 
     parameters: Mapping[str, Parameter]
     fit: float
-    misfit: Misfit | None
+    misfit: Misfit
     warnings: Sequence[str]
     model: KarnoppParameters | None
     stem: StemComparison | None
@@ -182,26 +190,50 @@ def _refined(
         refinement_verdicts(refinement, misfit, settings),
         misfit.fit,
         misfit,
-        warnings,
+        [*time_remarks(record, valve), *warnings],
         problem.model(refinement.coordinates),
         StemComparison(conditioned.sample_period, conditioned.position, refinement.simulated),
     )
 
 
-def _regressed(
-    record: MeasuredRecord, start: PublishedFit, settings: IdentificationSettings
-) -> _Outcome:
-    """Return the outcome of the regression: without a spring no simulated stem comes back."""
-    estimate, regression = start.estimate, regression_uncertainty(record, start)
-    parameters = regression_verdicts(estimate, regression, settings)
-    model = possible_model(estimate)
-    return _Outcome(parameters, regression.fit, None, estimate.warnings, model, None)
+def _balance(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings, window: int
+) -> AveragedBalance:
+    """Fit the balance with the given window, or with the best of those from `window` on.
+
+    A longer window averages more noise and leaves fewer samples without a reversal; the best gives
+    the narrowest interval of the first free parameter, the mass where it is free.
+    """
+    if settings.derivative_window is not None:
+        return averaged_balance(record, valve, settings, window)
+    longest = len(record) // _LEAST_WINDOWS
+    windows = [window, *(w for w in (2 * window + 1, 4 * window + 1) if w <= longest)]
+    return min(
+        (averaged_balance(record, valve, settings, each) for each in windows),
+        key=AveragedBalance.relative_width,
+    )
+
+
+def _regressed(balance: AveragedBalance, settings: IdentificationSettings) -> _Outcome:
+    """Return the outcome of the averaged balance: no simulated stem comes back without a spring."""
+    parameters = balance_verdicts(balance, settings)
+    try:
+        model = KarnoppParameters(
+            **balance.values, static_friction=balance.values["coulomb_friction"]
+        )
+    except ValueError:
+        model = None
+    doubts = [balance.doubt] if balance.doubt else []
+    return _Outcome(parameters, balance.misfit.fit, balance.misfit, doubts, model, None)
 
 
 def _finding(outcome: _Outcome, valve: Valve) -> str:
     misfit = outcome.misfit
-    if misfit is None:
-        return f"the regression reproduces {100 * outcome.fit:.2f} % of the force"
+    if outcome.stem is None:
+        return (
+            f"the force balance reproduces {100 * outcome.fit:.2f} % of the force; "
+            f"{misfit.words} of the rest are not noise"
+        )
     return (
         f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
         f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not noise"

@@ -29,6 +29,10 @@ from valve_friction_ros.identification.trust.excitation import (
     require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.plausible_units import (
+    require_plausible_units,
+    time_remarks,
+)
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
@@ -106,6 +110,7 @@ def identify_robust(
         misfit=misfit,
         derivative_window=0,
         warnings=(
+            *time_remarks(uniform, valve),
             *_doubts(misfit),
             *found_imperfections(fit),
             *sampling_remarks(record),
@@ -141,9 +146,10 @@ def has_no_place_for(settings: IdentificationSettings) -> str:
 
 def _require_record(record: MeasuredRecord, valve: Valve, settings: IdentificationSettings) -> None:
     """Refuse a record without the motion that determines friction."""
+    require_drive(record, valve)
+    require_plausible_units(record, valve, settings)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
-    require_drive(record, valve)
     require_two_directions(record, settings.published_window)
     require_travel(record, valve)
     require_stem_between_stops(record, valve)

@@ -32,6 +32,7 @@ from valve_friction_ros.identification.trust.excitation import (
 from valve_friction_ros.identification.trust.jackknife import Jackknife, jackknife
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
 from valve_friction_ros.identification.trust.misfit import percentage, stem_distance
+from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.identification.trust.uncertainty import half_width
 from valve_friction_ros.identification.trust.verdict import (
     Parameter,
@@ -125,6 +126,7 @@ def identify_signature(
         raise RefusalError("the force balance needs a spring: use the method refined")
     record = measured(recording)
     require_unbroken(record)
+    require_plausible_units(record, valve, settings)
     require_enough_samples(record, settings.published_window)
     require_motion(record)
     require_travel(record, valve)

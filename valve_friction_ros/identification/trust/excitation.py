@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.trust.plausible_units import position_question
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import measured
@@ -174,7 +175,7 @@ def require_travel(recording: Recording, valve: Valve) -> None:
         raise RefusalError(
             f"the stem position runs from {lowest:.4g} to {highest:.4g} m, the travel from 0 to "
             f"{travel:.4g} m: check that the signals are not swapped, and check unit (m), zero "
-            "and travel"
+            f"and travel: {position_question(max(-lowest, highest), travel)}"
         )
     if highest - lowest < _LEAST_TRAVEL * travel:
         raise RefusalError(

@@ -22,28 +22,43 @@ at 100 Hz
 
 @dataclass(frozen=True)
 class Misfit:
-    """How well the simulated stem follows the measured one.
+    """How well the simulated stem follows the measured one, or the modelled force the measured.
 
     Attributes
     ----------
     fit : float
         Share of the movement that is reproduced, at most 1.
     rms : float
-        Root mean square of the whole residual, sensor noise included, m.
+        Root mean square of the whole residual, sensor noise included, `unit`.
     systematic : float
-        Part of it that the sensors' noise does not explain, m.
+        Part of it that the sensors' noise does not explain, `unit`.
     tolerated : float
-        Largest systematic misfit that still counts as an effect of the noise, m.
+        Largest systematic misfit that leaves the model without doubt, `unit`.
+    unit : str
+        ``m``; ``N`` where no stem is simulated.
     """
 
     fit: float
     rms: float
     systematic: float
     tolerated: float
+    unit: str = "m"
+
+    @property
+    def of_stem(self) -> float:
+        """The systematic misfit of a simulated stem, m; nan where no stem is simulated."""
+        return self.systematic if self.unit == "m" else math.nan
+
+    @property
+    def words(self) -> str:
+        """The systematic misfit with its unit, for people."""
+        if self.unit == "m":
+            return f"{self.systematic * 1e6:.3g} µm"
+        return f"{self.systematic:.3g} {self.unit}"
 
     @property
     def excess(self) -> float:
-        """Systematic misfit beyond the share that chance explains, m."""
+        """Systematic misfit beyond the share that chance explains, `unit`."""
         expected = _EXPECTED_SHARE * self.tolerated
         return math.sqrt(max(self.systematic**2 - expected**2, 0.0))
 

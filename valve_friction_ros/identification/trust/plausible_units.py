@@ -1,0 +1,229 @@
+"""Quantities that no control valve has, and the unit in which they would be ordinary.
+
+Only a diaphragm with a spring is judged. The wide ranges refuse; they hold every actuator of the
+catalogues (Fisher 657/667 and 585C, SAMSON 3271/3277, Masoneilan 87/88, with margin): diaphragm
+areas from 30 cm² to two of 2800 cm² in tandem, travel from 5 mm to the 610 mm of long pistons,
+supply up to 10 bar. The ordinary ranges only choose the unit that is named.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
+from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
+from valve_friction_ros.model.drive import Drive
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.derivatives import Derivatives
+from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
+
+__all__ = ["position_question", "require_plausible_units", "require_valve_units", "time_remarks"]
+
+
+class _Quantity(NamedTuple):
+    """Ranges of a quantity, SI unit, and the sizes of the units that it is written in."""
+
+    unit: str
+    possible: tuple[float, float]
+    ordinary: tuple[float, float]
+    units: Mapping[str, float]
+
+
+_PRESSURE = _Quantity(
+    "Pa",
+    (8e3, 1.6e6),
+    (2e4, 7e5),
+    {"bar": 1e5, "kPa": 1e3, "psi": 6894.76, "mbar": 100.0, "MPa": 1e6},
+)
+"""Highest pressure of a record. A spring range starts at 0.2 bar (3 psi), seldom at half of that,
+and a stem moves only beyond; the supply is at most 10 bar, absolute or with margin 16."""
+
+_REFERENCE = _Quantity("Pa", (2e3, 1.6e6), (3e4, 1.2e5), _PRESSURE.units)
+"""Pressure reference other than 0: that of the air for an absolute sensor, as a rule."""
+
+_AREA = _Quantity("m²", (1e-3, 1.0), (3e-3, 0.6), {"cm²": 1e-4, "in²": 6.4516e-4, "mm²": 1e-6})
+_TRAVEL = _Quantity("m", (2e-3, 0.7), (4e-3, 0.2), {"mm": 1e-3, "cm": 1e-2, "in": 0.0254})
+_POSITION = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "µm": 1e-6}
+
+_STIFFNESS = _Quantity("N/m", (1e3, 1e8), (5e3, 2e7), {"N/mm": 1e3, "kN/m": 1e3, "N/cm": 1e2})
+"""Spring constant: 0.2 bar on 30 cm² over 60 mm to 4 bar on 2800 cm² over 15 mm, with margin."""
+
+_SPEED = _Quantity("m/s", (0.0, 0.5), (1e-4, 0.3), {"min read as s": 1 / 60, "s read as ms": 1e-3})
+"""Top speed: the fastest valves (anti-surge, with boosters) take 0.3 s for 100 mm."""
+
+_TRIP_SPEED = 5.0
+"""Speed, m/s, that even a spring that slams a valve shut does not reach."""
+
+_TIME_CONSTANT = _Quantity("s", (0.0, 10.0), (1e-3, 2.0), {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9})
+"""F_v/k, in which a stem follows a step of pressure: 0.02 to 0.4 s for the paper's packings."""
+
+_ORDER = 3
+_MOVING_SHARE = 0.05
+"""Order of the derivatives, and speed over the top speed from which the stem counts as moving.
+Chosen: as in the other checks of a record."""
+
+_MOST_BLOCKS = 200
+"""Most blocks for a scatter. Chosen: noise makes any number of strokes, and memory is finite."""
+
+_OUTSIDE = 0.05
+"""Distance beyond the travel, over the travel, up to which a record is judged; `require_travel`
+refuses a longer one, as where the signals are swapped."""
+
+_LEAST_SAMPLES = 100
+"""Samples below which the time is not judged. Chosen: other checks refuse such a record."""
+
+_PERCENT = (20.0, 105.0)
+"""Highest value of a signal in percent. Chosen: lower ones have an ordinary unit too."""
+
+
+def require_plausible_units(
+    recording: Recording, valve: Valve, settings: IdentificationSettings
+) -> None:
+    """Refuse a record or a valve in which a quantity is beyond every control valve.
+
+    A machine without a spring, one with a force as its drive, and a dead sensor are not judged.
+
+    Raises
+    ------
+    RefusalError
+        With the quantity, and the unit in which it would be ordinary.
+    """
+    if (
+        not _is_valve(recording, valve)
+        or settings.fixed.get("spring_constant") == 0.0
+        or np.ptp(recording.drive) == 0
+    ):
+        return
+    try:
+        require_valve_units(valve, settings.fixed)
+    except ValueError as error:
+        raise RefusalError(str(error)) from None
+    place = float(np.abs(recording.position).max())
+    if place > (1 + _OUTSIDE) * valve.travel:
+        return
+    pressure = float(np.abs(recording.drive).max())
+    if problem := _beyond("the pressure reaches", pressure, _PRESSURE):
+        raise RefusalError(problem)
+    if not np.isfinite(valve.travel) and place > _TRAVEL.possible[1]:
+        raise RefusalError(
+            f"the stem position reaches {place:.4g} m, further than any valve: "
+            + position_question(place, _TRAVEL.ordinary[1])
+        )
+    if len(recording) > _LEAST_SAMPLES:
+        speed, constant = _top_speed(recording), _least_time_constant(recording)
+        for problem in (
+            _beyond("the stem moves at", speed, _SPEED._replace(possible=(0.0, _TRIP_SPEED))),
+            _beyond("the stem lags behind the pressure by", constant, _TIME_CONSTANT),
+        ):
+            if problem:
+                raise RefusalError(problem)
+
+
+def require_valve_units(valve: Valve, known: Mapping[str, float]) -> None:
+    """Refuse the geometry and the spring of a valve that nobody builds.
+
+    Raises
+    ------
+    ValueError
+        With the quantity, and the unit in which it would be ordinary.
+    """
+    judged = [("diaphragm_area is", valve.diaphragm_area, _AREA)]
+    if np.isfinite(valve.travel):
+        judged.append(("travel is", valve.travel, _TRAVEL))
+    if valve.pressure_reference > 0:
+        judged.append(("pressure_reference is", valve.pressure_reference, _REFERENCE))
+    if np.isfinite(valve.pressure_maximum) and valve.pressure_maximum > 0:
+        # A sensor reaches further than its valve.
+        widened = _PRESSURE._replace(possible=(_PRESSURE.possible[0], 1e8))
+        judged.append(("pressure_maximum is", valve.pressure_maximum, widened))
+    if known.get("spring_constant"):
+        judged.append(("spring_constant is", known["spring_constant"], _STIFFNESS))
+    for words, value, quantity in judged:
+        if value is not None and (problem := _beyond(words, value, quantity)):
+            raise ValueError(problem)
+
+
+def position_question(place: float, travel: float) -> str:
+    """Ask for the unit in which a position that reads `place` m lies within the travel, m."""
+    units = [unit for unit, size in _POSITION.items() if 0.1 <= place * size / travel <= 1.05]
+    return _question((*units, *_percent(place)), "m")
+
+
+def time_remarks(recording: Recording, valve: Valve) -> tuple[str, ...]:
+    """Question the unit of time of a stem that is faster than most valves can be."""
+    if not _is_valve(recording, valve):
+        return ()
+    return tuple(filter(None, [_beyond("the stem moves at", _top_speed(recording), _SPEED)]))
+
+
+def _is_valve(recording: Recording, valve: Valve) -> bool:
+    return recording.driven_by is Drive.PRESSURE and valve.driven_by is Drive.PRESSURE
+
+
+def _velocity(recording: Recording) -> tuple[MeasuredRecord, Derivatives]:
+    record = measured(recording)
+    return record, record.derivatives(record.fitting_window(_ORDER), _ORDER)
+
+
+def _top_speed(recording: Recording) -> float:
+    return float(np.quantile(np.abs(_velocity(recording)[1].velocity), 0.999))
+
+
+def _least_time_constant(recording: Recording) -> float:
+    """Low end of the interval of F_v/k, s, from pressure = k·x + F_v·ẋ ± F_c; 0 without one."""
+    record, derivatives = _velocity(recording)
+    velocity, place, pressure = (
+        derivatives.velocity,
+        derivatives.inner(record.position),
+        derivatives.inner(record.drive),
+    )
+    moving = np.abs(velocity) > _MOVING_SHARE * np.abs(velocity).max()
+    columns = np.column_stack(
+        [velocity, place - place.mean(), np.sign(velocity), np.ones_like(velocity)]
+    )
+    columns /= np.linalg.norm(columns, axis=0)[None, :]
+    sizes = np.linalg.norm(velocity), np.linalg.norm(place - place.mean())
+    columns *= moving[:, None]
+    solved = np.linalg.lstsq(columns, pressure * moving, rcond=None)[0]
+    equation = EstimatingEquation.of_least_squares(columns, columns @ solved - pressure * moving)
+    stroke = stroke_length(np.cumsum(velocity * moving))
+    covariance = block_covariance(equation, max(stroke, velocity.size // _MOST_BLOCKS))
+    viscous, spring = (
+        (solved[index] + sign * covariance.half_width(np.eye(4)[index])) / sizes[index]
+        for index, sign in ((0, -1), (1, 1))
+    )
+    return float(viscous / spring) if viscous > 0 and solved[1] > 0 and spring > 0 else 0.0
+
+
+def _beyond(words: str, value: float, quantity: _Quantity) -> str:
+    """Say that no valve has this value, and name the likely units; empty if a valve has it."""
+    low, high = quantity.possible
+    if low <= value <= high:
+        return ""
+    units = [
+        unit
+        for unit, size in quantity.units.items()
+        if quantity.ordinary[0] <= value * size <= quantity.ordinary[1]
+    ]
+    if quantity is _PRESSURE:
+        units.extend(_percent(value))
+    return (
+        f"{words} {value:.4g} {quantity.unit}, {'less' if value < low else 'more'} than in any "
+        f"control valve ({low:.4g} to {high:.4g} {quantity.unit}): "
+        + _question(units, "" if quantity.unit == "m/s" else quantity.unit)
+    )
+
+
+def _percent(value: float) -> tuple[str, ...]:
+    return ("%",) if _PERCENT[0] <= value <= _PERCENT[1] else ()
+
+
+def _question(units: Iterable[str], read_as: str) -> str:
+    named = " or ".join(units)
+    if not named:
+        return "check the unit"
+    return f"{named} read as {read_as}?" if read_as else f"{named}?"
