@@ -22,6 +22,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_two_directions,
     require_unbroken,
 )
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
@@ -41,6 +42,18 @@ class PublishedFit(NamedTuple):
 
     estimate: Estimate
     regression: ForceBalanceRegression
+
+    @property
+    def sliding_speed(self) -> float:
+        """Mean speed over the distance, m/s, of the samples above the threshold."""
+        speed = self.regression.speed
+        return mean_speed(speed[speed > self.estimate.threshold])
+
+    @property
+    def sliding_friction(self) -> float:
+        """F_c + F_v·|ẋ| at that speed, N: the work of friction over the distance."""
+        estimate = self.estimate
+        return estimate.coulomb_friction + estimate.viscous_friction * self.sliding_speed
 
 
 def _sweep(

@@ -36,6 +36,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -130,6 +131,7 @@ def identify_refined(
         model=outcome.model,
         exhibit=estimate,
         stem=outcome.stem,
+        sliding_speed=outcome.sliding_speed,
     )
 
 
@@ -142,6 +144,7 @@ class _Outcome(NamedTuple):
     warnings: Sequence[str]
     model: KarnoppParameters | None
     stem: StemComparison | None
+    sliding_speed: float
 
 
 def _refined(
@@ -185,6 +188,7 @@ def _refined(
         warnings,
         problem.model(refinement.coordinates),
         StemComparison(conditioned.sample_period, conditioned.position, refinement.simulated),
+        mean_speed(refinement.velocity),
     )
 
 
@@ -193,9 +197,16 @@ def _regressed(
 ) -> _Outcome:
     """Return the outcome of the regression: without a spring no simulated stem comes back."""
     estimate, regression = start.estimate, regression_uncertainty(record, start)
-    parameters = regression_verdicts(estimate, regression, settings)
-    model = possible_model(estimate)
-    return _Outcome(parameters, regression.fit, None, estimate.warnings, model, None)
+    parameters = regression_verdicts(start, regression, settings)
+    return _Outcome(
+        parameters,
+        regression.fit,
+        None,
+        estimate.warnings,
+        possible_model(estimate),
+        None,
+        start.sliding_speed,
+    )
 
 
 def _finding(outcome: _Outcome, valve: Valve) -> str:

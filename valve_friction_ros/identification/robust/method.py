@@ -29,6 +29,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_unbroken,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
@@ -127,6 +128,7 @@ def identify_robust(
         model=_model(fit),
         exhibit=published,
         stem=_stem(fit),
+        sliding_speed=mean_speed(fit.model.simulate(fit.at).velocity),
     )
 
 
