@@ -32,6 +32,7 @@ __all__ = [
     "friction_point",
     "settings_text",
     "span_of",
+    "trended",
 ]
 
 
@@ -202,6 +203,12 @@ class HistoryEntry:
         return friction_point(self.time, self.parameters, self.sliding_speed, baseline)
 
 
+def trended(baseline: Baseline | None) -> str:
+    """Return the name of the friction whose trend is followed against a baseline."""
+    has_sliding = baseline is not None and baseline.sliding is not None
+    return SLIDING if has_sliding else "coulomb_friction"
+
+
 def friction_point(
     time: int, parameters: Mapping[str, Parameter], speed: float, baseline: Baseline | None
 ) -> FrictionPoint | None:
@@ -211,9 +218,7 @@ def friction_point(
     else F_c. Only an identified or weak friction counts: a fixed friction was not measured, and a
     friction that is not identifiable has no value.
     """
-    one = parameters.get("coulomb_friction")
-    if baseline is not None and baseline.sliding is not None:
-        one = parameters.get(SLIDING)
+    one = parameters.get(trended(baseline))
     if one is None or one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
         return None
     if not 0 <= one.half_width < _ENDLESS:

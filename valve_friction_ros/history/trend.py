@@ -13,9 +13,8 @@ from scipy.special import stdtrit
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import friction_words
 from valve_friction_ros.health.diagnosis import FrictionLimits
-from valve_friction_ros.history.entry import FrictionPoint
+from valve_friction_ros.history.entry import FrictionPoint, trended
 from valve_friction_ros.history.scattered_line import LEAST_ESTIMATES, ScatteredLine, fit_line
-from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.model.checks import require_non_negative
 
 __all__ = ["MONTH", "Crossing", "Limit", "Trend", "trend_of"]
@@ -209,7 +208,6 @@ def trend_of(
     crossing = None
     if baseline is not None and abs(line.slope) > line.slope_half_width:
         crossing = _crossing(line, begin, end, baseline, limits or FrictionLimits())
-    which: tuple[str, float] = ("coulomb_friction", math.nan)
-    if baseline is not None and baseline.sliding is not None:
-        which = (SLIDING, baseline.sliding.speed)
-    return Trend(line, days.times.size - outliers, outliers, begin, end, crossing, *which)
+    speed = math.nan if baseline is None or not baseline.sliding else baseline.sliding.speed
+    of = trended(baseline)
+    return Trend(line, days.times.size - outliers, outliers, begin, end, crossing, of, speed)

@@ -121,8 +121,9 @@ def friction_table(record: IdentifiedRecord) -> Table:
         rows += [
             ("excess friction", f"{excess:+.4g} ± {width:.2g} N"),
             (
-                f"{ratio.what} over baseline",
-                f"{ratio.value:.3g}, 95 % interval {ratio.low:.3g} to {ratio.high:.3g}",
+                "friction over baseline",
+                f"{ratio.what}: {ratio.value:.3g}, "
+                f"95 % interval {ratio.low:.3g} to {ratio.high:.3g}",
             ),
             (
                 "limits of that ratio",

@@ -103,11 +103,11 @@ class TestVerdicts:
         covariance = covariance_of(scatter)
         uncertainty = RegressionUncertainty(self.NAMES, covariance, 0.9, strokes)
         settings = IdentificationSettings(fixed=fixed)
-        return regression_verdicts(fit.estimate, uncertainty, settings), covariance
+        return regression_verdicts(fit, uncertainty, settings), covariance
 
     def test_by_the_interval_of_each(self, fit):
         found, covariance = self.of(fit, scatter=1e3)
-        assert list(found) == list(fit.estimate.values)
+        assert list(found) == [*fit.estimate.values, "sliding_friction"]
         one, gradient = found["coulomb_friction"], np.array([0.0, 1.0, 0.0, 0.0])
         assert one.name == "coulomb_friction"
         assert one.value == fit.estimate.coulomb_friction
@@ -126,6 +126,22 @@ class TestVerdicts:
             assert one.half_width == share * value
             gradient = np.eye(4)[self.NAMES.index(name)]
             assert one.standard_error == covariance.standard_error(gradient)
+
+    def test_the_sliding_friction_is_that_at_the_mean_speed(self, fit):
+        """F_c + F_v·v: its gradient is 1 by F_c and v by F_v, and their errors may cancel."""
+        found, covariance = self.of(fit, scatter=1e3)
+        moving = fit.regression.speed[fit.regression.speed > fit.estimate.threshold]
+        speed = np.sum(moving**2) / np.sum(moving)
+        one = found["sliding_friction"]
+        values = fit.estimate.values
+        assert one.value == pytest.approx(
+            values["coulomb_friction"] + values["viscous_friction"] * speed
+        )
+        gradient = np.array([speed, 1.0, 0.0, 0.0])
+        assert one.standard_error == pytest.approx(covariance.standard_error(gradient))
+        assert one.half_width == pytest.approx(
+            max(covariance.half_width(gradient), 3e-3 * one.value)
+        )
 
     def test_few_strokes_make_weak(self, fit):
         one = self.of(fit, strokes=2)[0]["viscous_friction"]
@@ -153,5 +169,7 @@ class TestVerdicts:
             **{**vars(fit.estimate), "viscous_friction": -fit.estimate.viscous_friction}
         )
         uncertainty = RegressionUncertainty(self.NAMES, covariance_of(1.0), 0.9, 10)
-        found = regression_verdicts(turned, uncertainty, IdentificationSettings())
+        found = regression_verdicts(
+            fit._replace(estimate=turned), uncertainty, IdentificationSettings()
+        )
         assert found["viscous_friction"].half_width == 5e-4 * fit.estimate.viscous_friction
