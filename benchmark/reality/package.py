@@ -3,7 +3,6 @@
 The only file here that knows the package.
 """
 
-import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -15,7 +14,6 @@ from valve_friction_ros.health import Baseline, StatusSignal, diagnose
 from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
-    Result,
     method_named,
 )
 from valve_friction_ros.model import Valve
@@ -61,28 +59,6 @@ def _arrivals(record: Record) -> Arrivals:
     )
 
 
-def _sliding_friction(result: Result) -> Number | None:
-    """Return ∫|F·dx|/∫|dx| of the identified model along its own stem.
-
-    For methods without such a number; only its usefulness counts.
-    """
-    stem, friction = result.stem, result.parameters["coulomb_friction"]
-    if stem is None or result.model is None or math.isnan(friction.value):
-        return None
-    moved = np.diff(stem.simulated)
-    distance = float(np.abs(moved).sum())
-    if distance == 0.0:
-        return None
-    velocity = moved / stem.sample_period
-    force = result.model.sliding_friction(velocity)
-    value = float(np.sum(force * moved)) / distance
-    speed = float(np.sum(np.abs(velocity * moved))) / distance
-    viscous = result.parameters["viscous_friction"]
-    by_viscous = 0.0 if math.isnan(viscous.half_width) else speed * viscous.half_width
-    # The errors of F_c and F_v are opposite as a rule: the larger one is what they do together.
-    return Number(value, max(friction.half_width, by_viscous), "derived")
-
-
 @dataclass(frozen=True)
 class PackageMethod:
     """A method of the package, called as a node calls it.
@@ -109,23 +85,18 @@ class PackageMethod:
             name: Number(one.value, one.half_width, one.verdict.value)
             for name, one in parameters.items()
         }
-        if "sliding_friction" not in numbers:
-            sliding = _sliding_friction(result)
-            if sliding is not None:
-                numbers["sliding_friction"] = sliding
         reasons = (f"{name}: {one.reason}" for name, one in parameters.items() if one.reason)
         return Answer(numbers, (*reasons, *result.warnings), native=result)
 
     def alarm(self, record: Record, answer: Answer, baseline: Answer) -> str:
-        """Compare the Coulomb friction with that of a baseline, as the monitor does."""
+        """Compare with the result of the healthy valve, as the monitor does."""
         if answer.native is None or baseline.native is None:
             return ""
-        healthy = baseline.native.parameters["coulomb_friction"]
-        if not healthy.value > 0:
+        try:
+            healthy = Baseline.of(baseline.native)
+        except RefusalError:
             return ""
-        diagnosis = diagnose(
-            answer.native, _valve(record.nominal), Baseline(healthy.value, healthy.half_width)
-        )
+        diagnosis = diagnose(answer.native, _valve(record.nominal), healthy)
         return _SIDES.get(diagnosis.status_signal, "")
 
 

@@ -14,6 +14,7 @@ from answers import KEYS, PARAMETER_KEYS, column, none_for_nan, values
 
 from valve_friction_ros.commands.output.result_output import as_json
 from valve_friction_ros.identification import (
+    PARAMETER_UNITS,
     UNITS,
     IdentificationSettings,
     identify_refined,
@@ -64,6 +65,7 @@ class TestProcesses:
         assert published["mass"] == pytest.approx(LOW_FRICTION.mass, rel=0.1)
         settings = IdentificationSettings(position_bias=POSITION_BIAS)
         expected = published_estimate(square_record, BENCH_VALVE, settings)
+        assert published.pop("sliding_friction") is None
         assert published == expected.values
         assert answer["evidence"]["threshold"] == expected.threshold
         assert answer["model_describes"] is True
@@ -96,7 +98,8 @@ class TestJson:
     def test_the_result_of_the_library(self, printed, quick_csv, result, bench_options):
         answer = printed(quick_csv, *bench_options, *REFINED)
         assert set(answer) == KEYS
-        assert list(answer["parameters"]) == list(UNITS) == list(result.parameters)
+        assert list(answer["parameters"]) == [*UNITS, "sliding_friction"]
+        assert answer["sliding_speed"] == result.sliding_speed
         for name, entry in answer["parameters"].items():
             expected = result.parameters[name]
             assert entry == {
@@ -106,8 +109,8 @@ class TestJson:
                 "interval": [none_for_nan(end) for end in expected.interval],
                 "verdict": expected.verdict.value,
                 "reason": expected.reason,
-                "published": result.estimate.values[name],
-                "unit": UNITS[name],
+                "published": result.estimate.values.get(name),
+                "unit": PARAMETER_UNITS[name],
             }
         assert answer["fit"] == result.misfit.fit
         assert answer["rms"] == result.misfit.rms
@@ -122,7 +125,7 @@ class TestJson:
     ):
         answer = printed(quick_csv, *bench_options, *REFINED)
         expected = published_estimate(quick_record, BENCH_VALVE, SETTINGS)
-        assert column(answer, "published") == expected.values
+        assert column(answer, "published") == {**expected.values, "sliding_friction": None}
         for key in ("threshold", "samples", "sigma", "r_squared"):
             assert answer["evidence"][key] == getattr(expected, key)
         assert answer["evidence"]["published_window"] == 31

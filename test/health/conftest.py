@@ -28,10 +28,10 @@ def result(loose_record):
 
 @pytest.fixture(scope="session")
 def friction():
-    """Function of a value and its half width: an assessed Coulomb friction."""
+    """Function of a value, its half width and its name: an assessed friction."""
 
-    def build(value, half_width=0.0):
-        return Parameter("coulomb_friction", value, half_width / 2, half_width, Verdict.IDENTIFIED)
+    def build(value, half_width=0.0, name="coulomb_friction"):
+        return Parameter(name, value, half_width / 2, half_width, Verdict.IDENTIFIED)
 
     return build
 

@@ -9,6 +9,7 @@ from valve_friction_ros.health import (
     Baseline,
     FrictionLimits,
     Level,
+    SlidingFriction,
     StatusSignal,
     dead_band,
     diagnose,
@@ -108,7 +109,7 @@ class TestLevels:
         )
         level, signal, words = verdict
         assert (found.level, found.status_signal) == (level, signal)
-        assert found.ratio == (ratio, ratio, ratio)
+        assert found.ratio[:3] == (ratio, ratio, ratio)
         compared = (
             f"{words}: coulomb friction is {ratio:.2f} ({ratio:.2f} to {ratio:.2f}) "
             "times its baseline; "
@@ -174,7 +175,10 @@ class TestLevels:
 class TestUnknownFriction:
     @pytest.mark.parametrize("baseline", [None, BASELINE, Baseline(1e-6), Baseline(1e6)])
     def test_never_alarms(self, with_values, unknown, baseline):
-        found = diagnose(with_values(coulomb_friction=unknown()), BENCH_VALVE, baseline)
+        result = with_values(
+            coulomb_friction=unknown(), sliding_friction=unknown("sliding_friction")
+        )
+        found = diagnose(result, BENCH_VALVE, baseline)
         assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
         assert found.ratio is None
         assert found.message == (
@@ -201,6 +205,19 @@ class TestUnknownFriction:
             assert found.level == Level.OK
         assert diagnose(result, BENCH_VALVE).level == Level.OK
 
+    def test_the_sliding_friction_is_told_where_it_is_known(self, with_values, unknown, friction):
+        sliding = friction(205.5, 3.0, "sliding_friction")
+        result = with_values(coulomb_friction=unknown(), sliding_friction=sliding)
+        found = diagnose(result, BENCH_VALVE)
+        assert found.message == "no baseline yet; sliding friction 205.5 ± 3 N"
+        found = diagnose(result, BENCH_VALVE, BASELINE)
+        assert (found.level, found.ratio) == (Level.OK, None)
+        assert found.message == (
+            "no comparison with the baseline (coulomb friction 128 N): coulomb friction is not "
+            "identifiable: the record does not determine it; the baseline has no sliding friction: "
+            "set it anew; sliding friction 205.5 ± 3 N"
+        )
+
     @pytest.mark.parametrize("baseline", [None, BASELINE])
     def test_below_zero_is_a_fault_of_the_signals(self, with_values, friction, baseline):
         """As of a drive whose sign is turned; no packing has it, so nothing is compared."""
@@ -218,6 +235,75 @@ class TestUnknownFriction:
         assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
         assert found.ratio.value == 0.0
         assert found.message.startswith("friction perhaps collapsed: ")
+
+
+class TestSlidingFriction:
+    """A baseline of 200 ± 4 N at 8 mm/s, and no F_c of use."""
+
+    SLIDING = SlidingFriction(200.0, 4.0, 8e-3)
+
+    @pytest.fixture
+    def slid(self, with_values, friction):
+        """Function of a sliding friction, its half width and speed: a result with a vague F_c."""
+
+        def build(value, half_width=4.0, speed=8e-3, **changes):
+            sliding = friction(value, half_width, "sliding_friction")
+            vague = dataclasses.replace(friction(160.0, 100.0), verdict=Verdict.WEAK)
+            changes = {"coulomb_friction": vague, "sliding_friction": sliding, **changes}
+            return dataclasses.replace(with_values(**changes), sliding_speed=speed)
+
+        return build
+
+    @pytest.mark.parametrize("coulomb", [None, 160.0])
+    @pytest.mark.parametrize(
+        ("value", "verdict"),
+        [(500.0, FAILURE), (300.0, MAINTENANCE), (200.0, NORMAL), (80.0, COLLAPSED)],
+    )
+    def test_it_raises_the_alarm_that_the_coulomb_friction_hides(
+        self, slid, value, verdict, coulomb
+    ):
+        found = diagnose(slid(value), BENCH_VALVE, Baseline(coulomb, 0.0, self.SLIDING))
+        level, signal, words = verdict
+        assert (found.level, found.status_signal) == (level, signal)
+        told = f"{words}: sliding friction at 8 mm/s is {value / 200:.2f} ("
+        assert found.message.startswith(told)
+        assert found.to_dict()["ratio_of"] == "sliding_friction"
+        assert found.to_dict()["ratio_speed"] == 8e-3
+
+    def test_at_other_speeds_it_says_so(self, slid, unknown):
+        result = slid(300.0, speed=3e-3, coulomb_friction=unknown())
+        found = diagnose(result, BENCH_VALVE, Baseline(sliding=self.SLIDING))
+        assert (found.level, found.ratio) == (Level.OK, None)
+        assert (
+            "the stem slides at 3 mm/s, and at 8 mm/s in the baseline: move it at" in found.message
+        )
+
+    def test_too_small_to_be_identified_it_has_collapsed(self, slid, unknown):
+        """Half of 196 N is 98 N; at 4 mm/s, 49 N may be 98 N at twice the speed."""
+        baseline = Baseline(sliding=self.SLIDING)
+        for bound, speed, level in (
+            (98.0, 8e-3, Level.ERROR),
+            (98.1, 8e-3, Level.OK),
+            (49.0, 4e-3, Level.ERROR),
+            (49.1, 4e-3, Level.OK),
+        ):
+            none = dataclasses.replace(unknown("sliding_friction"), magnitude_bound=bound)
+            result = slid(1.0, speed=speed, sliding_friction=none, coulomb_friction=unknown())
+            found = diagnose(result, BENCH_VALVE, baseline)
+            assert found.level == level
+            assert ("sliding friction is too small" in found.message) is (level == Level.ERROR)
+
+    def test_a_coulomb_friction_lost_to_viscous_friction_is_no_collapse(self, slid, unknown):
+        vanished = dataclasses.replace(unknown(), magnitude_bound=10.0)
+        baseline = Baseline(128.0, 0.0, self.SLIDING)
+        assert diagnose(slid(200.0, coulomb_friction=vanished), BENCH_VALVE, baseline).level == 0
+        less = diagnose(slid(150.0, coulomb_friction=vanished), BENCH_VALVE, baseline)
+        assert less.message.startswith("friction collapsed, the packing may leak: coulomb ")
+
+    def test_below_zero_it_is_a_fault_of_the_signals(self, slid):
+        found = diagnose(slid(-200.0), BENCH_VALVE, Baseline(sliding=self.SLIDING))
+        assert found.status_signal is StatusSignal.CHECK_FUNCTION
+        assert found.message.startswith("sliding friction is -200 ± 4 N, and friction is above")
 
 
 class TestModelDoubt:
@@ -259,7 +345,7 @@ class TestModelDoubt:
     def test_without_a_friction(self, doubted, unknown):
         found = diagnose(doubted(unknown()), BENCH_VALVE, BASELINE)
         assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
-        assert found.message.startswith(self.DOUBT + "coulomb friction is not identifiable")
+        assert found.message.startswith(self.DOUBT + "no comparison with the baseline (coulomb ")
 
     def test_a_tolerated_misfit_is_no_doubt(self, doubted):
         found = diagnose(doubted(128.0, systematic=97e-6), BENCH_VALVE, BASELINE)

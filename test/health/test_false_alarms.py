@@ -1,5 +1,7 @@
 """Noisy records of an unchanged valve and of a tightened one, against a noisy baseline."""
 
+from dataclasses import replace
+
 import pytest
 
 from valve_friction_ros.health import Baseline, FrictionLimits, Level, diagnose
@@ -15,11 +17,6 @@ def assessed(record, seed):
     return identify_refined(noise.applied_to(record), BENCH_VALVE, SETTINGS)
 
 
-def baseline_of(result):
-    healthy = result.parameters["coulomb_friction"]
-    return Baseline(healthy.value, healthy.half_width)
-
-
 @pytest.fixture(scope="module")
 def unchanged(loose_record):
     return [assessed(loose_record, seed) for seed in SEEDS]
@@ -29,7 +26,7 @@ def unchanged(loose_record):
 def pairs(unchanged):
     """Each result with the baseline that the one before it makes."""
     return [
-        (now, baseline_of(before))
+        (now, Baseline.of(before))
         for now, before in zip(unchanged, unchanged[-1:] + unchanged, strict=False)
     ]
 
@@ -40,13 +37,16 @@ def test_an_unchanged_valve_raises_none(pairs):
 
 
 def test_nor_where_the_limits_are_as_narrow_as_the_scatter(pairs):
-    """The ratios alone would pass these limits again and again: the intervals hold them back.
+    """The ratios of F_c alone would pass these limits again and again: intervals hold them back.
 
     At one standard deviation of the ratio, an unchanged valve passes with its whole interval,
     beyond 1 + 1.96 of them, once in 300 times.
     """
     limits = FrictionLimits(warn_ratio=1.006, error_ratio=1.02, low_ratio=1 / 1.006)
-    found = [diagnose(now, BENCH_VALVE, baseline, limits) for now, baseline in pairs]
+    found = [
+        diagnose(now, BENCH_VALVE, replace(baseline, sliding=None), limits)
+        for now, baseline in pairs
+    ]
     beyond = [one for one in found if not limits.low_ratio < one.ratio.value < limits.warn_ratio]
     assert len(beyond) > len(SEEDS) / 5
     assert [one.level for one in found] == [Level.OK] * len(SEEDS)
@@ -55,12 +55,12 @@ def test_nor_where_the_limits_are_as_narrow_as_the_scatter(pairs):
 def test_the_intervals_are_no_wider_than_they_must_be(pairs):
     """A limit 5 % away would be seen: no interval hides a change of that size."""
     for now, baseline in pairs:
-        ratio = baseline.compared_with(now.parameters["coulomb_friction"])
+        ratio = diagnose(now, BENCH_VALVE, baseline).ratio
         assert 0.95 < ratio.low < ratio.high < 1.05
 
 
 def test_friction_grown_by_half_is_always_seen(tight_record, unchanged):
     for seed, before in zip(range(100, 108), unchanged, strict=False):
-        found = diagnose(assessed(tight_record, seed), BENCH_VALVE, baseline_of(before))
+        found = diagnose(assessed(tight_record, seed), BENCH_VALVE, Baseline.of(before))
         assert found.level == Level.WARN
         assert found.message.startswith("friction has grown: ")

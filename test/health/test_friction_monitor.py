@@ -12,6 +12,7 @@ from valve_friction_ros.health import (
     FrictionMonitor,
     Level,
     MonitorSettings,
+    SlidingFriction,
     StatusSignal,
     diagnose,
     identify_snapshot,
@@ -240,17 +241,20 @@ class TestBaseline:
     def test_of_the_latest_assessment_with_its_interval(self, result, with_values, friction):
         monitor = FrictionMonitor(SETTINGS)
         monitor.accept(result, START)
-        healthy = coulomb_friction(result)
-        expected = Baseline(healthy.value, healthy.half_width)
+        healthy, slid = coulomb_friction(result), result.parameters["sliding_friction"]
+        sliding = SlidingFriction(slid.value, slid.half_width, result.sliding_speed)
+        expected = Baseline(healthy.value, healthy.half_width, sliding)
         monitor.baseline = monitor.result_as_baseline()
         assert monitor.baseline == expected
         assert monitor.diagnosis().ratio.value == 1.0
         tight = friction(2.5 * healthy.value, 7.0)
-        monitor.accept(with_values(coulomb_friction=tight), START + 1)
-        assert monitor.diagnosis().ratio == expected.compared_with(tight)
+        more = friction(slid.value + 1.5 * healthy.value, 7.0, "sliding_friction")
+        monitor.accept(with_values(coulomb_friction=tight, sliding_friction=more), START + 1)
+        assert monitor.diagnosis().ratio.of == "coulomb_friction"
+        assert monitor.diagnosis().ratio.value == 2.5
         assert monitor.diagnosis().level == Level.ERROR
         monitor.baseline = monitor.result_as_baseline()
-        assert monitor.baseline == Baseline(tight.value, 7.0)
+        assert monitor.baseline.coulomb_friction == tight.value
         assert monitor.diagnosis().level == Level.OK
 
     def test_needs_an_estimate(self):
@@ -262,17 +266,17 @@ class TestBaseline:
 
     def test_however_small(self, with_values, friction):
         monitor = FrictionMonitor(SETTINGS)
-        monitor.accept(with_values(coulomb_friction=friction(0.5, 0.1)), START)
-        assert monitor.result_as_baseline() == Baseline(0.5, 0.1)
+        monitor.accept(with_values(coulomb_friction=friction(0.5, 0.05)), START)
+        assert monitor.result_as_baseline().coulomb_friction == 0.5
 
-    @pytest.mark.parametrize("coulomb", [0.0, -3.0])
-    def test_needs_a_friction(self, with_values, coulomb):
+    @pytest.mark.parametrize("name", ["coulomb_friction", "sliding_friction"])
+    def test_needs_a_friction(self, with_values, name):
         monitor = compared_with(Baseline(100.0))
-        monitor.accept(with_values(coulomb_friction=coulomb), START)
+        monitor.accept(with_values(**{name: -3.0}), START)
         with pytest.raises(RefusalError) as refusal:
             monitor.result_as_baseline()
         assert str(refusal.value) == (
-            f"a coulomb friction of {coulomb:.4g} N cannot be a baseline: check the direction of "
+            f"a {name.replace('_', ' ')} of -3 N cannot be a baseline: check the direction of "
             "both signals, then identify again"
         )
         assert monitor.baseline == Baseline(100.0)
@@ -280,12 +284,14 @@ class TestBaseline:
     @pytest.mark.parametrize("before", [None, Baseline(100.0)])
     def test_needs_an_identifiable_friction(self, with_values, unknown, before):
         monitor = compared_with(before)
-        monitor.accept(with_values(coulomb_friction=unknown()), START)
+        nothing = {name: unknown(name) for name in ("coulomb_friction", "sliding_friction")}
+        monitor.accept(with_values(**nothing), START)
         with pytest.raises(RefusalError) as refusal:
             monitor.result_as_baseline()
-        assert str(refusal.value) == (
-            "coulomb friction is not identifiable, so it cannot be the baseline: "
-            "the record does not determine it"
+        assert str(refusal.value).startswith(
+            "this result cannot be the baseline: coulomb friction is not identifiable (the record "
+            "does not determine it); sliding friction is not identifiable (the record does not "
+            "determine it): record more strokes, "
         )
         assert monitor.baseline == before
         assert monitor.diagnosis().level == Level.OK
@@ -341,8 +347,7 @@ class TestChangeOfSettings:
         monitor = self.filled(result)
         monitor.baseline = monitor.result_as_baseline()
         monitor.change_settings(replaced(limits=FrictionLimits(warn_ratio=1.2)))
-        healthy = coulomb_friction(result)
-        assert monitor.baseline == Baseline(healthy.value, healthy.half_width)
+        assert monitor.baseline == Baseline.of(result)
 
     def test_new_limits_judge_the_old_estimate(self, result):
         healthy = Baseline(coulomb_friction(result).value / 1.2)

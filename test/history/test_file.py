@@ -1,14 +1,16 @@
 """The history's file: what goes in comes out, and what plain SQL finds in it."""
 
+import math
 import sqlite3
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, success
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.health import Baseline
+from valve_friction_ros.health import Baseline, SlidingFriction
 from valve_friction_ros.history import FrictionPoint, HistoryFile, KeptBaseline, KeptValve, schema
 from valve_friction_ros.identification import Verdict
 
@@ -16,6 +18,17 @@ from valve_friction_ros.identification import Verdict
 @pytest.fixture
 def history(tmp_path):
     return HistoryFile(tmp_path / "folder" / "a file ?#%.sqlite")
+
+
+SLIDING = SlidingFriction(205.5, 3.25, 9.5e-3)
+
+
+def write_version_2(history):
+    """Write the file, as dumped by that version: identifications, a refusal, baselines."""
+    history.path.parent.mkdir(parents=True)
+    connection = sqlite3.connect(history.path)
+    connection.executescript(Path(__file__).with_name("history_of_version_2.sql").read_text())
+    connection.close()
 
 
 def select(history, query):
@@ -35,31 +48,82 @@ def test_what_goes_in_comes_out(history):
     entries = [
         success(START, 150.123456789, 1 / 3, warnings=("one", "two")),
         success(START + 1, verdict=Verdict.WEAK, baseline=Baseline(140.0, 2.0)),
-        refused(START + 2),
+        success(START + 2, baseline=Baseline(140.0, 2.0, SLIDING), sliding=SLIDING),
+        success(START + 3, baseline=Baseline(sliding=SLIDING)),
+        refused(START + 4),
     ]
     for entry in entries:
         history.add(entry)
     found = history.entries()
-    assert len(found) == 3
+    assert found[2].diagnosis.ratio.of == "sliding_friction"
+    assert len(found) == len(entries)
     for one, other in zip(found, entries, strict=True):
         assert same(one, other)
 
 
 def test_a_file_of_version_1_is_read_and_extended(history):
     """Version 1 had no published values; a file that is only read stays as it is."""
-    history.add(success())
+    write_version_2(history)
     connection = sqlite3.connect(history.path)
     connection.execute("ALTER TABLE parameter DROP COLUMN published")
     connection.execute("PRAGMA user_version = 1")
     connection.close()
-    (old,) = history.entries()
-    assert same(old, success())
+    old = history.entries()
+    assert same(old[0], success(version="0.1.0"))
     assert select(history, "PRAGMA user_version") == [(1,)]
     friction = replace(parameter("coulomb_friction", 150.0), published=151.0)
-    new = success(START + 1, parameters={"coulomb_friction": friction})
+    new = success(START + 9 * DAY, parameters={"coulomb_friction": friction})
     history.add(new)
-    assert all(map(same, history.entries(), (old, new)))
+    assert all(map(same, history.entries(), (*old, new)))
     assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+
+
+class TestVersion2:
+    """A file that the last version without sliding friction in its baselines wrote."""
+
+    BASELINE = Baseline(140.0, 2.0)
+    ENTRIES = (
+        success(version="0.1.0"),
+        success(START + DAY, 210.0, 4.0, baseline=BASELINE, version="0.1.0"),
+        refused(START + 2 * DAY, version="0.1.0"),
+    )
+
+    def is_whole(self, history):
+        assert all(map(same, history.entries(), self.ENTRIES))
+        assert history.baseline(VALVE.name) == KeptBaseline(self.BASELINE, START + 5, START)
+        assert history.baseline(OTHER.name).baseline == Baseline(600.0, 7.0)
+        points = history.points(VALVE.name, "refined", baseline=self.BASELINE)
+        assert points == (FrictionPoint(START, 150.0, 3.0), FrictionPoint(START + DAY, 210.0, 4.0))
+        return True
+
+    def test_it_is_read_as_it_is(self, history):
+        write_version_2(history)
+        assert self.is_whole(history)
+        assert select(history, "PRAGMA user_version") == [(2,)]
+
+    def test_it_is_extended_by_the_first_change(self, history):
+        write_version_2(history)
+        history.prepare()
+        assert self.is_whole(history)
+        assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+        assert select(history, "PRAGMA foreign_key_check") == []
+        kept = KeptBaseline(Baseline(sliding=SLIDING), START + 3 * DAY, START)
+        history.set_baseline(VALVE, kept)
+        assert history.baseline(VALVE.name) == kept
+        new = success(START + 3 * DAY, baseline=kept.baseline, sliding=SLIDING)
+        history.add(new)
+        assert same(history.entries()[-1], new)
+
+    def test_it_then_has_the_tables_of_a_new_file(self, history, tmp_path):
+        write_version_2(history)
+        history.prepare()
+        new = HistoryFile(tmp_path / "new.sqlite")
+        new.prepare()
+        for table in ("identification", "parameter", "baseline"):
+            columns = f"SELECT name, type, \"notnull\" FROM pragma_table_info('{table}')"
+            assert sorted(select(history, columns)) == sorted(select(new, columns))
+        of = "SELECT sql FROM sqlite_master WHERE name IN ('friction', 'baseline_of_valve')"
+        assert select(history, of) == select(new, of)
 
 
 @given(
@@ -118,6 +182,26 @@ def test_points_are_those_of_the_entries(history):
         p for p in expected if p.time >= later
     )
     assert history.points(OTHER.name, "refined") == (FrictionPoint(START, 150.0, 3.0),)
+
+
+def test_points_of_the_sliding_friction_are_those_of_the_entries(history):
+    """Carried to the speed of the baseline; an entry without one, or too slow, is left out."""
+    baseline = Baseline(140.0, 2.0, SLIDING)
+    entries = [
+        success(START, sliding=SLIDING),
+        success(START + 1, sliding=replace(SLIDING, speed=8e-3)),
+        success(START + 2),
+        success(START + 3, sliding=replace(SLIDING, speed=4e-3)),
+    ]
+    for entry in entries:
+        history.add(entry)
+    points = history.points(VALVE.name, "refined", baseline=baseline)
+    assert points == tuple(p for one in entries if (p := one.point(baseline)) is not None)
+    assert [point.time - START for point in points] == [0, 1]
+    assert points[0] == FrictionPoint(START, SLIDING.value, SLIDING.half_width)
+    # F_v between 0 and 205.5 N over 8 mm/s, so from 205.5 N up to 9.5/8 of it.
+    assert points[1].value == pytest.approx(205.5 * (1 + 0.5 * 1.5 / 8))
+    assert points[1].half_width == pytest.approx(math.hypot(3.25, 205.5 * 0.5 * 1.5 / 8))
 
 
 class TestBaseline:

@@ -7,7 +7,7 @@ import pytest
 from histories import DAY, SECOND, START
 from scipy.stats import binom
 
-from valve_friction_ros.health import Baseline, FrictionLimits
+from valve_friction_ros.health import Baseline, FrictionLimits, SlidingFriction
 from valve_friction_ros.history import MONTH, FrictionPoint, Limit, trend_of
 
 NOON = START // DAY * DAY + DAY // 2
@@ -186,3 +186,15 @@ def test_an_interval_that_cannot_be(half_width):
     some[3] = some[3]._replace(half_width=half_width)
     with pytest.raises(ValueError, match="half_width"):
         trend_of(some)
+
+
+def test_against_a_baseline_of_sliding_friction_its_limits_count():
+    """200 N at 9.5 mm/s: worth maintenance at 250 N; F_c of the baseline does not matter."""
+    baseline = Baseline(1.0, 0.0, SlidingFriction(200.0, 1.0, 9.5e-3))
+    rising = [FrictionPoint(NOON + k * DAY, 220.0 + k, 1.0) for k in range(20)]
+    trend = trend_of(rising, baseline)
+    assert trend.what == "sliding friction at 9.5 mm/s"
+    assert trend.crossing.limit is Limit.WARN
+    assert trend.crossing.level == pytest.approx(250.0)
+    assert trend.crossing.time == pytest.approx(NOON + 30 * DAY, rel=1e-6)
+    assert trend_of(rising).what == "coulomb friction"

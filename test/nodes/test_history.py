@@ -17,7 +17,8 @@ NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
 PATIENT = {"input_timeout": 600.0}
 RECORD = quick_record()
-EXPECTED = as_kept(identify(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
+RESULT = identify(RECORD, BENCH_VALVE)
+EXPECTED = as_kept(RESULT.parameters["coulomb_friction"])
 
 
 @pytest.fixture
@@ -71,7 +72,7 @@ class TestBaseline:
         assert float(values["baseline half width [N]"]) == pytest.approx(EXPECTED.half_width)
         shown = live.client.parameters(NODE, "baseline_coulomb_friction")
         assert shown == [EXPECTED.value]
-        (line,) = logged(live, second, f"baseline {EXPECTED.value:.6g}")
+        (line,) = logged(live, second, f"baseline coulomb friction {EXPECTED.value:.6g}")
         assert "from the history" in line
         assert str(history.path) in line
         live.client.identified(quick_record(HIGH_FRICTION))
@@ -81,9 +82,9 @@ class TestBaseline:
         history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
         node = live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
         assert float(first_values(live)["baseline_coulomb_friction [N]"]) == 140.0
-        (line,) = logged(live, node, "baseline 140")
+        (line,) = logged(live, node, "baseline coulomb friction 140 N")
         assert "from the parameter baseline_coulomb_friction" in line
-        assert "not used: baseline 152.7 ± 1 N, set 2026-09-21 14:13 UTC" in line
+        assert "not used: baseline coulomb friction 152.7 ± 1 N, set 2026-09-21 14:13 UTC" in line
 
 
 def test_what_was_answered_survives_a_kill(live, history):
@@ -93,7 +94,7 @@ def test_what_was_answered_survives_a_kill(live, history):
     node.kill()
     live.nodes.remove(node)
     assert history.entries()[-1].friction == EXPECTED
-    assert history.baseline(VALVE.name).baseline == Baseline(EXPECTED.value, EXPECTED.half_width)
+    assert history.baseline(VALVE.name).baseline == Baseline.of(RESULT)
 
 
 def test_retention(live, history):
@@ -111,7 +112,7 @@ def test_nothing_is_kept_without_a_file(live, history, tmp_path):
     live.start_identifier({**PATIENT, "history_file": "''"})
     live.client.identified(RECORD)
     assert live.client.trigger("set_baseline").success
-    assert live.client.last_values()["coulomb_friction_ratio"] == "1"
+    assert live.client.last_values()["friction_ratio"] == "1"
     after = {path.name for path in tmp_path.iterdir()} - before
     assert all(name.startswith("identifier-") for name in after)
     assert not history.path.exists()
@@ -162,8 +163,8 @@ def test_a_drift_is_told_until_a_baseline_is_set(live, history):
     fill(history, 3.0, "robust")
     live.start_identifier(PATIENT)
     values = live.client.status_values()
-    assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
-    assert 0 < float(values["coulomb_friction_drift half width [N/month]"]) < 1
+    assert float(values["friction_drift [N/month]"]) == pytest.approx(3.0)
+    assert 0 < float(values["friction_drift half width [N/month]"]) < 1
     assert values["limit_expected"] == "warn_ratio"
     dates = [values[f"limit_expected {which}[date]"] for which in ("earliest ", "", "latest ")]
     assert dates == sorted(dates)
@@ -172,7 +173,7 @@ def test_a_drift_is_told_until_a_baseline_is_set(live, history):
     assert live.client.trigger("set_baseline").success
     values = live.client.status_values()
     assert not [key for key in values if "drift" in key]
-    assert math.isclose(float(values["coulomb_friction_ratio"]), 1.0)
+    assert math.isclose(float(values["friction_ratio"]), 1.0)
 
 
 def test_a_drift_is_that_of_the_method_which_the_settings_call_for(live, history):
@@ -182,8 +183,8 @@ def test_a_drift_is_that_of_the_method_which_the_settings_call_for(live, history
     assert not [key for key in live.client.status_values() if "drift" in key]
     assert live.client.set_together(NODE, {"position_bias": 1.13e-3}).successful
     live.client.trigger("identify")
-    values = live.client.status_values(lambda one: "coulomb_friction_drift" in str(one), "a drift")
-    assert float(values["coulomb_friction_drift [N/month]"]) == pytest.approx(3.0)
+    values = live.client.status_values(lambda one: "friction_drift" in str(one), "a drift")
+    assert float(values["friction_drift [N/month]"]) == pytest.approx(3.0)
 
 
 def test_only_a_significant_drift_has_keys():
@@ -192,5 +193,9 @@ def test_only_a_significant_drift_has_keys():
     assert trend_values(trend_of(points, Baseline(141.0))) == {}
     assert trend_values(None) == {}
     rising = [one._replace(value=150.0 + k) for k, one in enumerate(points)]
-    keys = {"coulomb_friction_drift [N/month]", "coulomb_friction_drift half width [N/month]"}
+    keys = {
+        "friction_drift [N/month]",
+        "friction_drift half width [N/month]",
+        "friction_drift of",
+    }
     assert set(trend_values(trend_of(rising))) == keys

@@ -24,6 +24,7 @@ from sensor_msgs.msg import FluidPressure
 from std_msgs.msg import Float64, Header
 
 from valve_friction_ros.identification import (
+    PARAMETER_UNITS,
     UNITS,
     IdentificationSettings,
     identify_refined,
@@ -87,12 +88,14 @@ def test_late_subscriber_gets_every_number_to_the_last_bit(bench):
         "threshold": published.threshold,
         "sigma": published.sigma,
         "r_squared": published.r_squared,
-        "coulomb_friction_ratio": np.nan,  # no baseline
+        "sliding_friction": values["sliding_friction"],
+        "sliding_speed": assessment.sliding_speed,
+        "friction_ratio": np.nan,  # no baseline
     }
     assert as_told(client.friction(*expected)) == as_told(expected)
     assert as_told(client.published(*UNITS)) == as_told(published.values)
     half_widths = {name: one.half_width for name, one in assessment.parameters.items()}
-    assert as_told(client.half_widths(*UNITS)) == as_told(half_widths)
+    assert as_told(client.half_widths(*half_widths)) == as_told(half_widths)
 
 
 def test_sweep_is_labelled_and_holds_the_estimate(bench):
@@ -139,12 +142,14 @@ def test_diagnostics(bench):
     values = values_of(status)
     published = assessment.estimate
     for name, one in assessment.parameters.items():
-        key = f"{name} [{UNITS[name]}]"
+        key = f"{name} [{PARAMETER_UNITS[name]}]"
         assert float(values[key]) == pytest.approx(one.value, rel=1e-8, nan_ok=True)
-        half_width = float(values[f"{name} half width [{UNITS[name]}]"])
+        half_width = float(values[f"{name} half width [{PARAMETER_UNITS[name]}]"])
         assert half_width == pytest.approx(one.half_width, rel=1e-8, nan_ok=True)
         assert values[f"{name} verdict"] == one.verdict.value
         assert values.get(f"{name} reason", "") == one.reason
+        if name not in published.values:
+            continue
         told = float(values[f"{name} published [{UNITS[name]}]"])
         assert told == pytest.approx(published.values[name], rel=1e-8)
     assert float(values["fit [%]"]) == pytest.approx(100 * assessment.misfit.fit, rel=1e-8)

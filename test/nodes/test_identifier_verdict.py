@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import pytest
 from live_nodes import NAMESPACE, values_of
-from records import quick_record
+from records import quick_record, square_record
 
+from valve_friction_ros.health import Baseline
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
-RATIO = 606 / 152.7
 
 
 @pytest.fixture(scope="module")
@@ -45,17 +45,16 @@ def test_baseline_needs_an_estimate(healthy):
     assert not refused.success
     assert "the valve has no result" in refused.message
     assert accepted.success
-    healthy = identify(quick_record(), BENCH_VALVE).parameters["coulomb_friction"]
-    assert accepted.message == (
-        f"baseline: coulomb_friction {healthy.value:.6g} ± {healthy.half_width:.2g} N"
-    )
+    result = identify(quick_record(), BENCH_VALVE)
+    assert accepted.message == f"baseline: {Baseline.of(result)}"
+    healthy = result.parameters["coulomb_friction"]
     assert healthy.interval[0] < 152.7 < healthy.interval[1]
 
 
 @pytest.mark.parametrize(
     ("parameters", "ratio", "level", "signal", "words"),
     [
-        (HIGH_FRICTION, RATIO, ERROR, "F", "excess friction"),
+        (HIGH_FRICTION, None, ERROR, "F", "excess friction"),
         (valve_with(0.3 * 152.7), 0.3, ERROR, "S", "friction collapsed"),
         (valve_with(1.7 * 152.7), 1.7, WARN, "M", "friction has grown"),
         (valve_with(1.2 * 152.7), 1.2, OK, "", "friction normal"),
@@ -63,28 +62,37 @@ def test_baseline_needs_an_estimate(healthy):
     ids=["tightened", "worn", "growing", "healthy"],
 )
 def test_verdict(client, parameters, ratio, level, signal, words):
+    """More dry friction alone shows in F_c; ten times the viscous friction in both together."""
     message = client.identified(quick_record(parameters))
     status = client.statuses[-1][1]
     assert status.level == level
     assert words in status.message
-    assert f"coulomb friction is {ratio:.2f} (" in status.message
     assert status.message == message
     values = values_of(status)
+    of = values["friction_ratio of"]
+    if ratio is None:
+        speed = float(values["baseline_sliding_friction speed [m/s]"])
+        assert of == f"sliding friction at {speed * 1e3:.2g} mm/s"
+        tight, loose = (float(one.sliding_friction(speed)) for one in (parameters, LOW_FRICTION))
+        ratio = tight / loose
+    else:
+        assert of == "coulomb friction"
+    assert f"{of} is {ratio:.2f} (" in status.message
     assert values["NE 107"] == signal
-    assert float(values["coulomb_friction_ratio"]) == pytest.approx(ratio, rel=2e-3)
+    assert float(values["friction_ratio"]) == pytest.approx(ratio, rel=2e-3)
     assert float(values["baseline_coulomb_friction [N]"]) == pytest.approx(152.7, rel=1e-3)
-    low, high = (float(values[f"coulomb_friction_ratio {end}"]) for end in ("low", "high"))
+    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
     assert low <= ratio <= high
-    published = client.friction("coulomb_friction_ratio")["coulomb_friction_ratio"]
-    assert published == pytest.approx(float(values["coulomb_friction_ratio"]), rel=1e-8)
+    published = client.friction("friction_ratio")["friction_ratio"]
+    assert published == pytest.approx(float(values["friction_ratio"]), rel=1e-8)
 
 
 def test_limits_are_parameters_and_judge_at_once(client):
     client.identified(quick_record(HIGH_FRICTION))
     assert client.statuses[-1][1].level == ERROR
     for limits, level in (
-        ({"error_ratio": 5.0}, WARN),
-        ({"warn_ratio": 4.5}, OK),
+        ({"error_ratio": 8.0}, WARN),
+        ({"warn_ratio": 7.5}, OK),
         ({"warn_ratio": 1.1, "error_ratio": 1.2}, ERROR),
     ):
         assert client.set_together(NODE, limits).successful
@@ -98,12 +106,12 @@ def test_baseline_is_a_parameter(live):
     assert status.level == ERROR
     assert status.hardware_id == "FV-101/A"
     values = values_of(status)
-    assert float(values["coulomb_friction_ratio"]) == pytest.approx(3.03, rel=1e-3)
+    assert float(values["friction_ratio"]) == pytest.approx(3.03, rel=1e-3)
     assert values["method"] == "robust"
 
     assert live.client.set_together(NODE, {"baseline_coulomb_friction": 600.0}).successful
     values = live.client.status_values(lambda status: status.level == OK, "OK")
-    assert float(values["coulomb_friction_ratio"]) == pytest.approx(1.01, rel=1e-3)
+    assert float(values["friction_ratio"]) == pytest.approx(1.01, rel=1e-3)
 
 
 def test_published_values_and_their_warnings_stand_beside_the_refined(live):
@@ -145,3 +153,44 @@ def test_refusal_keeps_the_verdict_and_says_so(live):
     assert status.level == ERROR
     assert "the latest identification was refused: " in status.message
     assert "before: excess friction" in status.message
+
+
+SQUARE = square_record()
+
+
+def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(live):
+    """A square wave behind a lag: F_c is weak, and the sliding friction serves instead."""
+    live.start_identifier({"input_timeout": 600.0, "timing_uncertainty": 0.01})
+    client = live.client
+    client.identified(SQUARE)
+    values = client.last_values()
+    assert values["coulomb_friction verdict"] == "weak"
+    assert client.trigger("set_baseline").success
+    known = float(client.last_values()["baseline_sliding_friction [N]"])
+    grown = replace(
+        HIGH_FRICTION,
+        coulomb_friction=1.6 * HIGH_FRICTION.coulomb_friction,
+        static_friction=1.6 * HIGH_FRICTION.static_friction,
+        viscous_friction=1.6 * HIGH_FRICTION.viscous_friction,
+    )
+    client.identified(square_record(grown))
+    status = client.statuses[-1][1]
+    assert status.level == WARN
+    values = values_of(status)
+    assert values["friction_ratio of"].startswith("sliding friction at ")
+    assert "friction has grown: sliding friction at " in status.message
+    low, high = (float(values[f"friction_ratio {end}"]) for end in ("low", "high"))
+    assert 1.25 < low < 1.6 < high
+    assert float(client.friction("friction_ratio")["friction_ratio"]) == pytest.approx(
+        float(values["friction_ratio"])
+    )
+    assert known == pytest.approx(float(values["baseline_sliding_friction [N]"]))
+
+
+def test_a_baseline_of_no_use_is_refused(live):
+    live.start_identifier({"input_timeout": 600.0, "timing_uncertainty": 0.1})
+    live.client.identified(square_record(LOW_FRICTION))
+    answer = live.client.trigger("set_baseline")
+    assert not answer.success
+    assert answer.message.startswith("this result cannot be the baseline: coulomb friction is ")
+    assert "state a timing_uncertainty" in answer.message

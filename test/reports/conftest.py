@@ -42,6 +42,8 @@ def with_friction(identified):
             "static_friction": parameter("static_friction", nan, nan, unknown, "hidden"),
             "spring_constant": parameter("spring_constant", 2e5, 1.0, Verdict.IDENTIFIED, ""),
         }
+        if verdict is unknown:
+            parameters["sliding_friction"] = parameter("sliding_friction", nan, nan, unknown, "")
         misfit = changes.pop("misfit", identified.result.misfit)
         result = dataclasses.replace(identified.result, parameters=parameters, misfit=misfit)
         return dataclasses.replace(identified, result=result, **changes)

@@ -9,6 +9,7 @@ KEYS = {
     "parameters",
     "fit",
     "rms",
+    "sliding_speed",
     "systematic_misfit",
     "model_describes",
     "derivative_window",

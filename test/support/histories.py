@@ -9,6 +9,7 @@ from valve_friction_ros.health import (
     Level,
     MonitorSettings,
     StatusSignal,
+    compared,
 )
 from valve_friction_ros.history import HistoryEntry, KeptValve
 from valve_friction_ros.history.entry import Fit, Span, settings_text
@@ -34,18 +35,29 @@ def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""
 
 
 def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
-    """An identification of a Coulomb friction; the rest of its parameters are always the same."""
+    """An identification of a Coulomb friction, and of a sliding friction where one is given.
+
+    The rest of its parameters are always the same.
+    """
     verdict = changes.pop("verdict", Verdict.IDENTIFIED)
     baseline = changes.get("baseline")
     one = parameter("coulomb_friction", friction, half_width, verdict)
-    ratio = None if baseline is None else baseline.compared_with(one)
+    frictions, slid = {one.name: one}, changes.pop("sliding", None)
+    if slid is not None:
+        name = "sliding_friction"
+        frictions[name] = parameter(name, slid.value, slid.half_width, verdict)
+        changes["sliding_speed"] = slid.speed
+    speed = changes.get("sliding_speed", math.nan)
+    found = None if baseline is None else compared(frictions, speed, baseline)
     return HistoryEntry(
         **{
             "time": time,
             "valve": valve,
             "span": Span(time - 60 * SECOND, time),
             "method": "refined",
-            "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, "friction normal: so", ratio),
+            "diagnosis": Diagnosis(
+                Level.OK, StatusSignal.GOOD, "friction normal: so", found and found.ratio
+            ),
             "limits": FrictionLimits(),
             "baseline": None,
             "settings": _SETTINGS,
@@ -55,6 +67,7 @@ def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
                 "static_friction": parameter(
                     "static_friction", math.nan, math.nan, Verdict.NOT_IDENTIFIABLE, "no slip jump"
                 ),
+                **frictions,
             },
             "fit": Fit(0.99, 1e-5, 1e-6),
             **changes,

@@ -4,8 +4,10 @@ import numpy as np
 
 from valve_friction_ros.model import (
     BENCH_VALVE,
+    HIGH_FRICTION,
     LOW_FRICTION,
     Recording,
+    SensorNoise,
     SineWave,
     SquareWave,
     converter_response,
@@ -30,6 +32,13 @@ def bench_record(parameters=LOW_FRICTION):
     time = np.arange(5200) / 1000
     pressure = converter_response(SquareWave(period=2.6).sample(time), 1e-3, 0.6)
     return simulated(pressure, 1e-3, parameters)
+
+
+def square_record(parameters=HIGH_FRICTION):
+    """Four periods of a square wave behind a V/P converter, at 100 Hz, with sensor noise."""
+    time = np.arange(3200) / 100
+    pressure = converter_response(SquareWave(period=8.0).sample(time), 0.01, 0.6)
+    return SensorNoise(10e-6, 50.0, seed=1).applied_to(simulated(pressure, 0.01, parameters))
 
 
 def sine_record(parameters, duration=16.0):

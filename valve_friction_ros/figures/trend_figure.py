@@ -1,4 +1,4 @@
-"""The figure of a history: Coulomb friction over months, with its intervals, limits and trend."""
+"""The figure of a history: friction over months, with its intervals, limits and trend."""
 
 from collections.abc import Sequence
 from datetime import datetime, timezone
@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.figures.panels import COLOURS
-from valve_friction_ros.history import Trend, ValveHistory
-from valve_friction_ros.identification import Verdict
+from valve_friction_ros.health import Baseline, friction_words
+from valve_friction_ros.history import Trend, ValveHistory, trended
+from valve_friction_ros.identification import SLIDING, Verdict
 
 __all__ = ["MOST_PANELS", "trend_figure"]
 
@@ -34,7 +35,9 @@ def _dates(times: ArrayLike) -> NDArray[np.datetime64]:
 
 
 def trend_figure(histories: Sequence[ValveHistory]) -> Figure:
-    """Draw the Coulomb friction of valves over time, one panel a valve.
+    """Draw the friction of valves over time, one panel a valve.
+
+    It is the sliding friction at the speed of the last baseline, where that has one, else F_c.
 
     Parameters
     ----------
@@ -112,7 +115,7 @@ def _draw(axes: Axes, history: ValveHistory) -> None:
     axes.set_title(f"{tag} ({history.valve.name})" if tag else history.valve.name, loc="left")
     if history.trend is not None and history.trend.is_significant:
         axes.set_title(_drift_text(history.trend), loc="right", fontsize="medium", color=_TREND)
-    axes.set_ylabel("coulomb friction $F_c$ [N]")
+    axes.set_ylabel(f"{_what(history)} [N]")
     axes.set_xlabel(f"time [UTC]; identified from {first} to {last}")
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
@@ -121,9 +124,10 @@ def _draw(axes: Axes, history: ValveHistory) -> None:
 def _draw_limits(axes: Axes, history: ValveHistory) -> None:
     """Draw baseline and limits as they were in force at each identification."""
     times = [entry.time for entry in history.entries]
+    of = trended(history.entries[-1].baseline)
     levels = np.array(
         [
-            np.nan if entry.baseline is None else entry.baseline.coulomb_friction
+            np.nan if entry.baseline is None else _level(entry.baseline, of)
             for entry in history.entries
         ]
     )
@@ -145,12 +149,29 @@ def _draw_limits(axes: Axes, history: ValveHistory) -> None:
         )
 
 
+def _level(baseline: Baseline, of: str) -> float:
+    if of == SLIDING:
+        return np.nan if baseline.sliding is None else baseline.sliding.value
+    return np.nan if baseline.coulomb_friction is None else baseline.coulomb_friction
+
+
+def _what(history: ValveHistory) -> str:
+    """Return what is drawn, in words."""
+    baseline = history.entries[-1].baseline
+    if baseline is None or baseline.sliding is None:
+        return "coulomb friction $F_c$"
+    return friction_words(SLIDING, baseline.sliding.speed)
+
+
 def _draw_estimates(axes: Axes, history: ValveHistory) -> None:
+    baseline = history.entries[-1].baseline
+    of = trended(baseline)
     for verdict, face in ((Verdict.IDENTIFIED, _ESTIMATE), (Verdict.WEAK, "white")):
         some = [
-            (entry.time, one.value, one.half_width)
+            point
             for entry in history.entries
-            if (one := entry.friction) is not None and one.verdict is verdict
+            if (point := entry.point(baseline)) is not None
+            and entry.parameters[of].verdict is verdict
         ]
         if some:
             times, values, half_widths = zip(*some, strict=True)

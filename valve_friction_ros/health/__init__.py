@@ -1,6 +1,13 @@
 """Health of a valve: its baseline, its diagnosis, and the monitor of one valve; no ROS."""
 
-from valve_friction_ros.health.baseline import Baseline, Ratio
+from valve_friction_ros.health.baseline import Baseline, SlidingFriction
+from valve_friction_ros.health.comparison import (
+    Comparison,
+    Ratio,
+    carried,
+    compared,
+    friction_words,
+)
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     FrictionLimits,
@@ -19,6 +26,7 @@ from valve_friction_ros.health.friction_monitor import (
 
 __all__ = [
     "Baseline",
+    "Comparison",
     "Diagnosis",
     "FrictionLimits",
     "FrictionMonitor",
@@ -26,9 +34,13 @@ __all__ = [
     "Level",
     "MonitorSettings",
     "Ratio",
+    "SlidingFriction",
     "StatusSignal",
+    "carried",
+    "compared",
     "dead_band",
     "diagnose",
+    "friction_words",
     "identify_snapshot",
     "percentage",
 ]

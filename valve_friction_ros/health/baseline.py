@@ -1,79 +1,149 @@
-"""The friction of the healthy valve, and how far an estimate has moved away from it."""
+"""The friction of the healthy valve."""
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from valve_friction_ros.identification import Parameter, RefusalError, Result
+from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 
-__all__ = ["Baseline", "Ratio"]
+__all__ = ["LARGEST_SHARE", "Baseline", "SlidingFriction"]
+
+LARGEST_SHARE = 0.13
+"""Largest half width of a friction, as a share of its value, that can be a baseline.
+
+With it a friction that has grown by half, and is known no better, is still declared to have grown:
+ln(1.5/1.25)/√2, with the 1.25 of `FrictionLimits`."""
 
 
-class Ratio(NamedTuple):
-    """A ratio of two frictions with its 95 % interval."""
+_MORE = (
+    "record more strokes, some fast and some slow, and state a timing_uncertainty if the clocks "
+    "and lags of both signals are known"
+)
+_OTHER_METHOD = "identify by a method that gives intervals"
+
+
+@dataclass(frozen=True)
+class SlidingFriction:
+    """Work of friction over the distance that the stem slides, and the speed that it belongs to.
+
+    Attributes
+    ----------
+    value : float
+        ∫|F_friction|·|dx| / ∫|dx|, N, above zero.
+    half_width : float
+        Half the width of its 95 % interval, N.
+    speed : float
+        Mean speed over the distance, ∫|v|·|dx| / ∫|dx|, m/s, above zero.
+    """
 
     value: float
-    low: float
-    high: float
+    half_width: float
+    speed: float
+
+    def __post_init__(self) -> None:
+        """Refuse impossible values."""
+        require_positive("sliding_friction", self.value)
+        require_non_negative("half_width", self.half_width)
+        require_positive("sliding_speed", self.speed)
+
+    def __str__(self) -> str:
+        """Return value, half width and speed."""
+        width = f" ± {self.half_width:.2g}" if self.half_width > 0 else ""
+        return f"{self.value:.6g}{width} N at {self.speed * 1e3:.3g} mm/s"
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """Coulomb friction of the healthy valve.
+    """Friction of the healthy valve: Coulomb friction, sliding friction, or both.
 
     Attributes
     ----------
-    coulomb_friction : float
+    coulomb_friction : float or None
         F_c, N, above zero.
     half_width : float
         Half the width of its 95 % interval, N; zero for a given value.
+    sliding : SlidingFriction or None
+        The sliding friction, which needs no split into F_c and F_v.
+
+    Raises
+    ------
+    ValueError
+        If a value is impossible, or there is none.
 
     Examples
     --------
     >>> import valve_friction_ros as vf
     >>> healthy = vf.Baseline(coulomb_friction=150.0, half_width=2.0)
-    >>> healthy.coulomb_friction
-    150.0
+    >>> print(healthy)
+    coulomb friction 150 ± 2 N
     """
 
-    coulomb_friction: float
+    coulomb_friction: float | None = None
     half_width: float = 0.0
+    sliding: SlidingFriction | None = None
 
     def __post_init__(self) -> None:
         """Refuse a baseline that is not above zero."""
-        require_positive("baseline_coulomb_friction", self.coulomb_friction)
+        if self.coulomb_friction is not None:
+            require_positive("baseline_coulomb_friction", self.coulomb_friction)
+        elif self.sliding is None:
+            raise ValueError("a baseline needs a coulomb friction or a sliding friction")
         require_non_negative("half_width", self.half_width)
+
+    def __str__(self) -> str:
+        """Return its frictions on one line."""
+        told = []
+        if self.coulomb_friction is not None:
+            width = f" ± {self.half_width:.2g}" if self.half_width > 0 else ""
+            told.append(f"coulomb friction {self.coulomb_friction:.6g}{width} N")
+        if self.sliding is not None:
+            told.append(f"sliding friction {self.sliding}")
+        return ", ".join(told)
 
     @classmethod
     def of(cls, result: Result) -> "Baseline":
-        """Return the Coulomb friction of a result as baseline.
+        """Return the frictions of a result as baseline, those that are known well enough.
 
-        Raises RefusalError if it is not identifiable, or not above zero.
+        Raises RefusalError if neither is known to `LARGEST_SHARE`; the message names why.
         """
-        friction = result.parameters["coulomb_friction"]
-        if math.isnan(friction.value):
-            raise RefusalError(
-                "coulomb friction is not identifiable, so it cannot be the baseline: "
-                f"{friction.reason}"
-            )
-        if friction.value <= 0:
-            raise RefusalError(
-                f"a coulomb friction of {friction.value:.4g} N cannot be a baseline: check the "
-                "direction of both signals, then identify again"
-            )
-        return cls(friction.value, friction.half_width)
-
-    def compared_with(self, friction: Parameter) -> Ratio:
-        """Ratio of an identified friction to the baseline; nan where it is not identifiable.
-
-        The relative half widths of two independent estimates add in squares, and the interval
-        is symmetric in the logarithm, so that a ratio and its inverse have the same interval.
-        """
-        ratio = friction.value / self.coulomb_friction
-        if not ratio > 0:
-            return Ratio(ratio, math.nan, math.nan)
-        share = math.hypot(
-            friction.half_width / friction.value, self.half_width / self.coulomb_friction
+        frictions = {"coulomb_friction": result.parameters["coulomb_friction"]}
+        if SLIDING in result.parameters and result.sliding_speed > 0:
+            frictions[SLIDING] = result.parameters[SLIDING]
+        for one in frictions.values():
+            if one.value < 0:
+                raise RefusalError(
+                    f"a {one.name.replace('_', ' ')} of {one.value:.4g} N cannot be a baseline: "
+                    "check the direction of both signals, then identify again"
+                )
+        useful = {name: one for name, one in frictions.items() if not _why_not(one)}
+        if not useful:
+            why_not = "; ".join(map(_why_not, frictions.values()))
+            without = all(math.isnan(one.half_width) for one in frictions.values())
+            known = any(not math.isnan(one.value) for one in frictions.values())
+            remedy = _OTHER_METHOD if without and known else _MORE
+            raise RefusalError(f"this result cannot be the baseline: {why_not}: {remedy}")
+        coulomb, slid = useful.get("coulomb_friction"), useful.get(SLIDING)
+        return cls(
+            None if coulomb is None else coulomb.value,
+            0.0 if coulomb is None else coulomb.half_width,
+            None
+            if slid is None
+            else SlidingFriction(slid.value, slid.half_width, result.sliding_speed),
         )
-        return Ratio(ratio, ratio * math.exp(-share), ratio * math.exp(share))
+
+
+def _why_not(friction: Parameter) -> str:
+    """Return why a friction cannot be a baseline; empty if it can."""
+    name, value, width = friction.name.replace("_", " "), friction.value, friction.half_width
+    if math.isnan(value):
+        return f"{name} is not identifiable ({friction.reason})"
+    if value <= 0:
+        return f"{name} is {value:.4g} N"
+    if math.isnan(width):
+        return f"{name} has no interval"
+    if width > LARGEST_SHARE * value:
+        return (
+            f"{name} is known to ±{100 * width / value:.2g} %, and a baseline needs "
+            f"±{100 * LARGEST_SHARE:.2g} %"
+        )
+    return ""

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from typing import Any
 
-from valve_friction_ros.health.baseline import Baseline, Ratio
-from valve_friction_ros.identification import Parameter, Result, plain
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
+from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.identification.trust.misfit import percentage
 from valve_friction_ros.model.valve import Valve
 
@@ -41,7 +42,7 @@ class StatusSignal(Enum):
 
 @dataclass(frozen=True)
 class FrictionLimits:
-    """Bounds of the Coulomb friction, as ratios to its baseline.
+    """Bounds of the friction, as ratios to its baseline.
 
     A bound counts as passed only when the whole interval of the ratio lies beyond it.
 
@@ -93,8 +94,8 @@ class Diagnosis:
     message : str
         One sentence, with the consequence.
     ratio : Ratio or None
-        Coulomb friction over its baseline, with its interval; None without a baseline or without
-        an identifiable friction.
+        Friction over its baseline, with its interval and the friction that is compared; None
+        without a baseline, or where the result has no friction to compare with it.
     """
 
     level: Level
@@ -105,8 +106,8 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """Return the diagnosis as a mapping of plain values, from which other forms are derived.
 
-        Its keys are ``level`` (OK, WARN or ERROR), ``ne_107``, ``message``, ``ratio`` and
-        ``ratio_interval``.
+        Its keys are ``level`` (OK, WARN or ERROR), ``ne_107``, ``message``, ``ratio``,
+        ``ratio_interval``, ``ratio_of`` and ``ratio_speed``.
         """
         ratio = self.ratio
         return {
@@ -115,6 +116,8 @@ class Diagnosis:
             "message": self.message,
             "ratio": None if ratio is None else plain(ratio.value),
             "ratio_interval": None if ratio is None else plain([ratio.low, ratio.high]),
+            "ratio_of": None if ratio is None else ratio.of,
+            "ratio_speed": None if ratio is None else plain(ratio.speed),
         }
 
     def __str__(self) -> str:
@@ -143,9 +146,18 @@ def dead_band(result: Result, valve: Valve) -> float:
 def _consequence(result: Result, valve: Valve) -> str:
     share = dead_band(result, valve)
     if math.isnan(share):
-        friction = result.parameters["coulomb_friction"]
-        return f"coulomb friction {friction.value:.4g} ± {friction.half_width:.2g} N"
+        friction = next(one for one in _frictions(result) if not math.isnan(one.value))
+        return f"{_words(friction)} {friction.value:.4g} ± {friction.half_width:.2g} N"
     return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
+
+
+def _frictions(result: Result) -> list[Parameter]:
+    """Return F_c and, where the result has one, the sliding friction."""
+    return [result.parameters[n] for n in ("coulomb_friction", SLIDING) if n in result.parameters]
+
+
+def _words(friction: Parameter) -> str:
+    return friction.name.replace("_", " ")
 
 
 def _figures(ratio: Ratio) -> str:
@@ -158,7 +170,7 @@ def diagnose(
     baseline: Baseline | None = None,
     limits: FrictionLimits | None = None,
 ) -> Diagnosis:
-    """Compare the identified Coulomb friction with its baseline.
+    """Compare the identified friction with its baseline (`compared`).
 
     Parameters
     ----------
@@ -167,7 +179,7 @@ def diagnose(
     valve : Valve
         Gives the travel, for the dead band.
     baseline : Baseline, optional
-        Coulomb friction of the healthy valve.
+        Friction of the healthy valve.
     limits : FrictionLimits, optional
         Bounds of the ratio.
 
@@ -181,36 +193,76 @@ def diagnose(
         describe is WARN at least.
     """
     limits = limits or FrictionLimits()
-    friction = result.parameters["coulomb_friction"]
-    if math.isnan(friction.value):
-        message = f"coulomb friction is not identifiable: {friction.reason}"
-        diagnosis = Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
-        if baseline is not None and _has_vanished(friction, baseline, limits):
+    for friction in _frictions(result):
+        if friction.value < 0:
             message = (
-                "friction collapsed, the packing may leak: coulomb friction is too small to be "
-                f"identified, at most {friction.magnitude_bound:.2g} N; its baseline is "
-                f"{baseline.coulomb_friction:.4g} N"
+                f"{_words(friction)} is {friction.value:.4g} ± {friction.half_width:.2g} N, and "
+                "friction is above zero: check the direction of both signals"
             )
-            diagnosis = Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, message, None)
-        return _with_model_doubt(diagnosis, result)
-    if friction.value < 0:
-        message = (
-            f"coulomb friction is {friction.value:.4g} ± {friction.half_width:.2g} N, and "
-            "friction is above zero: check the direction of both signals"
-        )
-        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
+            return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
+    return _with_model_doubt(_by_size(result, valve, baseline, limits), result)
+
+
+def _by_size(
+    result: Result, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
+) -> Diagnosis:
+    found = None
+    if baseline is not None:
+        found = compared(result.parameters, result.sliding_speed, baseline)
+        if vanished := _vanished(result, baseline, limits):
+            return Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, vanished, None)
+    if all(math.isnan(one.value) for one in _frictions(result)):
+        friction = _frictions(result)[0]
+        message = f"{_words(friction)} is not identifiable: {friction.reason}"
+        return Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
     effect = _consequence(result, valve)
-    if baseline is None:
-        diagnosis = Diagnosis(Level.OK, StatusSignal.GOOD, f"no baseline yet; {effect}", None)
-    else:
-        diagnosis = _against(baseline.compared_with(friction), limits, effect)
-    return _with_model_doubt(diagnosis, result)
+    if found is not None:
+        return _against(found.ratio, limits, effect)
+    why = "no baseline yet" if baseline is None else _why_not_compared(result, baseline)
+    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{why}; {effect}", None)
 
 
-def _has_vanished(friction: Parameter, baseline: Baseline, limits: FrictionLimits) -> bool:
-    """Return whether a friction that is too small to be identified lies below the low limit."""
-    least = baseline.coulomb_friction - baseline.half_width
-    return friction.magnitude_bound <= limits.low_ratio * least
+def _why_not_compared(result: Result, baseline: Baseline) -> str:
+    """Return why a result has no friction to compare with a baseline, in one sentence."""
+    reasons = []
+    for one in _frictions(result):
+        if math.isnan(one.value):
+            reasons.append(f"{_words(one)} is not identifiable: {one.reason}")
+        elif one.name == SLIDING and baseline.sliding is not None:
+            reasons.append(
+                f"the stem slides at {result.sliding_speed * 1e3:.2g} mm/s, and at "
+                f"{baseline.sliding.speed * 1e3:.2g} mm/s in the baseline: move it at a speed "
+                f"within a factor of {LARGEST_SPEED_RATIO:g}"
+            )
+        else:
+            reasons.append(f"the baseline has no {_words(one)}: set it anew")
+    return f"no comparison with the baseline ({baseline}): {'; '.join(reasons)}"
+
+
+def _vanished(result: Result, baseline: Baseline, limits: FrictionLimits) -> str:
+    """Return that a friction too small to be identified lies below the low limit, or nothing.
+
+    The sliding friction decides where both have it. F_c decides only where no sliding friction
+    contradicts it: what F_c loses to F_v is no collapse. At a higher speed a sliding friction is
+    larger, at most by the ratio of the speeds.
+    """
+    healthy = {"coulomb_friction": (baseline.coulomb_friction or 0.0, baseline.half_width)}
+    if (slid := baseline.sliding) is not None:
+        healthy[SLIDING] = (slid.value, slid.half_width)
+        now = carried(result.parameters, result.sliding_speed, slid)
+        if now is not None and now.value + now.half_width >= slid.value - slid.half_width:
+            return ""
+    for one in _frictions(result):
+        value, width = healthy.get(one.name, (0.0, 0.0))
+        largest = one.magnitude_bound
+        if one.name == SLIDING and slid is not None:
+            largest *= max(slid.speed / result.sliding_speed, 1.0)
+        if math.isnan(one.value) and largest <= limits.low_ratio * (value - width):
+            return (
+                f"friction collapsed, the packing may leak: {_words(one)} is too small to be "
+                f"identified, at most {largest:.2g} N; its baseline is {value:.4g} N"
+            )
+    return ""
 
 
 def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
@@ -229,23 +281,23 @@ def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
 
 
 def _against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
-    compared = f"coulomb friction is {_figures(ratio)} times its baseline"
+    finding = f"{ratio.what} is {_figures(ratio)} times its baseline"
     if ratio.low >= limits.error_ratio:
         return Diagnosis(
-            Level.ERROR, StatusSignal.FAILURE, f"excess friction: {compared}; {effect}", ratio
+            Level.ERROR, StatusSignal.FAILURE, f"excess friction: {finding}; {effect}", ratio
         )
     if ratio.high <= limits.low_ratio:
         return Diagnosis(
             Level.ERROR,
             StatusSignal.OUT_OF_SPECIFICATION,
-            f"friction collapsed, the packing may leak: {compared}; {effect}",
+            f"friction collapsed, the packing may leak: {finding}; {effect}",
             ratio,
         )
     if ratio.low >= limits.warn_ratio:
         return Diagnosis(
             Level.WARN,
             StatusSignal.MAINTENANCE_REQUIRED,
-            f"friction has grown: {compared}; {effect}",
+            f"friction has grown: {finding}; {effect}",
             ratio,
         )
     words = "friction normal"
@@ -253,4 +305,4 @@ def _against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
         words = "friction perhaps grown"
     elif ratio.value <= limits.low_ratio:
         words = "friction perhaps collapsed"
-    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {compared}; {effect}", ratio)
+    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {finding}; {effect}", ratio)

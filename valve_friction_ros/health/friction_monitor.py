@@ -162,10 +162,9 @@ class FrictionMonitor:
         self._internal_error = internal_error
 
     def result_as_baseline(self) -> Baseline:
-        """Return the Coulomb friction of the latest result, without making it the baseline.
+        """Return the frictions of the latest result, without making them the baseline.
 
-        Raises RefusalError if there is no result, or its Coulomb friction is not identifiable or
-        not above zero.
+        Raises RefusalError if there is no result, or `Baseline.of` refuses it.
         """
         if self._result is None:
             raise RefusalError("the valve has no result to take as baseline: identify it first")

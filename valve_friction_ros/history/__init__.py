@@ -6,6 +6,7 @@ from valve_friction_ros.history.entry import (
     KeptBaseline,
     KeptValve,
     entry_of,
+    trended,
 )
 from valve_friction_ros.history.file import HistoryError, HistoryFile
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
@@ -26,5 +27,6 @@ __all__ = [
     "current_trend",
     "entry_of",
     "trend_of",
+    "trended",
     "valve_histories",
 ]

@@ -9,9 +9,16 @@ from typing import Any, NamedTuple
 
 from valve_friction_ros import __version__
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.comparison import carried
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
-from valve_friction_ros.identification import Parameter, Verdict, parameter_mapping, plain
+from valve_friction_ros.identification import (
+    SLIDING,
+    Parameter,
+    Verdict,
+    parameter_mapping,
+    plain,
+)
 from valve_friction_ros.streams.record_buffer import Snapshot
 
 __all__ = [
@@ -22,9 +29,15 @@ __all__ = [
     "KeptValve",
     "Span",
     "entry_of",
+    "friction_point",
     "settings_text",
     "span_of",
+    "trended",
 ]
+
+
+_ENDLESS = 1e300
+"""Half width, N, from which an interval says nothing."""
 
 
 class KeptValve(NamedTuple):
@@ -60,14 +73,14 @@ class Fit(NamedTuple):
 
 
 class FrictionPoint(NamedTuple):
-    """One Coulomb friction of a trend.
+    """One friction of a trend.
 
     Attributes
     ----------
     time : int
         When it was identified, ns since 1970 (UTC).
     value, half_width : float
-        F_c, and half the width of its 95 % interval, N.
+        Friction, and half the width of its 95 % interval, N.
     """
 
     time: int
@@ -82,7 +95,7 @@ class KeptBaseline:
     Attributes
     ----------
     baseline : Baseline
-        The Coulomb friction of the healthy valve.
+        The friction of the healthy valve.
     time : int
         When it was set, ns since 1970 (UTC).
     since : int
@@ -126,6 +139,8 @@ class HistoryEntry:
         Cause of the refusal; empty for a success.
     version : str
         Version of this software.
+    sliding_speed : float
+        Speed that the sliding friction belongs to, m/s; nan where it is unknown.
     """
 
     time: int
@@ -141,6 +156,7 @@ class HistoryEntry:
     warnings: tuple[str, ...] = ()
     refusal: str = ""
     version: str = __version__
+    sliding_speed: float = math.nan
 
     def __post_init__(self) -> None:
         """Refuse an entry that is not exactly one of success and refusal."""
@@ -160,12 +176,14 @@ class HistoryEntry:
         """
         begin, end = self.span or (None, None)
         baseline = self.baseline
+        sliding = None if baseline is None else baseline.sliding
         return {
             "time": self.time,
             "begin": begin,
             "end": end,
             "method": self.method,
             "parameters": {name: parameter_mapping(one) for name, one in self.parameters.items()},
+            "sliding_speed": plain(self.sliding_speed),
             "fit": plain(self.fit.share),
             "rms": plain(self.fit.rms),
             "systematic_misfit": plain(self.fit.systematic),
@@ -173,22 +191,42 @@ class HistoryEntry:
             "diagnosis": self.diagnosis.to_dict(),
             "baseline": None if baseline is None else baseline.coulomb_friction,
             "baseline_half_width": None if baseline is None else baseline.half_width,
+            "baseline_sliding": None if sliding is None else vars(sliding),
             "limits": plain(vars(self.limits)),
             "refusal": self.refusal,
             "settings": json.loads(self.settings),
             "software_version": self.version,
         }
 
-    def point(self) -> FrictionPoint | None:
-        """Return the point of this entry in a trend, or None.
+    def point(self, baseline: Baseline | None = None) -> FrictionPoint | None:
+        """Return the point of this entry in a trend against a baseline (`friction_point`)."""
+        return friction_point(self.time, self.parameters, self.sliding_speed, baseline)
 
-        Only an identified or weak friction counts: a fixed friction was not measured, and a
-        friction that is not identifiable has no value.
-        """
-        one = self.friction
-        if one is None or one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
-            return None
-        return FrictionPoint(self.time, one.value, one.half_width)
+
+def trended(baseline: Baseline | None) -> str:
+    """Return the name of the friction whose trend is followed against a baseline."""
+    has_sliding = baseline is not None and baseline.sliding is not None
+    return SLIDING if has_sliding else "coulomb_friction"
+
+
+def friction_point(
+    time: int, parameters: Mapping[str, Parameter], speed: float, baseline: Baseline | None
+) -> FrictionPoint | None:
+    """Return the point of an identification in a trend, or None.
+
+    Where the baseline has a sliding friction, it is the sliding friction carried to that speed;
+    else F_c. Only an identified or weak friction counts: a fixed friction was not measured, and a
+    friction that is not identifiable has no value.
+    """
+    one = parameters.get(trended(baseline))
+    if one is None or one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
+        return None
+    if not 0 <= one.half_width < _ENDLESS:
+        return None
+    if baseline is None or baseline.sliding is None:
+        return FrictionPoint(time, one.value, one.half_width)
+    now = carried(parameters, speed, baseline.sliding)
+    return None if now is None else FrictionPoint(time, now.value, now.half_width)
 
 
 def span_of(snapshot: Snapshot) -> Span | None:
@@ -244,6 +282,7 @@ def entry_of(
                 math.nan if result.misfit is None else result.misfit.of_stem,
             ),
             "warnings": result.warnings,
+            "sliding_speed": result.sliding_speed,
         }
     return HistoryEntry(
         time=time,

@@ -11,15 +11,18 @@ from valve_friction_ros.history.entry import (
     HistoryEntry,
     KeptBaseline,
     KeptValve,
+    friction_point,
 )
 from valve_friction_ros.history.rows import (
+    baseline_in,
     entries_in,
+    frictions_in,
     insert_baseline,
     insert_entry,
     valve_id,
 )
 from valve_friction_ros.history.schema import HistoryError, reading, writing
-from valve_friction_ros.identification import FORMER_METHODS, Verdict
+from valve_friction_ros.identification import FORMER_METHODS, SLIDING
 
 __all__ = ["HistoryError", "HistoryFile"]
 
@@ -70,29 +73,40 @@ class HistoryFile:
     def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
         """Return the newest baseline set before `until` (ns) for the valve of this name, if any."""
         with reading(self.path) as connection:
+            connection.row_factory = sqlite3.Row
             row = connection.execute(
-                "SELECT coulomb_friction, half_width, time_ns, since_ns FROM baseline "
+                "SELECT baseline.* FROM baseline "
                 "JOIN valve ON valve.id = valve_id WHERE name = ? AND time_ns < ? "
                 "ORDER BY baseline.id DESC",
                 (valve, until),
             ).fetchone()
-        return None if row is None else KeptBaseline(Baseline(*row[:2]), *row[2:])
+        baseline = None if row is None else baseline_in(row)
+        if baseline is None:
+            return None
+        return KeptBaseline(baseline, row["time_ns"], row["since_ns"])
 
-    def points(self, valve: str, method: str, since: int = 0) -> tuple[FrictionPoint, ...]:
-        """Return a valve's identified and weak Coulomb frictions of one method, from `since` on."""
+    def points(
+        self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None
+    ) -> tuple[FrictionPoint, ...]:
+        """Return a valve's frictions of one method, from `since` on (`friction_point`)."""
         former = next((old for old, new in FORMER_METHODS.items() if new == method), method)
+        names = (SLIDING, "coulomb_friction", "viscous_friction")
         with reading(self.path) as connection:
+            connection.row_factory = sqlite3.Row
             rows = connection.execute(
-                "SELECT time_ns, value, half_width FROM identification "
+                "SELECT identification.*, parameter.* FROM identification "
                 "JOIN valve ON valve.id = valve_id "
                 "JOIN parameter ON identification_id = identification.id "
                 "WHERE valve.name = ? AND method IN (?, ?) AND time_ns >= ? "
-                "AND parameter.name = 'coulomb_friction' AND verdict IN (?, ?) "
-                "AND value IS NOT NULL AND half_width BETWEEN 0 AND 1e300 "
+                "AND parameter.name IN (?, ?, ?) "
                 "ORDER BY time_ns, identification.id",
-                (valve, method, former, since, Verdict.IDENTIFIED.value, Verdict.WEAK.value),
+                (valve, method, former, since, *names),
             ).fetchall()
-        return tuple(FrictionPoint(*row) for row in rows)
+        points = (
+            friction_point(time, parameters, speed, baseline)
+            for time, parameters, speed in frictions_in(rows)
+        )
+        return tuple(point for point in points if point is not None)
 
     def valves(self) -> tuple[KeptValve, ...]:
         """Return all valves, by name."""

@@ -4,8 +4,11 @@ import math
 import sqlite3
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Any
 
-from valve_friction_ros.health.baseline import Baseline, Ratio
+from valve_friction_ros.health.baseline import Baseline, SlidingFriction
+from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Level, StatusSignal
 from valve_friction_ros.history.entry import (
     Fit,
@@ -21,7 +24,31 @@ from valve_friction_ros.identification import (
     Verdict,
 )
 
-__all__ = ["entries_in", "insert_baseline", "insert_entry", "valve_id"]
+__all__ = [
+    "baseline_in",
+    "entries_in",
+    "frictions_in",
+    "insert_baseline",
+    "insert_entry",
+    "valve_id",
+]
+
+
+_OF_BASELINE = (
+    "coulomb_friction",
+    "half_width",
+    "sliding_friction",
+    "sliding_half_width",
+    "sliding_speed",
+)
+_OF_ENTRY = (
+    "baseline",
+    "baseline_half_width",
+    "baseline_sliding_friction",
+    "baseline_sliding_half_width",
+    "baseline_sliding_speed",
+)
+"""Columns of a baseline, in its own table and in that of the identifications."""
 
 
 def valve_id(connection: sqlite3.Connection, valve: KeptValve) -> int:
@@ -52,7 +79,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
     """Add an identification to a valve. SQLite stores nan as NULL."""
     diagnosis, baseline = entry.diagnosis, entry.baseline
     begin, end = entry.span or (None, None)
-    ratio, low, high = diagnosis.ratio or (None, None, None)
+    ratio, low, high, of, speed = diagnosis.ratio or (None,) * 5
     identification = _insert(
         connection,
         "identification",
@@ -72,8 +99,10 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
         ratio=ratio,
         ratio_low=low,
         ratio_high=high,
-        baseline=None if baseline is None else baseline.coulomb_friction,
-        baseline_half_width=None if baseline is None else baseline.half_width,
+        ratio_of=of,
+        ratio_speed=speed,
+        sliding_speed=entry.sliding_speed,
+        **_baseline_columns(baseline, _OF_ENTRY),
         warn_ratio=entry.limits.warn_ratio,
         error_ratio=entry.limits.error_ratio,
         low_ratio=entry.limits.low_ratio,
@@ -103,9 +132,30 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         valve_id=valve,
         time_ns=kept.time,
         since_ns=kept.since,
-        coulomb_friction=kept.baseline.coulomb_friction,
-        half_width=kept.baseline.half_width,
+        **_baseline_columns(kept.baseline, _OF_BASELINE),
     )
+
+
+def _baseline_columns(baseline: Baseline | None, names: Sequence[str]) -> dict[str, float | None]:
+    if baseline is None:
+        return dict.fromkeys(names)
+    slid = baseline.sliding
+    sliding = (None,) * 3 if slid is None else (slid.value, slid.half_width, slid.speed)
+    values = (baseline.coulomb_friction, baseline.half_width, *sliding)
+    return dict(zip(names, values, strict=True))
+
+
+def baseline_in(row: sqlite3.Row, names: Sequence[str] | None = None) -> Baseline | None:
+    """Return the baseline in a row of its table, or in columns of other names, if any."""
+    friction, width, *sliding = (_cell(row, name) for name in names or _OF_BASELINE)
+    if friction is None and sliding[0] is None:
+        return None
+    return Baseline(friction, width, None if sliding[0] is None else SlidingFriction(*sliding))
+
+
+def _cell(row: sqlite3.Row, name: str) -> Any:
+    """Return a cell, or None where a file of an older version has no such column."""
+    return row[name] if name in row.keys() else None  # noqa: SIM118 - a row is no mapping
 
 
 def _number(value: float | None) -> float:
@@ -126,13 +176,18 @@ def _parameter(row: sqlite3.Row) -> Parameter:
         _number(row["half_width"]),
         Verdict(row["verdict"]),
         row["reason"],
-        published=_number(row["published"]) if "published" in row.keys() else math.nan,  # noqa: SIM118
+        published=_number(_cell(row, "published")),
     )
 
 
 def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
-    ratio = Ratio(*(_number(row[name]) for name in ("ratio", "ratio_low", "ratio_high")))
-    baseline = row["baseline"]
+    ratio = Ratio(
+        _number(row["ratio"]),
+        _number(row["ratio_low"]),
+        _number(row["ratio_high"]),
+        _cell(row, "ratio_of") or "coulomb_friction",
+        _number(_cell(row, "ratio_speed")),
+    )
     return HistoryEntry(
         time=row["time_ns"],
         valve=KeptValve(row["name"], row["tag"]),
@@ -145,7 +200,8 @@ def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
             None if row["ratio"] is None else ratio,
         ),
         limits=FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"]),
-        baseline=None if baseline is None else Baseline(baseline, row["baseline_half_width"]),
+        baseline=baseline_in(row, _OF_ENTRY),
+        sliding_speed=_number(_cell(row, "sliding_speed")),
         settings=row["content"],
         parameters={one.name: one for one in parameters},
         fit=Fit(*(_number(row[name]) for name in ("fit", "rms", "systematic_misfit"))),
@@ -153,6 +209,16 @@ def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
         refusal=row["refusal"] or "",
         version=row["software_version"],
     )
+
+
+def frictions_in(
+    rows: Sequence[sqlite3.Row],
+) -> Iterator[tuple[int, dict[str, Parameter], float]]:
+    """Gather rows of parameters, each with its identification: time, parameters, sliding speed."""
+    for _, some in groupby(rows, key=lambda row: row["identification_id"]):
+        several = [*some]
+        parameters = {row["name"]: _parameter(row) for row in several}
+        yield several[0]["time_ns"], parameters, _number(_cell(several[0], "sliding_speed"))
 
 
 def entries_in(

@@ -3,13 +3,16 @@
 import contextlib
 import sqlite3
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from urllib.parse import quote
 
 __all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
 
-SCHEMA_VERSION = 2
-"""The database's user_version. Version 1 has no published values."""
+SCHEMA_VERSION = 3
+"""The database's user_version.
+
+Version 1 has no published values, version 2 no sliding friction in baselines and ratios."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -45,8 +48,14 @@ CREATE TABLE identification (
     ratio REAL,
     ratio_low REAL,
     ratio_high REAL,
+    ratio_of TEXT,
+    ratio_speed REAL,
     baseline REAL,
     baseline_half_width REAL,
+    baseline_sliding_friction REAL,
+    baseline_sliding_half_width REAL,
+    baseline_sliding_speed REAL,
+    sliding_speed REAL,
     warn_ratio REAL NOT NULL,
     error_ratio REAL NOT NULL,
     low_ratio REAL NOT NULL,
@@ -65,13 +74,20 @@ CREATE TABLE parameter (
     published REAL,
     PRIMARY KEY (identification_id, name)
 ) WITHOUT ROWID;
+"""
+
+_BASELINE = """
 CREATE TABLE baseline (
     id INTEGER PRIMARY KEY,
     valve_id INTEGER NOT NULL REFERENCES valve,
     time_ns INTEGER NOT NULL,
     since_ns INTEGER NOT NULL,
-    coulomb_friction REAL NOT NULL CHECK (coulomb_friction > 0),
-    half_width REAL NOT NULL CHECK (half_width >= 0)
+    coulomb_friction REAL CHECK (coulomb_friction > 0),
+    half_width REAL NOT NULL CHECK (half_width >= 0),
+    sliding_friction REAL CHECK (sliding_friction > 0),
+    sliding_half_width REAL CHECK (sliding_half_width >= 0),
+    sliding_speed REAL CHECK (sliding_speed > 0),
+    CHECK (coalesce(coulomb_friction, sliding_friction) IS NOT NULL)
 );
 CREATE INDEX baseline_of_valve ON baseline (valve_id, id);
 CREATE VIEW friction AS
@@ -83,15 +99,47 @@ CREATE VIEW friction AS
         parameter.value AS coulomb_friction,
         parameter.half_width AS half_width,
         parameter.verdict AS verdict,
+        sliding.value AS sliding_friction,
+        sliding.half_width AS sliding_half_width,
+        sliding.verdict AS sliding_verdict,
+        identification.sliding_speed AS sliding_speed,
         ratio,
+        ratio_of,
         level,
         message,
         refusal
     FROM identification
     JOIN valve ON valve.id = valve_id
     LEFT JOIN parameter
-        ON parameter.identification_id = identification.id AND parameter.name = 'coulomb_friction';
+        ON parameter.identification_id = identification.id AND parameter.name = 'coulomb_friction'
+    LEFT JOIN parameter AS sliding
+        ON sliding.identification_id = identification.id AND sliding.name = 'sliding_friction';
 """
+
+_ADDED = {
+    "ratio_of": "TEXT",
+    "ratio_speed": "REAL",
+    "baseline_sliding_friction": "REAL",
+    "baseline_sliding_half_width": "REAL",
+    "baseline_sliding_speed": "REAL",
+    "sliding_speed": "REAL",
+}
+"""Columns of the identifications that version 3 adds."""
+
+_STEPS = {
+    1: ("ALTER TABLE parameter ADD COLUMN published REAL",),
+    2: (
+        *(f"ALTER TABLE identification ADD COLUMN {name} {kind}" for name, kind in _ADDED.items()),
+        "DROP VIEW friction",
+        "DROP INDEX baseline_of_valve",
+        "ALTER TABLE baseline RENAME TO former_baseline",
+        *_BASELINE.split(";"),
+        "INSERT INTO baseline (id, valve_id, time_ns, since_ns, coulomb_friction, half_width) "
+        "SELECT id, valve_id, time_ns, since_ns, coulomb_friction, half_width FROM former_baseline",
+        "DROP TABLE former_baseline",
+    ),
+}
+"""What leads from a version to the next one."""
 
 _REMEDIES = (
     ("disk is full", "make room on its disk"),
@@ -175,11 +223,10 @@ def _set_journal(connection: sqlite3.Connection) -> None:
 
 def _make_tables(connection: sqlite3.Connection) -> None:
     """Create the tables of a new file, and add to those of an older one what they lack."""
-    if _pragma(connection, "user_version") == 1:
-        connection.execute("ALTER TABLE parameter ADD COLUMN published REAL")
-        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-        return
-    for statement in filter(str.strip, _SCHEMA.split(";")):
+    version = _pragma(connection, "user_version")
+    steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
+    statements = chain(*steps) if version else f"{_SCHEMA};{_BASELINE}".split(";")
+    for statement in filter(str.strip, statements):
         connection.execute(statement)
     connection.execute(f"PRAGMA application_id = {_APPLICATION}")
     connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")

@@ -1,5 +1,6 @@
-"""How the Coulomb friction of a valve drifts, and when it is expected to cross a limit."""
+"""How the friction of a valve drifts, and when it is expected to cross a limit."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.comparison import friction_words
 from valve_friction_ros.health.diagnosis import FrictionLimits
-from valve_friction_ros.history.entry import FrictionPoint
+from valve_friction_ros.history.entry import FrictionPoint, trended
 from valve_friction_ros.history.scattered_line import LEAST_ESTIMATES, ScatteredLine, fit_line
 from valve_friction_ros.model.checks import require_non_negative
 
@@ -39,7 +41,7 @@ _MOST_OUTLIERS = 0.1
 
 
 class Limit(Enum):
-    """A bound of the Coulomb friction, by the name of its ratio."""
+    """A bound of the friction, by the name of its ratio."""
 
     WARN = "warn_ratio"
     ERROR = "error_ratio"
@@ -50,7 +52,7 @@ class Limit(Enum):
 class Crossing:
     """When the next limit on the way is expected to be crossed.
 
-    `level` is its Coulomb friction, N; `earliest` and `latest` are the ends of the 95 % interval of
+    `level` is its friction, N; `earliest` and `latest` are the ends of the 95 % interval of
     the expected time, ns since 1970 (UTC).
     """
 
@@ -63,11 +65,12 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Trend:
-    """The drift of the Coulomb friction, a line through the days, N over ns since `begin`.
+    """The drift of a friction, a line through the days, N over ns since `begin`.
 
     `days` go into the line, `outliers` are left out. `begin` and `end` are the first and the last
     estimate, ns since 1970 (UTC). The crossing is None without a significant drift, without a
-    baseline, or where it lies too far ahead.
+    baseline, or where it lies too far ahead. `of` names the friction: the sliding friction at
+    `speed`, m/s, where the baseline has one, else F_c.
     """
 
     line: ScatteredLine
@@ -76,6 +79,13 @@ class Trend:
     begin: int
     end: int
     crossing: Crossing | None
+    of: str = "coulomb_friction"
+    speed: float = math.nan
+
+    @property
+    def what(self) -> str:
+        """What drifts, in words."""
+        return friction_words(self.of, self.speed)
 
     @property
     def drift(self) -> float:
@@ -142,11 +152,18 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
     return line, outliers
 
 
+def _healthy(baseline: Baseline) -> tuple[float, float]:
+    """Friction of the baseline that points are compared with, and half its interval's width, N."""
+    if baseline.sliding is not None:
+        return baseline.sliding.value, baseline.sliding.half_width
+    return baseline.coulomb_friction or math.nan, baseline.half_width
+
+
 def _crossing(
     line: ScatteredLine, begin: int, end: int, baseline: Baseline, limits: FrictionLimits
 ) -> Crossing | None:
     """Return when the next limit is crossed, if that is not too far ahead."""
-    friction, span = baseline.coulomb_friction, end - begin
+    (friction, half_width), span = _healthy(baseline), end - begin
     now = line.at(span)
     rising = ((Limit.WARN, limits.warn_ratio), (Limit.ERROR, limits.error_ratio))
     ahead = (
@@ -157,7 +174,7 @@ def _crossing(
     if not ahead:
         return None
     limit, ratio = ahead[0]
-    crossed = line.crossing(ratio * friction, ratio * baseline.half_width / _NORMAL)
+    crossed = line.crossing(ratio * friction, ratio * half_width / _NORMAL)
     if crossed is None or not span < crossed[0] <= (1 + _HORIZON) * span:
         return None
     return Crossing(limit, ratio * friction, *(begin + round(time) for time in crossed))
@@ -168,7 +185,9 @@ def trend_of(
     baseline: Baseline | None = None,
     limits: FrictionLimits | None = None,
 ) -> Trend | None:
-    """Estimate the drift of the Coulomb friction from points since the last work on the packing.
+    """Estimate the drift of the friction from points since the last work on the packing.
+
+    The points are those of `friction_point` with this baseline.
 
     The weight of a point follows from its interval and from the scatter between days, which
     `fit_line` estimates. All points of one day count as one point. Outlying days are left out, a
@@ -189,4 +208,6 @@ def trend_of(
     crossing = None
     if baseline is not None and abs(line.slope) > line.slope_half_width:
         crossing = _crossing(line, begin, end, baseline, limits or FrictionLimits())
-    return Trend(line, days.times.size - outliers, outliers, begin, end, crossing)
+    speed = math.nan if baseline is None or not baseline.sliding else baseline.sliding.speed
+    of = trended(baseline)
+    return Trend(line, days.times.size - outliers, outliers, begin, end, crossing, of, speed)

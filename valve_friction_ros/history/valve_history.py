@@ -50,7 +50,7 @@ def valve_histories(
         begin = since if kept is None else max(since, kept.since)
         last = entries[-1]
         same = (one for one in entries if one.time >= begin and one.method == last.method)
-        points = [point for one in same if (point := one.point()) is not None]
+        points = [point for one in same if (point := one.point(last.baseline)) is not None]
         trend = trend_of(points, last.baseline, last.limits)
         found.append(ValveHistory(valve, entries, kept, trend))
     return tuple(found)
@@ -64,5 +64,5 @@ def current_trend(
     Raises HistoryError if the file cannot be read.
     """
     kept = history.baseline(valve)
-    points = history.points(valve, settings.method_used, kept.since if kept else 0)
+    points = history.points(valve, settings.method_used, kept.since if kept else 0, baseline)
     return trend_of(points, baseline, settings.limits)

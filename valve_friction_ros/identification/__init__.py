@@ -44,6 +44,7 @@ from valve_friction_ros.identification.steps.step_response import (
 from valve_friction_ros.identification.steps.validation import Validation, validate
 from valve_friction_ros.identification.trust.misfit import Misfit, percentage
 from valve_friction_ros.identification.trust.plausible_units import require_valve_units
+from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS
 
@@ -53,6 +54,7 @@ __all__ = [
     "FORMER_METHODS",
     "METHODS",
     "PARAMETER_UNITS",
+    "SLIDING",
     "TIMING_UNCERTAINTY",
     "UNITS",
     "Bracket",

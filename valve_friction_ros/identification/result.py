@@ -1,5 +1,6 @@
 """The result: what every method of identification returns."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -71,7 +72,7 @@ class Result:
     settings : IdentificationSettings
         Settings of the identification.
     parameters : mapping of str to Parameter
-        By name: those of `UNITS`, then the extensions that the record demanded.
+        By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`.
     fit : float
         Share of the stem's movement that the model reproduces, at most 1; of the force where no
         stem is simulated.
@@ -94,6 +95,9 @@ class Result:
         What figures and reports draw beside record and stem, such as a sweep or a valve signature.
     stem : StemComparison or None
         Measured and simulated stem; None where no stem is simulated.
+    sliding_speed : float
+        Mean speed of the stem over the distance, ∫|v|·|dx| / ∫|dx|, m/s: the speed that
+        `sliding_friction` belongs to; nan where it is unknown.
 
     Examples
     --------
@@ -126,6 +130,7 @@ class Result:
     model: KarnoppParameters | None = field(default=None, repr=False)
     exhibit: Exhibit | None = field(default=None, repr=False)
     stem: StemComparison | None = field(default=None, repr=False)
+    sliding_speed: float = math.nan
 
     def __post_init__(self) -> None:
         """Freeze the mappings."""
@@ -159,9 +164,9 @@ class Result:
 
         Every other rendering (JSON, rows, diagnostics, tables) is derived from this mapping. Its
         keys are stable: ``method``, ``parameters.<name>`` with ``value``, ``standard_error``,
-        ``half_width``, ``interval``, ``verdict``, ``reason``, ``published`` and ``unit``; ``fit``,
-        ``rms``, ``systematic_misfit``, ``model_describes``, ``derivative_window``, ``evidence``,
-        ``settings`` and ``warnings``.
+        ``half_width``, ``interval``, ``verdict``, ``reason``, ``published`` and ``unit``;
+        ``sliding_speed``, ``fit``, ``rms``, ``systematic_misfit``, ``model_describes``,
+        ``derivative_window``, ``evidence``, ``settings`` and ``warnings``.
         """
         misfit, settings = self.misfit, self.settings
         return {
@@ -169,6 +174,7 @@ class Result:
             "parameters": {
                 name: rendering.parameter_mapping(each) for name, each in self.parameters.items()
             },
+            "sliding_speed": rendering.plain(self.sliding_speed),
             "fit": rendering.plain(self.fit),
             "rms": rendering.plain(self.rms),
             "systematic_misfit": None if misfit is None else rendering.plain(misfit.of_stem),

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from valve_friction_ros.health import StatusSignal, dead_band, percentage
-from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.identification import SLIDING, Parameter, Verdict
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
 __all__ = ["diagnosis_sentence"]
@@ -37,10 +37,11 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
 
     It states the diagnosis of the monitor in words for readers outside control engineering.
     """
-    friction = record.result.parameters["coulomb_friction"]
+    friction = _friction(record)
     alarm = _ALARMS.get(record.diagnosis.status_signal)
-    if math.isnan(friction.value) and alarm is not None:
-        size = f"at most {friction.magnitude_bound:.2g} N, too small to be identified"
+    if record.diagnosis.ratio is None and alarm is not None:
+        vanished = next(one for one in _frictions(record) if math.isnan(one.value))
+        size = f"at most {vanished.magnitude_bound:.2g} N, too small to be identified"
         finding = _Finding(alarm.what.format(ratio=size), alarm.advice)
     elif math.isnan(friction.value):
         finding = _Finding(
@@ -59,15 +60,36 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     return sentence[0].upper() + sentence[1:]
 
 
+def _frictions(record: IdentifiedRecord) -> list[Parameter]:
+    parameters = record.result.parameters
+    return [parameters[name] for name in ("coulomb_friction", SLIDING) if name in parameters]
+
+
+def _friction(record: IdentifiedRecord) -> Parameter:
+    """Return the friction that was compared; without a comparison one that is known, F_c if it is.
+
+    One below zero comes first: it is a fault of the signals.
+    """
+    ratio, frictions = record.diagnosis.ratio, _frictions(record)
+    if ratio is not None:
+        return record.result.parameters[ratio.of]
+    below = [one for one in frictions if one.value < 0]
+    known = [one for one in frictions if not math.isnan(one.value)]
+    return [*below, *known, *frictions][0]
+
+
 def _found(record: IdentifiedRecord) -> _Finding:
-    friction, diagnosis = record.result.parameters["coulomb_friction"], record.diagnosis
+    friction, diagnosis = _friction(record), record.diagnosis
     if diagnosis.ratio is None:
         size = f"{friction.value:.4g}"
         if friction.verdict is not Verdict.FIXED:
             size += f" ± {friction.half_width:.2g}"
+        advice = "set a baseline, the friction of the healthy valve"
+        if record.baseline is not None:
+            advice = "move the valve as its baseline was taken, and identify it again"
         return _Finding(
             f"the friction is {size} N{_sureness(friction)}",
-            "to find out whether it has grown, set a baseline, the friction of the healthy valve",
+            f"to find out whether it has grown, {advice}",
         )
     ratio = (
         f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % interval: "

@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 
 import valve_friction_ros
-from valve_friction_ros.health import Baseline, dead_band, percentage
-from valve_friction_ros.identification import TIMING_UNCERTAINTY, Parameter, Verdict, two_digits
+from valve_friction_ros.health import compared, dead_band, percentage
+from valve_friction_ros.identification import TIMING_UNCERTAINTY, Verdict, two_digits
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
 
@@ -109,27 +109,21 @@ def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
     return Table((Column(first), Column(second)), tuple(rows))
 
 
-def _excess(friction: Parameter, baseline: Baseline) -> str:
-    width = math.hypot(friction.half_width, baseline.half_width)
-    return f"{friction.value - baseline.coulomb_friction:+.4g} ± {width:.2g} N"
-
-
 def friction_table(record: IdentifiedRecord) -> Table:
-    """Return the Coulomb friction beside its baseline, and the diagnosis."""
-    friction = record.result.parameters["coulomb_friction"]
+    """Return the friction beside its baseline, and the diagnosis."""
     baseline, diagnosis, limits = record.baseline, record.diagnosis, record.limits
-    rows = []
+    rows, found = [], None
     if baseline is not None:
-        healthy = f"{baseline.coulomb_friction:.5g}"
-        healthy += f" ± {baseline.half_width:.2g}" if baseline.half_width > 0 else ""
-        rows.append(("friction of the healthy valve (baseline)", f"{healthy} N"))
-    if baseline is not None and diagnosis.ratio is not None:
-        ratio = diagnosis.ratio
+        rows.append(("friction of the healthy valve (baseline)", str(baseline)))
+        found = compared(record.result.parameters, record.result.sliding_speed, baseline)
+    if found is not None and (ratio := diagnosis.ratio) is not None:
+        excess, width = found.excess
         rows += [
-            ("excess friction", _excess(friction, baseline)),
+            ("excess friction", f"{excess:+.4g} ± {width:.2g} N"),
             (
                 "friction over baseline",
-                f"{ratio.value:.3g}, 95 % interval {ratio.low:.3g} to {ratio.high:.3g}",
+                f"{ratio.what}: {ratio.value:.3g}, "
+                f"95 % interval {ratio.low:.3g} to {ratio.high:.3g}",
             ),
             (
                 "limits of that ratio",

@@ -53,9 +53,9 @@ def result(record):
 
 def test_no_parameter_has_an_interval(result, estimate):
     """A given spring, an assumed mass, and what is identified without an interval."""
-    assert list(result.parameters) == list(UNITS)
-    for name, one in result.parameters.items():
-        value = estimate.values[name]
+    assert list(result.parameters) == [*UNITS, "sliding_friction"]
+    for name in UNITS:
+        one, value = result.parameters[name], estimate.values[name]
         assert (one.name, one.value, one.published) == (name, value, value)
         if name in ("mass", "spring_constant"):
             assert (one.verdict, one.half_width) == (Verdict.FIXED, 0.0)

@@ -29,7 +29,7 @@ NOISE = SensorNoise(28.6e-6, 165.0)
 
 
 def extras(result):
-    return result.parameters.keys() - UNITS.keys()
+    return result.parameters.keys() - UNITS.keys() - {"sliding_friction"}
 
 
 def high_record(parameters=HIGH_FRICTION, seed=0, late=0.0):

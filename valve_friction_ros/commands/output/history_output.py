@@ -16,6 +16,7 @@ from valve_friction_ros.identification import (
     parameter_cells,
     parameter_columns,
     parameter_mapping,
+    plain,
     two_digits,
 )
 from valve_friction_ros.records.whole_file import write_whole
@@ -38,6 +39,8 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
         "end": time_text(trend.end),
         "days": trend.days,
         "outliers": trend.outliers,
+        "of": trend.of,
+        "speed": plain(trend.speed),
         "significant": trend.is_significant,
         "drift_n_per_month": None,
         "half_width_n_per_month": None,
@@ -96,7 +99,11 @@ def _row(entry: HistoryEntry) -> dict[str, object]:
         "ratio": diagnosis["ratio"],
         "ratio_low": low,
         "ratio_high": high,
+        "ratio_of": diagnosis["ratio_of"],
+        "ratio_speed_m_per_s": diagnosis["ratio_speed"],
         "baseline_n": shown["baseline"],
+        "baseline_sliding_n": (shown["baseline_sliding"] or {}).get("value"),
+        "sliding_speed_m_per_s": shown["sliding_speed"],
         "fit": shown["fit"],
         "rms_m": shown["rms"],
     }
@@ -178,9 +185,9 @@ def _trend_lines(trend: Trend | None) -> list[str]:
     if trend.outliers:
         days += f" ({trend.outliers} left out as outliers)"
     if not trend.is_significant:
-        return [f"trend: no significant drift of coulomb friction over {days}"]
+        return [f"trend: no significant drift of {trend.what} over {days}"]
     lines = [
-        f"trend: coulomb friction drifts by {trend.drift:+.3g} ± {two_digits(trend.half_width)} N "
+        f"trend: {trend.what} drifts by {trend.drift:+.3g} ± {two_digits(trend.half_width)} N "
         f"a month, over {days}"
     ]
     if trend.crossing is not None:

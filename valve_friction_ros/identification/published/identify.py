@@ -23,6 +23,7 @@ from valve_friction_ros.identification.trust.excitation import (
     require_unbroken,
 )
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
@@ -52,6 +53,18 @@ class PublishedFit(NamedTuple):
         force = regression.force[moving]
         left = regression.columns[moving] @ values - force
         return 1 - float(np.linalg.norm(left) / np.linalg.norm(force - force.mean()))
+
+    @property
+    def sliding_speed(self) -> float:
+        """Mean speed over the distance, m/s, of the samples above the threshold."""
+        speed = self.regression.speed
+        return mean_speed(speed[speed > self.estimate.threshold])
+
+    @property
+    def sliding_friction(self) -> float:
+        """F_c + F_v·|ẋ| at that speed, N: the work of friction over the distance."""
+        estimate = self.estimate
+        return estimate.coulomb_friction + estimate.viscous_friction * self.sliding_speed
 
 
 def chosen_step(

@@ -12,6 +12,7 @@ from valve_friction_ros.identification.published.evidence import (
 from valve_friction_ros.identification.published.identify import published_fit
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -54,6 +55,7 @@ def identify_published(
     found = published_fit(record, valve, settings)
     estimate = found.estimate
     parameters = {name: _stated(name, estimate, settings.fixed) for name in estimate.values}
+    parameters[SLIDING] = _without_interval(SLIDING, found.sliding_friction)
     return Result(
         method=METHOD,
         recording=recording,
@@ -69,6 +71,7 @@ def identify_published(
         findings=(sweep_finding(estimate),),
         model=possible_model(estimate),
         exhibit=estimate,
+        sliding_speed=found.sliding_speed,
     )
 
 
@@ -78,4 +81,8 @@ def _stated(name: str, estimate: Estimate, given: Container[str]) -> Parameter:
         return fixed(name, value)
     if name in estimate.fixed:
         return fixed(name, value, "assumed: the record does not determine it")
+    return _without_interval(name, value)
+
+
+def _without_interval(name: str, value: float) -> Parameter:
     return Parameter(name, value, math.nan, math.nan, Verdict.WEAK, _NO_INTERVAL)

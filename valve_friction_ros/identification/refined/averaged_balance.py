@@ -19,6 +19,7 @@ from valve_friction_ros.identification.published.regression import ForceBalanceR
 from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
 from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.identification.trust.uncertainty import (
     Covariance,
     block_covariance,
@@ -87,6 +88,8 @@ class AveragedBalance:
     change : float
         Change of the Coulomb friction over the travel of the record, over its mean; 0 if it is no
         more than chance.
+    sliding_speed : float
+        Mean speed over the distance, m/s.
     """
 
     values: Mapping[str, float]
@@ -97,6 +100,7 @@ class AveragedBalance:
     strokes: int
     window: int
     change: float
+    sliding_speed: float
 
     @property
     def doubt(self) -> str:
@@ -113,21 +117,29 @@ class AveragedBalance:
             )
         return ""
 
-    def half_width(self, name: str) -> float:
-        """Half the width of the 95 % interval of a free parameter."""
-        index = self.names.index(name)
-        gradient = np.eye(len(self.names))[index]
-        return self.covariance.half_width(gradient) + float(self.systematic[index])
+    @property
+    def sliding_friction(self) -> tuple[float, dict[str, float]]:
+        """F_c + F_v·|ẋ| at the sliding speed, N, and what it takes of each parameter."""
+        parts = {"coulomb_friction": 1.0, "viscous_friction": self.sliding_speed}
+        return sum(share * self.values[name] for name, share in parts.items()), parts
+
+    def half_width(self, parts: Mapping[str, float]) -> float:
+        """Half the width of the 95 % interval of a sum of parameters, by its shares of each."""
+        gradient = self._gradient(parts)
+        return self.covariance.half_width(gradient) + float(np.abs(gradient) @ self.systematic)
+
+    def _gradient(self, parts: Mapping[str, float]) -> NDArray[np.float64]:
+        return np.array([parts.get(name, 0.0) for name in self.names])
 
     def relative_width(self) -> float:
         """Half width of the first free parameter over its value; infinite where it has none."""
         name = self.names[0]
         value = self.values.get(name, 0.0)
-        return self.half_width(name) / value if value > 0 else math.inf
+        return self.half_width({name: 1.0}) / value if value > 0 else math.inf
 
-    def standard_error(self, name: str) -> float:
-        """Scatter of a free parameter between the strokes."""
-        return self.covariance.standard_error(np.eye(len(self.names))[self.names.index(name)])
+    def standard_error(self, parts: Mapping[str, float]) -> float:
+        """Scatter of a sum of parameters between the strokes."""
+        return self.covariance.standard_error(self._gradient(parts))
 
 
 def averaged_balance(
@@ -203,6 +215,7 @@ def averaged_balance(
         residual.size // stroke,
         window,
         change,
+        mean_speed(averaged.velocity[moving]),
     )
 
 

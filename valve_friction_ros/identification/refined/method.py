@@ -40,6 +40,7 @@ from valve_friction_ros.identification.trust.plausible_units import (
     require_plausible_units,
     time_remarks,
 )
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import CLOCK_OFFSET
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -138,6 +139,7 @@ def identify_refined(
         model=outcome.model,
         exhibit=estimate,
         stem=outcome.stem,
+        sliding_speed=outcome.sliding_speed,
     )
 
 
@@ -150,6 +152,7 @@ class _Outcome(NamedTuple):
     warnings: Sequence[str]
     model: KarnoppParameters | None
     stem: StemComparison | None
+    sliding_speed: float
 
 
 def _refined(
@@ -193,6 +196,7 @@ def _refined(
         [*time_remarks(record, valve), *warnings],
         problem.model(refinement.coordinates),
         StemComparison(conditioned.sample_period, conditioned.position, refinement.simulated),
+        mean_speed(refinement.velocity),
     )
 
 
@@ -224,7 +228,9 @@ def _regressed(balance: AveragedBalance, settings: IdentificationSettings) -> _O
     except ValueError:
         model = None
     doubts = [balance.doubt] if balance.doubt else []
-    return _Outcome(parameters, balance.misfit.fit, balance.misfit, doubts, model, None)
+    return _Outcome(
+        parameters, balance.misfit.fit, balance.misfit, doubts, model, None, balance.sliding_speed
+    )
 
 
 def _finding(outcome: _Outcome, valve: Valve) -> str:

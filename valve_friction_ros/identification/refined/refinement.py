@@ -80,10 +80,15 @@ class Refinement:
         """Simulated minus measured position, m, shape (n,)."""
         return self.simulated - self.problem.record.position
 
+    @cached_property
+    def velocity(self) -> NDArray[np.float64]:
+        """Velocity of the simulated stem from sample to sample, m/s, shape (n − 1,)."""
+        return np.asarray(np.diff(self.simulated) / self.problem.record.sample_period)
+
     @property
     def top_speed(self) -> float:
         """Highest speed of the simulated stem, m/s."""
-        return float(np.max(np.abs(np.diff(self.simulated)))) / self.problem.record.sample_period
+        return float(np.max(np.abs(self.velocity)))
 
     @property
     def rms(self) -> float:

@@ -17,10 +17,12 @@ from valve_friction_ros.identification.trust.limits import (
     too_few_strokes,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit
-from valve_friction_ros.identification.trust.uncertainty import (
-    CONFIDENCE,
-    worst_case,
+from valve_friction_ros.identification.trust.sliding import (
+    FINEST_SLIDING,
+    SLIDING,
+    mean_sliding_friction,
 )
+from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE, worst_case
 from valve_friction_ros.identification.trust.verdict import (
     Parameter,
     fixed,
@@ -33,6 +35,9 @@ __all__ = ["balance_verdicts", "refinement_verdicts"]
 
 _SPRING = ("mass", "spring_constant", "spring_preload", CLOCK_OFFSET)
 """Parameters whose verdicts stand where the friction model is doubted: no friction enters them."""
+
+_SLIDING_STEP = 1e-4
+"""Step of the sliding friction's differences, in the natural sizes of the coordinates."""
 
 _RECTANGLE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) / math.sqrt(3)
 """Half width of an interval over the half width of a rectangular distribution."""
@@ -47,7 +52,7 @@ def refinement_verdicts(
     Student's quantile. Where a mass is assumed, the effect of its error is added in squares; the
     error is taken as uniform within plus or minus the mass itself. Where the misfit exceeds noise,
     its largest possible effect (`worst_case`) is added in full. No half width is less than 0.05 %
-    of its value, or 0.02 % of a spring constant.
+    of its value, 0.02 % of a spring constant or 0.3 % of a sliding friction.
     """
     covariance = refinement.covariance
     samples = refinement.simulated.size
@@ -57,6 +62,12 @@ def refinement_verdicts(
         **vars(refinement.problem.model(refinement.coordinates)),
         CLOCK_OFFSET: refinement.coordinates[CLOCK_OFFSET],
     }
+
+    def width_of(gradient: NDArray[np.float64]) -> float:
+        bound = _root(float(gradient @ systematic @ gradient))
+        lean = _RECTANGLE * abs(float(gradient @ by_mass))
+        return math.hypot(covariance.half_width(gradient), lean) + bound
+
     few = too_few_strokes(samples // max(refinement.stroke, 1))
     doubt = _doubt(refinement, misfit)
     extras = (name for name in refinement.names if name not in (*UNITS, SLIP, START))
@@ -75,12 +86,13 @@ def refinement_verdicts(
             parameters[name] = not_identifiable(name, NO_SLIP)
         else:
             error = covariance.standard_error(gradient)
-            bound = _root(float(gradient @ systematic @ gradient))
-            lean = _RECTANGLE * abs(float(gradient @ by_mass))
-            width = math.hypot(covariance.half_width(gradient), lean) + bound
-            width = max(width, finest_half_share(name, settings) * abs(values[name]))
+            width = max(width_of(gradient), finest_half_share(name, settings) * abs(values[name]))
             reason = few or ("" if name in _SPRING else doubt)
             parameters[name] = with_verdict(name, values[name], error, width, reason)
+    value, gradient = _sliding(refinement)
+    error, width = covariance.standard_error(gradient), width_of(gradient)
+    width, reason = max(width, FINEST_SLIDING * value), few or _model_doubt(misfit)
+    parameters[SLIDING] = with_verdict(SLIDING, value, error, width, reason)
     return parameters
 
 
@@ -103,10 +115,31 @@ def balance_verdicts(
             )
         else:
             value = balance.values[name]
-            width = max(balance.half_width(name), finest_half_share(name, settings) * abs(value))
-            error = balance.standard_error(name)
+            width = max(
+                balance.half_width({name: 1.0}), finest_half_share(name, settings) * abs(value)
+            )
+            error = balance.standard_error({name: 1.0})
             parameters[name] = with_verdict(name, value, error, width, few or balance.doubt)
+    value, parts = balance.sliding_friction
+    width = max(balance.half_width(parts), FINEST_SLIDING * abs(value))
+    error = balance.standard_error(parts)
+    parameters[SLIDING] = with_verdict(SLIDING, value, error, width, few or balance.doubt)
     return parameters
+
+
+def _sliding(refinement: Refinement) -> tuple[float, NDArray[np.float64]]:
+    """Return the sliding friction of the simulated stem, N, and its gradient.
+
+    The velocities stay as they are: they follow from the record, not from one coordinate.
+    """
+    problem, at, velocity = refinement.problem, refinement.coordinates, refinement.velocity
+    value = mean_sliding_friction(problem.model(at), velocity)
+    gradient = []
+    for name, size in problem.units(refinement.names, at).items():
+        moved = problem.model({**at, name: at[name] + _SLIDING_STEP * size})
+        change = mean_sliding_friction(moved, velocity) - value
+        gradient.append(change / (_SLIDING_STEP * size))
+    return value, np.array(gradient)
 
 
 def _shift_by_assumed_mass(
@@ -128,13 +161,20 @@ def _root(variance: float) -> float:
     return math.sqrt(variance) if variance >= 0 else math.nan
 
 
+def _model_doubt(misfit: Misfit) -> str:
+    """Return why every friction is at most weak, or an empty string."""
+    if misfit.describes:
+        return ""
+    return (
+        "the Karnopp model does not describe this valve: "
+        f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
+    )
+
+
 def _doubt(refinement: Refinement, misfit: Misfit) -> str:
-    """Return why the friction is at most weak, or an empty string."""
-    if not misfit.describes:
-        return (
-            "the Karnopp model does not describe this valve: "
-            f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
-        )
+    """Return why what the friction is made of is at most weak, or an empty string."""
+    if doubt := _model_doubt(misfit):
+        return doubt
     speed = refinement.top_speed
     if speed < FALL_SPEED:
         return (

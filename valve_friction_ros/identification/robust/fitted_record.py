@@ -36,6 +36,9 @@ _CALM = 1e-3
 """Noise of the speed, over `LOW_SPEED`, for which it is averaged longer: through a friction that
 falls with speed, the simulated stem would follow the noise of the measured one."""
 
+_CALM_PARTS = 20
+"""Of the record; it is averaged over one of them at most."""
+
 _GAP_PERIODS = 10
 _GAP_TIME = 0.05
 """Longer pauses than so many periods, and than this, s, are gaps: what is between them is lost."""
@@ -352,11 +355,12 @@ def _slow_view(
     stem = _averaged_twice(position, length)
     velocity = np.gradient(stem, period)
     calm = (math.sqrt(2.0) * density / (_CALM * LOW_SPEED)) ** (2.0 / 3.0)
-    calmer = _averaged_twice(velocity, round(calm / period)) if calm > _SLOW else velocity
+    longest = min(round(calm / period), stem.size // _CALM_PARTS)
+    calmer = _averaged_twice(velocity, longest) if longest > length else velocity
     lowest, highest = float(stem.min()), float(stem.max())
     return SlowView(
         (2.0 * stem - lowest - highest) / max(highest - lowest, np.finfo(float).tiny),
-        np.linspace(-1.0, 1.0, stem.size),
+        np.linspace(-1.0, 1.0, stem.size, dtype=np.float64),
         np.abs(velocity),
         np.exp(-np.abs(calmer) / LOW_SPEED),
         velocity,

@@ -16,6 +16,7 @@ from valve_friction_ros.identification.robust.numbers import (
     reported_numbers,
 )
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, Stage
+from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING, SLIDING
 from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
 
 __all__ = ["NOISE_LIKE", "Budget", "Estimated", "estimated"]
@@ -38,10 +39,9 @@ _FAR = 0.5
 """Share of that work by which a fit may differ from it before it is doubted, however well it
 follows the stem: a lag alone makes up for less."""
 
-_FINEST = {"sliding_friction": 3e-3, "spring_constant": 2e-4}
+_FINEST = {SLIDING: FINEST_SLIDING, "spring_constant": 2e-4}
 _FINEST_OTHER = 5e-4
-"""No interval is narrower than this share of its value, however quiet the record is. The speed of
-the stem, and so the mean friction, is known no better than the step of the simulation allows."""
+"""No interval is narrower than this share of its value, however quiet the record is."""
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,10 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
             apart = abs(numbers[name].value - first.value)
             there = min(_half_width(other, stage, numbers[name]), _WIDEST * own)
             width = max(width, near * (apart + 0.5 * there))
-        if name == "sliding_friction":
+        if name == SLIDING:
             lost = fit.model.record.lost / fit.model.record.duration
             width = math.hypot(width, _LOST * lost * abs(first.value))
-        if name == "sliding_friction":
+        if name == SLIDING:
             loop = loop_friction(fit.model, places[0][1].at)
             apart = abs(loop - first.value)
             if fit.inflation > NOISE_LIKE or apart > _FAR * abs(loop):

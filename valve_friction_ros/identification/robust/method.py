@@ -33,6 +33,7 @@ from valve_friction_ros.identification.trust.plausible_units import (
     require_plausible_units,
     time_remarks,
 )
+from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
@@ -132,6 +133,7 @@ def identify_robust(
         model=_model(fit),
         exhibit=published,
         stem=_stem(fit),
+        sliding_speed=mean_speed(fit.model.simulate(fit.at).velocity),
     )
 
 

@@ -41,7 +41,7 @@ _START_TIME = 5e-3
 such a time (s) and in that by which its sensor may be late."""
 
 _MOST_WORK = 20_000_000
-"""Steps of simulations after which no other branch begins: about one and a half seconds of a processor.
+"""Steps of simulations after which no other branch begins: 1.5 seconds of a processor or so.
 
 A count and not a time, so that the answer does not depend on the machine."""
 

@@ -22,6 +22,7 @@ _DRY_SHARES = (0.3, 0.5, 0.7, 0.85, 0.95, 1.0)
 _LAGS = (-2.0, -1.5, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 1.5, 2.0)
 """Lags to start from, in timing uncertainties."""
 
+
 @dataclass(frozen=True)
 class Sliding:
     """A regression over the steps at which the stem surely slides.
@@ -105,7 +106,7 @@ def lagging(at: Coordinates, timing_uncertainty: float) -> list[Coordinates]:
     A sliding stem follows the force by F_v/k, and a lag of a sensor adds to that; a fit without
     lags finds their sum. From there the fit with all of them leads into many a wrong valley.
     """
-    starts = []
+    starts: list[Coordinates] = []
     for name in TIMING:
         for share in _LAGS:
             lag = share * timing_uncertainty

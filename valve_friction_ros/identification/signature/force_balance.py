@@ -18,6 +18,7 @@ from valve_friction_ros.identification.signature.valve_signature import (
     mean_position_bias,
     mean_spring_constant,
     sliding_friction,
+    sliding_places,
     sliding_speed,
     valve_signature,
 )
@@ -33,6 +34,7 @@ from valve_friction_ros.identification.trust.jackknife import Jackknife, jackkni
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
 from valve_friction_ros.identification.trust.misfit import percentage, stem_distance
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
+from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING, SLIDING
 from valve_friction_ros.identification.trust.uncertainty import half_width
 from valve_friction_ros.identification.trust.verdict import (
     Parameter,
@@ -81,8 +83,9 @@ def identify_signature(
     """Identify a valve signature by force balances, as the paper's model 2.
 
     k is the mean of (15), x̄ follows from (14), F_s from (11) and (12) at the breakaway points,
-    F_c is F_s, and F_v the mean of (19) while the stem slides. Intervals come from the scatter
-    between strokes, widened by the errors that all strokes may share: 1 % of F_s, 0.2 % of k.
+    F_c is F_s, and F_v the mean of (19) while the stem slides; the sliding friction is half the
+    dead zone as a force. Intervals come from the scatter between strokes, widened by the errors
+    that all strokes may share: 1 % of F_s, 0.2 % of k, 0.3 % of the sliding friction.
 
     Parameters
     ----------
@@ -176,6 +179,7 @@ def identify_signature(
         model=identified.parameters,
         exhibit=signature,
         stem=StemComparison(recording.sample_period, recording.position, validation.simulated),
+        sliding_speed=sliding_speed(ways),
     )
 
 
@@ -234,7 +238,8 @@ def _figures(ways: Ways, settings: IdentificationSettings) -> dict[str, float]:
     ]
     static_friction = given.get("static_friction", float(np.mean(pulls)))
     coulomb_friction = given.get("coulomb_friction", static_friction)
-    slip = static_friction - sliding_friction(ways, spring_constant)
+    sliding = sliding_friction(ways, spring_constant)
+    slip = static_friction - sliding
     leaving, speed = leaving_speed(ways), sliding_speed(ways)
     falling = slip / (leaving - speed) if leaving > speed else math.nan
     return {
@@ -243,6 +248,7 @@ def _figures(ways: Ways, settings: IdentificationSettings) -> dict[str, float]:
         "static_friction": static_friction,
         "coulomb_friction": coulomb_friction,
         "viscous_friction": _viscous_friction(ways, coulomb_friction, spring_constant, bias),
+        SLIDING: sliding,
         "slip": slip,
         "viscous_friction after a jump": falling,
         "coulomb_friction after a jump": static_friction - falling * leaving,
@@ -279,6 +285,7 @@ def _parameters(
         "static_friction": friction,
         "spring_constant": stiffness,
         "spring_preload": stiffness * place,
+        SLIDING: 0.5 * stiffness * abs(sliding_places(ways)) + FINEST_SLIDING * values[SLIDING],
     }
     least_slip = max(_SURE * errors["slip"], _LEAST_SLIP * values["static_friction"])
     jumps = values["slip"] > least_slip and "coulomb_friction" not in settings.fixed

@@ -30,6 +30,7 @@ __all__ = [
     "mean_position_bias",
     "mean_spring_constant",
     "sliding_friction",
+    "sliding_places",
     "sliding_speed",
     "valve_signature",
 ]
@@ -167,6 +168,14 @@ def sliding_friction(ways: Ways, spring_constant: float) -> float:
         for way in ways
     )
     return 0.5 * (upward - downward)
+
+
+def sliding_places(ways: Ways) -> float:
+    """Return how far the stem slides further out on its way up than on its way down, m."""
+    upward, downward = (
+        float(np.mean([np.mean(stroke.sliding.position) for stroke in way])) for way in ways
+    )
+    return upward - downward
 
 
 def sliding_speed(ways: Ways) -> float:

@@ -1,5 +1,6 @@
 """The baseline in force: parameter, service and history all set it here."""
 
+import math
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -18,20 +19,16 @@ def _value(baseline: Baseline | None) -> float | None:
     return None if baseline is None else baseline.coulomb_friction
 
 
-def _described(baseline: Baseline) -> str:
-    return f"baseline {baseline.coulomb_friction:.6g} ± {baseline.half_width:.2g} N"
-
-
 def _described_with_date(kept: KeptBaseline) -> str:
     date = datetime.fromtimestamp(kept.time / 1e9, timezone.utc)
-    return f"{_described(kept.baseline)}, set {date:%Y-%m-%d %H:%M} UTC"
+    return f"baseline {kept.baseline}, set {date:%Y-%m-%d %H:%M} UTC"
 
 
 class BaselineInForce:
     """Puts a baseline in force: that of the parameter, of ``~/set_baseline`` or of the history.
 
-    The parameter shows the value of the baseline in force. A parameter that is set to another
-    value stands for an exact baseline.
+    The parameter shows F_c of the baseline in force, nan where that has only a sliding friction. A
+    parameter that is set to another value stands for an exact F_c, and no sliding friction.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor) -> None:
@@ -46,7 +43,7 @@ class BaselineInForce:
             source = f"from the parameter {BASELINE.name}"
             if kept is not None:
                 source += f"; the history's is not used: {_described_with_date(kept)}"
-            log.info(f"{_described(given)}, {source}")
+            log.info(f"baseline {given}, {source}")
         elif kept is not None:
             self.put_in_force(kept.baseline)
             log.info(f"{_described_with_date(kept)}, from the history {history}")
@@ -54,7 +51,8 @@ class BaselineInForce:
     def put_in_force(self, baseline: Baseline) -> None:
         """Compare with this baseline from now on."""
         self._monitor.baseline = baseline
-        self._node.set_parameters([Parameter(BASELINE.name, value=baseline.coulomb_friction)])
+        shown = math.nan if baseline.coulomb_friction is None else baseline.coulomb_friction
+        self._node.set_parameters([Parameter(BASELINE.name, value=shown)])
 
     def follow_parameter(self) -> None:
         """Put the parameter's baseline in force, unless its value is in force already."""

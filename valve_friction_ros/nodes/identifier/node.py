@@ -224,10 +224,7 @@ class Identifier(PolledNode):
         self._baseline.put_in_force(baseline)
         await self._history.keep_baseline(baseline)
         self._publish_diagnostics()
-        return (
-            f"baseline: coulomb_friction {baseline.coulomb_friction:.6g} "
-            f"± {baseline.half_width:.2g} N{self._history.reservation}"
-        )
+        return f"baseline: {baseline}{self._history.reservation}"
 
     async def _clear(self) -> str:
         self._inputs.take()

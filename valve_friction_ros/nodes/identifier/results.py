@@ -4,7 +4,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
 
 from valve_friction_ros.health import FrictionMonitor, dead_band
-from valve_friction_ros.identification import UNITS, Result
+from valve_friction_ros.identification import SLIDING, UNITS, Result
 from valve_friction_ros.nodes.plumbing.messages import sweep_message
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
@@ -12,7 +12,8 @@ __all__ = ["ResultTopics"]
 
 _FIGURES = (
     "dead_band",
-    "coulomb_friction_ratio",
+    "friction_ratio",
+    "sliding_speed",
     "fit",
     "rms",
     "threshold",
@@ -21,17 +22,20 @@ _FIGURES = (
 )
 
 
+_FRICTIONS = (*UNITS, SLIDING)
+
+
 class ResultTopics:
     """Publishes each number of a result on a topic of its own, and the sweep."""
 
     def __init__(self, node: Node) -> None:
         self._friction = {
             name: node.create_publisher(Float64, f"~/friction/{name}", LATCHED)
-            for name in (*UNITS, *_FIGURES)
+            for name in (*_FRICTIONS, *_FIGURES)
         }
         self._half_width, self._published = (
-            {name: node.create_publisher(Float64, f"~/{kind}/{name}", LATCHED) for name in UNITS}
-            for kind in ("half_width", "published")
+            {name: node.create_publisher(Float64, f"~/{kind}/{name}", LATCHED) for name in names}
+            for kind, names in (("half_width", _FRICTIONS), ("published", UNITS))
         )
         self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
 
@@ -41,9 +45,11 @@ class ResultTopics:
         evidence = result.evidence
         unknown = float("nan")
         figures = {
+            SLIDING: unknown,
             **result.values,
             "dead_band": dead_band(result, monitor.settings.valve),
-            "coulomb_friction_ratio": unknown if ratio is None else ratio.value,
+            "friction_ratio": unknown if ratio is None else ratio.value,
+            "sliding_speed": result.sliding_speed,
             "fit": result.fit,
             "rms": result.rms,
             **{name: evidence.get(name, unknown) for name in ("threshold", "sigma", "r_squared")},
@@ -51,7 +57,8 @@ class ResultTopics:
         for name, publisher in self._friction.items():
             publisher.publish(Float64(data=figures[name]))
         for name, publisher in self._half_width.items():
-            publisher.publish(Float64(data=result.parameters[name].half_width))
+            one = result.parameters.get(name)
+            publisher.publish(Float64(data=unknown if one is None else one.half_width))
         for name, publisher in self._published.items():
             publisher.publish(Float64(data=result.parameters[name].published))
         self._sweep.publish(

@@ -6,9 +6,9 @@ from datetime import datetime, timezone
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from valve_friction_ros.health import FrictionMonitor, Level, StatusSignal, dead_band
+from valve_friction_ros.health import Baseline, FrictionMonitor, Level, StatusSignal, dead_band
 from valve_friction_ros.history import Trend
-from valve_friction_ros.identification import Result
+from valve_friction_ros.identification import SLIDING, Result
 
 __all__ = ["friction_status", "trend_values"]
 
@@ -33,6 +33,7 @@ def _result_values(result: Result, dead_band_share: float) -> dict[str, str]:
             values[f"{name} reason"] = parameter["reason"]
         if parameter["published"] is not None:
             values[f"{name} published [{unit}]"] = _number(parameter["published"])
+    values["sliding_speed [m/s]"] = _number(shown["sliding_speed"])
     if math.isfinite(dead_band_share):
         values["dead_band [%]"] = _number(100 * dead_band_share)
     if shown["rms"] is not None:
@@ -51,6 +52,20 @@ def _result_values(result: Result, dead_band_share: float) -> dict[str, str]:
     return values
 
 
+def _baseline_values(baseline: Baseline | None) -> dict[str, str]:
+    values: dict[str, str] = {}
+    if baseline is None:
+        return values
+    if baseline.coulomb_friction is not None:
+        values["baseline_coulomb_friction [N]"] = _number(baseline.coulomb_friction)
+        values["baseline half width [N]"] = _number(baseline.half_width)
+    if (sliding := baseline.sliding) is not None:
+        values["baseline_sliding_friction [N]"] = _number(sliding.value)
+        values["baseline_sliding_friction half width [N]"] = _number(sliding.half_width)
+        values["baseline_sliding_friction speed [m/s]"] = _number(sliding.speed)
+    return values
+
+
 def _date(time: int) -> str:
     return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d}"
 
@@ -60,8 +75,9 @@ def trend_values(trend: Trend | None) -> dict[str, str]:
     if trend is None or not trend.is_significant:
         return {}
     values = {
-        "coulomb_friction_drift [N/month]": _number(trend.drift),
-        "coulomb_friction_drift half width [N/month]": _number(trend.half_width),
+        "friction_drift [N/month]": _number(trend.drift),
+        "friction_drift half width [N/month]": _number(trend.half_width),
+        "friction_drift of": trend.what,
     }
     if trend.crossing is not None:
         values["limit_expected"] = trend.crossing.limit.value
@@ -92,10 +108,11 @@ def friction_status(
     elif upkeep_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
     result = monitor.result
-    friction = None if result is None else result.parameters["coulomb_friction"]
+    found = {} if result is None else result.parameters
+    frictions = [found[name] for name in (SLIDING, "coulomb_friction") if name in found]
     trouble = monitor.internal_error or monitor.refusal
-    valid = friction is not None and math.isfinite(friction.value) and trouble is None
-    reason = trouble or ("" if friction is None or valid else friction.reason)
+    valid = trouble is None and any(math.isfinite(one.value) for one in frictions)
+    reason = trouble or ("" if valid or not frictions else frictions[0].reason)
     values: dict[str, str] = {
         "estimate_valid": str(valid).lower(),
         "reason": reason,
@@ -104,12 +121,12 @@ def friction_status(
     if result is not None and monitor.stamp is not None:
         values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
         values |= _result_values(result, dead_band(result, monitor.settings.valve))
-    if monitor.baseline is not None:
-        values["baseline_coulomb_friction [N]"] = _number(monitor.baseline.coulomb_friction)
-        values["baseline half width [N]"] = _number(monitor.baseline.half_width)
-    if diagnosis.ratio is not None:
-        for bound, value in zip(("", " low", " high"), diagnosis.ratio, strict=True):
-            values[f"coulomb_friction_ratio{bound}"] = _number(value)
+    values |= _baseline_values(monitor.baseline)
+    if (ratio := diagnosis.ratio) is not None:
+        values["friction_ratio"] = _number(ratio.value)
+        values["friction_ratio low"] = _number(ratio.low)
+        values["friction_ratio high"] = _number(ratio.high)
+        values["friction_ratio of"] = ratio.what
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
     return _status(
