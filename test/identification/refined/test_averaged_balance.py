@@ -153,6 +153,17 @@ class TestModel:
         assert found.stem is None
 
 
+def test_sliding_friction_holds_the_truth(record):
+    """F_c + F_v·v at the mean speed over the distance, which the result tells."""
+    result = identified(record)
+    one = result.parameters["sliding_friction"]
+    truth = TRUTH["coulomb_friction"] + TRUTH["viscous_friction"] * result.sliding_speed
+    assert abs(one.value - truth) <= one.half_width
+    assert 0 < one.half_width < 0.2 * truth
+    velocity = np.abs(np.gradient(record.position, PERIOD))
+    assert result.sliding_speed == pytest.approx(np.sum(velocity**2) / np.sum(velocity), rel=0.02)
+
+
 def test_fixed_values_leave_the_balance(record):
     settings = IdentificationSettings(
         fixed={"spring_constant": 0.0, "mass": 20.0, "viscous_friction": 60.0}

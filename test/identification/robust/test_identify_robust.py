@@ -92,12 +92,18 @@ def test_late_stamps_are_found_on_random_levels():
 
 
 def test_late_stamps_are_in_the_interval_on_a_square_wave():
-    """There a delay is the same as a smaller stroke: k, F_c and F_0 make up for it."""
+    """There a delay is the same as a smaller stroke: k, F_c and F_0 make up for it.
+
+    F_0 may be off by more than its own size; then it is withheld, with its largest magnitude.
+    """
     settings = IdentificationSettings(timing_uncertainty=0.03)
     result = identify_robust(record(SquareWave().sample, late=0.02), BENCH_VALVE, settings)
     for name, true in TRUTH.items():
         one = result.parameters[name]
-        assert abs(one.value - true) <= one.half_width, name
+        if name == "spring_preload" and one.verdict is Verdict.NOT_IDENTIFIABLE:
+            assert true < one.magnitude_bound < 3 * true
+        else:
+            assert abs(one.value - true) <= one.half_width, name
 
 
 @pytest.mark.parametrize("command", [levels, SquareWave().sample], ids=["levels", "square"])

@@ -215,7 +215,7 @@ def averaged_balance(
         residual.size // stroke,
         window,
         change,
-        mean_speed(averaged.velocity[moving]),
+        mean_speed(averaged.velocity),
     )
 
 

@@ -22,6 +22,10 @@ _DRY_SHARES = (0.3, 0.5, 0.7, 0.85, 0.95, 1.0)
 _LAGS = (-2.0, -1.5, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 1.5, 2.0)
 """Lags to start from, in timing uncertainties."""
 
+_LEAST_VISCOUS = 0.1
+"""Share of the viscous friction that a start keeps: without any a stem swings, and no derivative
+tells the way."""
+
 
 @dataclass(frozen=True)
 class Sliding:
@@ -111,6 +115,7 @@ def lagging(at: Coordinates, timing_uncertainty: float) -> list[Coordinates]:
         for share in _LAGS:
             lag = share * timing_uncertainty
             viscous = at["viscous_friction"] - lag * at["spring_constant"]
+            least = _LEAST_VISCOUS * at["viscous_friction"]
             if lag > BOUNDS.get(name, -np.inf) and lag != 0.0:
-                starts.append({**at, name: lag, "viscous_friction": max(viscous, 0.0)})
+                starts.append({**at, name: lag, "viscous_friction": max(viscous, least)})
     return starts

@@ -172,10 +172,11 @@ def require_travel(recording: Recording, valve: Valve) -> None:
     if not np.isfinite(travel):
         return
     if lowest < -_OUTSIDE * travel or highest > (1 + _OUTSIDE) * travel:
+        question = position_question(max(-lowest, highest), travel)
         raise RefusalError(
             f"the stem position runs from {lowest:.4g} to {highest:.4g} m, the travel from 0 to "
             f"{travel:.4g} m: check that the signals are not swapped, and check unit (m), zero "
-            f"and travel: {position_question(max(-lowest, highest), travel)}"
+            f"and travel{question and f': {question}'}"
         )
     if highest - lowest < _LEAST_TRAVEL * travel:
         raise RefusalError(

@@ -148,9 +148,13 @@ def require_valve_units(valve: Valve, known: Mapping[str, float]) -> None:
 
 
 def position_question(place: float, travel: float) -> str:
-    """Ask for the unit in which a position that reads `place` m lies within the travel, m."""
+    """Ask for the unit in which a position that reads `place` m lies within the travel, m.
+
+    Empty if there is none.
+    """
     units = [unit for unit, size in _POSITION.items() if 0.1 <= place * size / travel <= 1.05]
-    return _question((*units, *_percent(place)), "m")
+    units.extend(_percent(place))
+    return _question(units, "m") if units else ""
 
 
 def time_remarks(recording: Recording, valve: Valve) -> tuple[str, ...]:
