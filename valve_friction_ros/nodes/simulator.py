@@ -26,6 +26,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
+from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.valve_parameters import (
     JOINT,
@@ -34,6 +35,7 @@ from valve_friction_ros.nodes.plumbing.valve_parameters import (
     karnopp_parameters_from,
     valve_from,
 )
+from valve_friction_ros.nodes.plumbing.worker import Worker
 
 __all__ = ["PARAMETERS", "Simulator", "main"]
 
@@ -81,7 +83,7 @@ class Simulator(PolledNode):
         self._stamp: int | None = None
         self._pressure = 0.0
         self._state = StemState(0.0)
-        compile_kernels()
+        self._readiness = Readiness(self, Worker("compile", compile_kernels), "the stem follows")
         self._publisher = self.create_publisher(
             JointState, "stem_state", stream(), qos_overriding_options=qos_overrides()
         )
@@ -92,6 +94,8 @@ class Simulator(PolledNode):
 
     def poll(self) -> None:
         """Let the stem follow the pressures that have arrived."""
+        if not self._readiness.look():
+            return  # they wait, up to 20 s of them
         for pressure in self._pressures.take():
             self._follow(pressure.message)
 
@@ -107,7 +111,9 @@ class Simulator(PolledNode):
             return
         if self._stamp is None or stamp < self._stamp:
             if self._stamp is not None:
-                self.get_logger().warning("stamps went back: the stem starts anew, at rest")
+                self.get_logger().warning(
+                    "stamps went back: the stem starts anew, at rest", throttle_duration_sec=5.0
+                )
             self._state = balanced_state(valve, parameters, pressure)
         else:
             self._state = advance(

@@ -1,5 +1,6 @@
 """Watch over an input topic: whether it arrives, and if not, why."""
 
+import time
 from collections.abc import Sequence
 
 from rclpy.node import Node
@@ -11,7 +12,7 @@ __all__ = ["InputWatch"]
 
 
 class InputWatch:
-    """Says what is wrong with one subscribed topic."""
+    """Says what is wrong with one subscribed topic; silence is real time, also with sim time."""
 
     def __init__(self, node: Node, subscription: Subscription) -> None:
         self._node = node
@@ -19,7 +20,7 @@ class InputWatch:
         self._topic = subscription.topic_name
         package = subscription.msg_type.__module__.split(".")[0]
         self._type = f"{package}/msg/{subscription.msg_type.__name__}"
-        self._since = node.get_clock().now().nanoseconds
+        self._since = time.monotonic()
         self._has_arrived = False
 
     @property
@@ -29,12 +30,12 @@ class InputWatch:
 
     def arrived(self) -> None:
         """Note that a message has come."""
-        self._since = self._node.get_clock().now().nanoseconds
+        self._since = time.monotonic()
         self._has_arrived = True
 
     def silence(self) -> float:
         """Return the time since the last message, or the start, s."""
-        return float(self._node.get_clock().now().nanoseconds - self._since) / 1e9
+        return time.monotonic() - self._since
 
     def is_used(self) -> bool:
         """Return whether a message has ever come, or the topic has a publisher."""
