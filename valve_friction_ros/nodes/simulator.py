@@ -1,6 +1,7 @@
 """Node `simulator`: a valve with Karnopp friction on real topics."""
 
 import sys
+from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -41,6 +42,11 @@ __all__ = ["PARAMETERS", "Simulator", "main"]
 
 _PAUSE = 0.02
 """Time between two looks for pressures, s: as often as `pressure_source` sends some."""
+
+_MOST = 1_000
+"""Pressures that the stem follows in one turn."""
+_MOST_WAITING = 20_000
+"""Pressures that wait until the model is compiled; then the oldest are given up."""
 
 _HIGHEST_PRESSURE = 1e9
 """Pressure, Pa, beyond any valve: a larger number may overflow the model."""
@@ -87,6 +93,7 @@ class Simulator(PolledNode):
         self._publisher = self.create_publisher(
             JointState, "stem_state", stream(), qos_overriding_options=qos_overrides()
         )
+        self._waiting: deque[FluidPressure] = deque(maxlen=_MOST_WAITING)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
 
     def _take_parameters(self, _: object) -> None:
@@ -94,10 +101,12 @@ class Simulator(PolledNode):
 
     def poll(self) -> None:
         """Let the stem follow the pressures that have arrived."""
+        # Taken at once: a reliable subscription that is not emptied slows its publishers down.
+        self._waiting.extend(taken.message for taken in self._pressures.take())
         if not self._readiness.look():
-            return  # they wait, up to 20 s of them
-        for pressure in self._pressures.take():
-            self._follow(pressure.message)
+            return
+        for _ in range(min(len(self._waiting), _MOST)):
+            self._follow(self._waiting.popleft())
 
     def _follow(self, message: FluidPressure) -> None:
         stamp, pressure = stamp_of(message.header.stamp), message.fluid_pressure

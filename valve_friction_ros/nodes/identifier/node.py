@@ -261,6 +261,7 @@ class Identifier(PolledNode):
 
     def _publish_diagnostics(self) -> None:
         self._inputs.take()
+        self._inputs.follow_publishers()
         now = self.get_clock().now()
         status = friction_status(
             self._monitor,
