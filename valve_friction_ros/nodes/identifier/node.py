@@ -15,6 +15,7 @@ from valve_friction_ros.identification.preparation import compile_methods
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.level_log import LevelLog
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
     IDENTIFICATION_LIMIT,
@@ -89,6 +90,7 @@ class Identifier(PolledNode):
         pressure, stem, _ = self._inputs.names
         self._readiness = Readiness(self, worker, f"identifies {pressure} and {stem}")
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
+        self._level_log = LevelLog(self)
         self._identifying = False
         self._identified_until: int | None = None
         waiting = ReentrantCallbackGroup()
@@ -169,9 +171,10 @@ class Identifier(PolledNode):
         try:
             await self._identified(record)
         except RefusalError as refusal:
+            # What the inputs lack is the cause where there are no samples.
+            refused = RefusalError("; ".join((*self._input_problems(), str(refusal))))
             self._monitor.refuse(refusal)
-            self.get_logger().warning(f"identification refused: {refusal}")
-            refused = refusal
+            self.get_logger().warning(f"identification refused: {refused}")
         except InternalError:
             self._publish_diagnostics()
             raise
@@ -219,6 +222,7 @@ class Identifier(PolledNode):
                 result = await done_in(self._worker, identify_snapshot, *record)
                 self._monitor.accept(result, self.get_clock().now().nanoseconds)
                 self._results.publish(result, self._monitor)
+                self.get_logger().info(f"identified: {self._monitor.diagnosis().message}")
         except InternalError as error:
             self._monitor.fail(str(error))
             raise
@@ -246,7 +250,9 @@ class Identifier(PolledNode):
         self._baseline.put_in_force(baseline)
         await self._history.keep_baseline(baseline)
         self._publish_diagnostics()
-        return f"baseline: {baseline}{self._history.reservation}"
+        answer = f"baseline: {baseline}{self._history.reservation}"
+        self.get_logger().info(answer)
+        return answer
 
     async def _clear(self) -> str:
         self._inputs.take()
@@ -274,6 +280,7 @@ class Identifier(PolledNode):
         )
         if (preparing := self._readiness.problem) is not None:
             status.message = f"{preparing}; {status.message}"
+        self._level_log.follow(status)
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()
         self._diagnostics_publisher.publish(message)
