@@ -3,9 +3,9 @@
 ``ros2 launch valve_friction_ros monitor.launch.py valves:=fv_101,fv_102
 pressure_topic:='/plant/{valve}/pressure' stem_topic:='/plant/{valve}/stem'``
 
-In place of the list, ``valves:=plant.yaml`` names a file: a list of valves, or each with its topics::
+In place of the list, ``valves:=plant.yaml`` names a file: a list of valves, or each with topics::
 
-    fv_101: {pressure_topic: /plant/fv_101/pressure, stem_topic: /plant/fv_101/stem}
+    fv_101: {pressure_topic: /plant/p101, stem_topic: /plant/x101}
     fv_102:
 """
 
