@@ -44,7 +44,12 @@ class HistoryWriter:
         self._monitor = monitor
         self._valve = KeptValve(node.get_fully_qualified_name(), tag)
         path = node.get_parameter(HISTORY_FILE.name).value
-        self._file = HistoryFile(Path(path).expanduser()) if path else None
+        try:
+            self._file = HistoryFile(Path(path).expanduser()) if path else None
+        except RuntimeError as error:  # pathlib's
+            raise ValueError(
+                f"{HISTORY_FILE.name} {path}: {error} Set HOME or ROS_HOME, or name another file"
+            ) from None
         self._writer = Worker("history", finishes=True)
         self._waiting: deque[Callable[[HistoryFile], None]] = deque(maxlen=_MOST_WAITING)
         self._problem: str | None = None

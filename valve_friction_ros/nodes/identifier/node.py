@@ -278,9 +278,9 @@ class Identifier(PolledNode):
             self._history.problems,
             {**trend_values(self._history.trend), **self._schedule.values()},
         )
+        self._level_log.follow(status)
         if (preparing := self._readiness.problem) is not None:
             status.message = f"{preparing}; {status.message}"
-        self._level_log.follow(status)
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()
         self._diagnostics_publisher.publish(message)

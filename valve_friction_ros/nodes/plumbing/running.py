@@ -35,7 +35,10 @@ _WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, Va
 
 def _cannot_start(error: Exception) -> int:
     """Write what was wrong in one line, and return the exit code."""
-    print(f"cannot start: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
+    cause = " ".join(str(error).split())
+    if "log directory" in cause or "logging directory" in cause:  # rcl's words
+        cause += ": set ROS_LOG_DIR to a folder that can be written"
+    print(f"cannot start: {cause}", file=sys.stderr)  # noqa: T201
     return 2
 
 
