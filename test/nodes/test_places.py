@@ -1,7 +1,7 @@
 """Where nothing can be written and no home is known: a start, or one line that says what to set."""
 
 import pytest
-from live_nodes import Domain, NodeProcess
+from live_nodes import Domain, NodeProcess, values_of
 
 from valve_friction_ros.records.data_folder import data_folder
 
@@ -58,3 +58,28 @@ def test_compiled_code_without_a_place_is_said(live, tmp_path):
     live.client.wait_until(lambda: "ready: " in process.errors, "the ready line")
     assert "at each start, because no folder for it can be written" in process.errors
     assert "set NUMBA_CACHE_DIR" in process.errors
+
+
+def test_diagnostics_say_that_it_prepares(live, tmp_path):
+    script = tmp_path / "slow_preparation.py"
+    script.write_text(
+        "import sys, time\n"
+        "from pathlib import Path\n"
+        "import valve_friction_ros.nodes.plumbing.readiness as readiness\n"
+        "from valve_friction_ros.nodes.identifier import node\n"
+        "readiness._QUICK = 0.0\n"
+        "def prepare():\n"
+        "    while not Path('prepared').exists():\n"
+        "        time.sleep(0.05)\n"
+        "node.compile_methods = prepare\n"
+        "sys.exit(node.main())\n"
+    )
+    process = live.start("identifier", {"input_timeout": 600.0}, script=script)
+    status = live.client.next_status()
+    assert values_of(status)["preparing"].startswith("preparing: numeric code is compiled")
+    assert status.message.endswith(values_of(status)["preparing"])
+    assert "ready: " not in process.errors
+    (tmp_path / "prepared").touch()
+    status = live.client.next_status(lambda one: "preparing" not in values_of(one), "its end")
+    assert "preparing" not in status.message
+    assert "ready: " in process.errors

@@ -276,11 +276,15 @@ class Identifier(PolledNode):
             now.nanoseconds,
             [*filter(None, [self.overdue()]), *self._input_problems()],
             self._history.problems,
-            {**trend_values(self._history.trend), **self._schedule.values()},
+            {
+                **trend_values(self._history.trend),
+                **self._schedule.values(),
+                **self._readiness.values(),
+            },
         )
         self._level_log.follow(status)
-        if (preparing := self._readiness.problem) is not None:
-            status.message = f"{preparing}; {status.message}"
+        if self._readiness.is_slow:
+            status.message += f"; {self._readiness.problem}"
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()
         self._diagnostics_publisher.publish(message)

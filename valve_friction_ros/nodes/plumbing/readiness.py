@@ -9,7 +9,7 @@ from valve_friction_ros.nodes.plumbing.worker import Worker
 
 __all__ = ["Readiness"]
 
-_QUICK = 3.0
+_QUICK = 5.0
 """Time, s, of a preparation that is not worth a line."""
 
 
@@ -35,6 +35,15 @@ class Readiness:
             "written: set NUMBA_CACHE_DIR to one"
         )
 
+    @property
+    def is_slow(self) -> bool:
+        """Whether the preparation is worth a line: it lasts longer than loading does."""
+        return self.problem is not None and time.monotonic() > self._tell_at
+
+    def values(self) -> dict[str, str]:
+        """Return the value of the diagnostic while the node is preparing."""
+        return {} if self.problem is None else {"preparing": self.problem}
+
     def look(self) -> bool:
         """Return whether the node is ready; log what has not been logged."""
         if self._is_ready:
@@ -43,7 +52,7 @@ class Readiness:
         if problem is None:
             self._is_ready = True
             log.info(f"ready: {self._ready}")
-        elif not self._has_told and time.monotonic() > self._tell_at:
+        elif not self._has_told and self.is_slow:
             self._has_told = True
             log.info(problem)
         return self._is_ready
