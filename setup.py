@@ -42,6 +42,7 @@ setup(
         "rosbags",
         "scipy",
     ],
+    extras_require={"test": ["pytest"]},  # by which `colcon test` knows that there are tests
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -1,12 +1,19 @@
-"""An identifier for each valve of a list, each in the valve's namespace.
+"""The identifiers of a plant's valves, each in its valve's namespace, in one process.
 
 ``ros2 launch valve_friction_ros monitor.launch.py valves:=fv_101,fv_102
 pressure_topic:='/plant/{valve}/pressure' stem_topic:='/plant/{valve}/stem'``
+
+In place of the list, ``valves:=plant.yaml`` names a file: a list of valves, or each with topics::
+
+    fv_101: {pressure_topic: /plant/p101, stem_topic: /plant/x101}
+    fv_102:
 """
 
 import re
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import yaml
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
@@ -16,48 +23,127 @@ from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = "valve_friction_ros"
 NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+INPUTS = {"pressure_topic": "actuator_pressure", "stem_topic": "stem_state"}
+"""Arguments, and keys of a file of valves, with the name that each remaps."""
 
 
-def valve_names(text: str) -> list[str]:
-    """Split a list of valves at commas and spaces; refuse what ROS takes for no namespace."""
-    names = text.replace(",", " ").split()
+class PlantValve(NamedTuple):
+    """A valve of the plant: its namespace, and its topics by argument."""
+
+    namespace: str
+    topics: dict[str, str]
+
+    def remappings(self, within: str) -> list[tuple[str, str]]:
+        """Remap the inputs, whose names begin with `within`."""
+        return [(within + INPUTS[argument], topic) for argument, topic in self.topics.items()]
+
+    def qualities(self, reliability: str) -> dict[str, str]:
+        """Return the parameters that override the reliability of the inputs."""
+        if reliability == "auto":
+            return {}
+        names = [topic if topic.startswith("/") else f"{self.namespace}/{topic}"
+                 for topic in self.topics.values()]  # fmt: skip
+        return {f"qos_overrides.{name}.subscription.reliability": reliability for name in names}
+
+
+def listed(text: str) -> dict[str, Any]:
+    """Return the valves of a list, or of a YAML file, with what the file says of each."""
+    if not text.endswith((".yaml", ".yml")):
+        names = text.replace(",", " ").split()
+        found: Any = names
+    else:
+        if not Path(text).is_file():
+            raise ValueError(f"valves '{text}' is no file: give its path, or a list of valves")
+        found = yaml.safe_load(Path(text).read_text(encoding="utf-8")) or []
+        names = list(found)
     if not names:
         raise ValueError("no valve given: name at least one, as in valves:=fv_101,fv_102")
-    for name in names:
+    repeated = sorted({str(name) for name in names if names.count(name) > 1})
+    if repeated:
+        raise ValueError(f"valve '{repeated[0]}' is listed twice: name each valve once")
+    return {str(name): (found[name] if isinstance(found, dict) else None) or {} for name in names}
+
+
+def plant_valves(text: str, usual: dict[str, str]) -> list[PlantValve]:
+    """Read the valves; ``{valve}`` in a usual topic stands for the valve's name."""
+    valves = []
+    for name, given in listed(text).items():
         if not NAMESPACE.fullmatch(name):
             raise ValueError(
                 f"valve '{name}' is no ROS namespace: use letters, digits and underscores, "
                 "as in valves:=fv_101,fv_102"
             )
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise ValueError(f"valve '{repeated[0]}' is listed twice: name each valve once")
-    return names
+        unknown = sorted(set(given) - set(INPUTS))
+        if unknown:
+            raise ValueError(
+                f"valve '{name}' has the unknown key '{unknown[0]}': use {' and '.join(INPUTS)}; "
+                "parameters of one valve stand in the config"
+            )
+        place = name.strip("/")
+        topics = {key: topic.replace("{valve}", place) for key, topic in usual.items()}
+        valves.append(PlantValve(f"/{place}", {**topics, **given}))
+    return valves
 
 
 def identifiers(context: LaunchContext) -> list[Node]:
-    """Make an identifier for each valve; ``{valve}`` in a topic stands for the valve's name."""
-    config = LaunchConfiguration("config").perform(context)
-    if not Path(config).is_file():
-        raise ValueError(f"config '{config}' is no file: give the path of a parameter file")
-    pressure = LaunchConfiguration("pressure_topic").perform(context)
-    stem = LaunchConfiguration("stem_topic").perform(context)
+    """Make one process for all valves, or one for each."""
+
+    def argument(name: str) -> str:
+        return str(LaunchConfiguration(name).perform(context))
+
+    if not Path(argument("config")).is_file():
+        raise ValueError(f"config '{argument('config')}' is no file: give that of a parameter file")
+    valves = plant_valves(argument("valves"), {name: argument(name) for name in INPUTS})
     use_sim_time = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
+    shared = {"use_sim_time": use_sim_time}
+    for valve in valves:
+        shared |= valve.qualities(argument("reliability"))
+    common = {
+        "package": PACKAGE,
+        "output": "screen",
+        "respawn": LaunchConfiguration("respawn"),
+        "respawn_delay": 2.0,
+        "ros_arguments": ["--log-level", argument("log_level")],
+    }
+    if argument("one_process").lower() in {"true", "1"}:
+        remappings = [rule for one in valves for rule in one.remappings(f"{one.namespace}/")]
+        names = {"valves": [valve.namespace for valve in valves]}
+        parameters = [argument("config"), shared | names]
+        return [
+            Node(executable="identifiers", parameters=parameters, remappings=remappings, **common)
+        ]
     return [
         Node(
-            package=PACKAGE,
             executable="identifier",
             name="identifier",
-            namespace=valve,
-            parameters=[config, {"use_sim_time": use_sim_time}],
-            remappings=[
-                ("actuator_pressure", pressure.replace("{valve}", valve.strip("/"))),
-                ("stem_state", stem.replace("{valve}", valve.strip("/"))),
-            ],
-            output="screen",
+            namespace=valve.namespace,
+            parameters=[argument("config"), shared],
+            remappings=valve.remappings(""),
+            **common,
         )
-        for valve in valve_names(LaunchConfiguration("valves").perform(context))
+        for valve in valves
     ]
+
+
+ARGUMENTS = {
+    "valves": (
+        "fv_101",
+        "Namespaces of the valves, separated by commas, or a YAML file of valves.",
+    ),
+    "pressure_topic": (
+        "actuator_pressure",
+        "Actuator pressure, sensor_msgs/FluidPressure; may contain {valve}.",
+    ),
+    "stem_topic": ("stem_state", "Stem position, sensor_msgs/JointState; may contain {valve}."),
+    "one_process": ("true", "false to start a process for each valve."),
+    "respawn": ("false", "true to start a process again that has ended."),
+    "log_level": ("info", "debug, info, warn, error or fatal."),
+    "use_sim_time": ("false", "true to take time from /clock, as when a bag is played."),
+    "reliability": (
+        "auto",
+        "Of the inputs: auto takes what is published; reliable; best_effort.",
+    ),
+}
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -65,30 +151,14 @@ def generate_launch_description() -> LaunchDescription:
     default_config = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", "monitor.yaml"])
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "valves",
-                default_value="fv_101",
-                description="Namespaces of the valves, separated by commas.",
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=description)
+                for name, (default, description) in ARGUMENTS.items()
             ),
             DeclareLaunchArgument(
                 "config",
                 default_value=default_config,
                 description="Parameter file for the identifiers.",
-            ),
-            DeclareLaunchArgument(
-                "pressure_topic",
-                default_value="actuator_pressure",
-                description="Actuator pressure, sensor_msgs/FluidPressure; may contain {valve}.",
-            ),
-            DeclareLaunchArgument(
-                "stem_topic",
-                default_value="stem_state",
-                description="Stem position, sensor_msgs/JointState; may contain {valve}.",
-            ),
-            DeclareLaunchArgument(
-                "use_sim_time",
-                default_value="false",
-                description="true to take time from /clock, as when a bag is played.",
             ),
             OpaqueFunction(function=identifiers),
         ]

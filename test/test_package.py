@@ -13,6 +13,8 @@ import time
 import xml.etree.ElementTree as ET
 from configparser import ConfigParser
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 import rclpy
@@ -89,6 +91,72 @@ def test_launch_file(name):
     namespace = {"__name__": path.stem}
     exec(code, namespace)
     assert namespace["generate_launch_description"]().entities
+
+
+@pytest.fixture
+def monitor(monkeypatch):
+    """The launch file of a plant, with stand-ins for launch, which comes with ROS only."""
+    for name in ("launch", "launch.actions", "launch.substitutions", "launch_ros",
+                 "launch_ros.actions", "launch_ros.parameter_descriptions",
+                 "launch_ros.substitutions"):  # fmt: skip
+        monkeypatch.setitem(sys.modules, name, MagicMock())
+    namespace = {"__name__": "monitor"}
+    exec((PROJECT / "launch" / "monitor.launch.py").read_text(), namespace)
+    return SimpleNamespace(**namespace)
+
+
+USUAL = {"pressure_topic": "/plant/{valve}/pressure", "stem_topic": "stem"}
+
+
+def test_a_list_of_valves(monitor):
+    one, other = monitor.plant_valves("fv_101, area/fv_102", USUAL)
+    assert one.namespace == "/fv_101"
+    assert one.remappings("/fv_101/") == [
+        ("/fv_101/actuator_pressure", "/plant/fv_101/pressure"),
+        ("/fv_101/stem_state", "stem"),
+    ]
+    assert other.remappings("")[0] == ("actuator_pressure", "/plant/area/fv_102/pressure")
+    assert one.qualities("auto") == {}
+    prefix = "qos_overrides.{}.subscription.reliability"
+    assert other.qualities("reliable") == {
+        prefix.format("/plant/area/fv_102/pressure"): "reliable",
+        prefix.format("/area/fv_102/stem"): "reliable",
+    }
+
+
+def test_a_file_of_valves(monitor, tmp_path):
+    file = tmp_path / "plant.yaml"
+    file.write_text("fv_101: {stem_topic: /x101}\nfv_102:\n")
+    one, other = monitor.plant_valves(str(file), USUAL)
+    assert dict(one.remappings(""))["stem_state"] == "/x101"
+    assert dict(one.remappings(""))["actuator_pressure"] == "/plant/fv_101/pressure"
+    assert other.topics == {**USUAL, "pressure_topic": "/plant/fv_102/pressure"}
+    file.write_text("[fv_101, fv_102]")
+    assert [valve.namespace for valve in monitor.plant_valves(str(file), USUAL)] == [
+        "/fv_101",
+        "/fv_102",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no valve given"),
+        ("fv_101 fv_101", "'fv_101' is listed twice"),
+        ("fv-101", "'fv-101' is no ROS namespace"),
+        ("missing.yaml", "'missing.yaml' is no file"),
+    ],
+)
+def test_wrong_lists_of_valves(monitor, text, words):
+    with pytest.raises(ValueError, match=words):
+        monitor.plant_valves(text, USUAL)
+
+
+def test_an_unknown_key_of_a_valve(monitor, tmp_path):
+    file = tmp_path / "plant.yaml"
+    file.write_text("fv_101: {topic: /x101}")
+    with pytest.raises(ValueError, match="unknown key 'topic': use pressure_topic and stem_topic"):
+        monitor.plant_valves(str(file), USUAL)
 
 
 @pytest.fixture(scope="module")

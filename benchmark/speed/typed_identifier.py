@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -58,7 +57,7 @@ def main() -> int:
     for create in ("create_publisher", "create_subscription"):  # with its callbacks for events
         setattr(identifier.Identifier, create, getattr(Node, create))
     rclpy.init()
-    with ThreadPoolExecutor(max_workers=1) as worker:
+    with identifier.identification_worker() as worker:
         node = identifier.Identifier(worker)
         try:
             rclpy.spin(node)

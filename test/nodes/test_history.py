@@ -135,7 +135,7 @@ def test_a_history_that_cannot_be_written(live, tmp_path):
     answer = client.trigger("set_baseline")
     assert answer.success
     assert f"lost with this node: {cause}" in answer.message
-    assert len(logged(live, node, cause)) == 1
+    assert len(logged(live, node, f"]: {cause}")) == 1
 
     blocked.unlink()
     assert client.trigger("identify").success

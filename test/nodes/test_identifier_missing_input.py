@@ -64,14 +64,33 @@ def test_silent_publisher(client):
         warned_of(client, STEM, "nobody publishes it")
 
 
-def test_incompatible_quality_of_service(client):
+def sends_until_taken(client, made):
+    """Publish stem positions until some have got into the buffer."""
+    stamp = START
+
+    def is_taken():
+        nonlocal stamp
+        stamp += 20_000_000
+        message = JointState(name=["stem"], position=[0.0])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        made.publish(message)
+        return STEM not in client.statuses[-1][1].message
+
+    client.wait_until(is_taken, "samples of the stem")
+
+
+def test_best_effort_and_reliable_publishers_alike(client):
     best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-    with publisher(client, JointState, STEM, best_effort) as lossy:
-        lossy.publish(JointState(name=["stem"], position=[0.0]))
-        status = warned_of(client, STEM, "quality of service")
-        assert status.level == WARN
-        remedy = f"qos_overrides.{STEM}.subscription.reliability:=best_effort"
-        assert remedy in status.message
+    for quality in (best_effort, STREAM, best_effort):
+        warned_of(client, STEM, "nobody publishes it")
+        with publisher(client, JointState, STEM, quality) as made:
+            sends_until_taken(client, made)
+    warned_of(client, STEM, "nobody publishes it")
+    with (
+        publisher(client, JointState, STEM),
+        publisher(client, JointState, STEM, best_effort) as made,
+    ):
+        sends_until_taken(client, made)
 
 
 def test_data_end_the_warning(client):

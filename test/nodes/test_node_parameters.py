@@ -133,6 +133,29 @@ def test_new_window_empties_the_buffer_and_says_so(client):
     assert client.set_together(NODE, {"window": 60.0}).successful
 
 
+@pytest.mark.parametrize("text", [".nan", "nan"])
+def test_numbers_may_be_texts(client, text):
+    """ros2 param load sends .nan and 1e-06 so."""
+    assert client.set_together(NODE, {"assumed_mass": "1e-06", "fixed.mass": text}).successful
+    mass, fixed = client.parameters(NODE, "assumed_mass", "fixed.mass")
+    assert mass == 1e-6
+    assert math.isnan(fixed)
+
+
+def test_no_clock_is_said(live):
+    live.start("identifier", {"use_sim_time": True})
+    client = live.client
+    status = client.next_status(lambda one: "no time on /clock" in one.message, "a warning")
+    assert status.level == b"\x01"
+    clock = client.node.create_publisher(Clock, "/clock", STREAM)
+
+    def is_quiet():
+        clock.publish(Clock(clock=time_of(5000 * SECOND)))
+        return "/clock" not in client.statuses[-1][1].message
+
+    client.wait_until(is_quiet, "a status without the warning")
+
+
 def test_simulated_time(live):
     live.start_identifier()
     client = live.client

@@ -17,10 +17,12 @@ from typing import Any, ParamSpec, TypeVar
 
 import numba
 
-__all__ = ["compiled", "compiled_products", "compiled_reductions"]
+__all__ = ["compiled", "compiled_products", "compiled_reductions", "kernels_are_cached"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
+
+_without_cache: set[str] = set()
 
 
 @cache
@@ -39,12 +41,18 @@ def _kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
         kernel = numba.njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:  # numba's "cannot cache function: no locator available"
         kernel = numba.njit(nogil=True, **options)(function)
+        _without_cache.add(function.__name__)
     folders = (Path(function.__code__.co_filename).parent, Path(__file__).parent)
     # Numba renews a cache when the kernel's own file changes, and has nothing public to widen that.
     # A plain function, and a kernel without a cache, have no such attribute.
     with contextlib.suppress(AttributeError):
         kernel._cache._cache_file._source_stamp = tuple(map(_sources, folders))  # noqa: SLF001
     return kernel  # type: ignore[no-any-return]
+
+
+def kernels_are_cached() -> bool:
+    """Return whether there is a place where compiled kernels are kept for the next process."""
+    return not _without_cache
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
@@ -11,6 +10,7 @@ from valve_friction_ros.nodes.identifier import parameters
 from valve_friction_ros.nodes.identifier.node import Identifier, identification_worker
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
 from valve_friction_ros.nodes.plumbing.running import run_nodes
+from valve_friction_ros.nodes.plumbing.worker import Worker
 
 __all__ = ["PARAMETERS", "identifiers_of_valves", "main"]
 
@@ -21,7 +21,7 @@ PARAMETERS = (_VALVES, *parameters.PARAMETERS)
 """Its own, and those of its identifiers."""
 
 
-def identifiers_of_valves(worker: ThreadPoolExecutor) -> Iterator[Node]:
+def identifiers_of_valves(worker: Worker) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve of its parameter.
 
     Raises

@@ -120,6 +120,7 @@ class PressureSource(PolledNode):
         self._publisher = self.create_publisher(
             FluidPressure, "actuator_pressure", stream(), qos_overriding_options=qos_overrides()
         )
+        self.get_logger().info(f"ready: publishes {self._publisher.topic_name}")
 
     def poll(self) -> None:
         """Publish all samples whose time has come since the last block."""

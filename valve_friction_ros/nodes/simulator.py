@@ -1,6 +1,7 @@
 """Node `simulator`: a valve with Karnopp friction on real topics."""
 
 import sys
+from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -26,6 +27,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
+from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.valve_parameters import (
     JOINT,
@@ -34,11 +36,17 @@ from valve_friction_ros.nodes.plumbing.valve_parameters import (
     karnopp_parameters_from,
     valve_from,
 )
+from valve_friction_ros.nodes.plumbing.worker import Worker
 
 __all__ = ["PARAMETERS", "Simulator", "main"]
 
 _PAUSE = 0.02
 """Time between two looks for pressures, s: as often as `pressure_source` sends some."""
+
+_MOST = 1_000
+"""Pressures that the stem follows in one turn."""
+_MOST_WAITING = 20_000
+"""Pressures that wait until the model is compiled; then the oldest are given up."""
 
 _HIGHEST_PRESSURE = 1e9
 """Pressure, Pa, beyond any valve: a larger number may overflow the model."""
@@ -81,10 +89,11 @@ class Simulator(PolledNode):
         self._stamp: int | None = None
         self._pressure = 0.0
         self._state = StemState(0.0)
-        compile_kernels()
+        self._readiness = Readiness(self, Worker("compile", compile_kernels), "the stem follows")
         self._publisher = self.create_publisher(
             JointState, "stem_state", stream(), qos_overriding_options=qos_overrides()
         )
+        self._waiting: deque[FluidPressure] = deque(maxlen=_MOST_WAITING)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
 
     def _take_parameters(self, _: object) -> None:
@@ -92,8 +101,12 @@ class Simulator(PolledNode):
 
     def poll(self) -> None:
         """Let the stem follow the pressures that have arrived."""
-        for pressure in self._pressures.take():
-            self._follow(pressure.message)
+        # Taken at once: a reliable subscription that is not emptied slows its publishers down.
+        self._waiting.extend(taken.message for taken in self._pressures.take())
+        if not self._readiness.look():
+            return
+        for _ in range(min(len(self._waiting), _MOST)):
+            self._follow(self._waiting.popleft())
 
     def _follow(self, message: FluidPressure) -> None:
         stamp, pressure = stamp_of(message.header.stamp), message.fluid_pressure
@@ -107,7 +120,9 @@ class Simulator(PolledNode):
             return
         if self._stamp is None or stamp < self._stamp:
             if self._stamp is not None:
-                self.get_logger().warning("stamps went back: the stem starts anew, at rest")
+                self.get_logger().warning(
+                    "stamps went back: the stem starts anew, at rest", throttle_duration_sec=5.0
+                )
             self._state = balanced_state(valve, parameters, pressure)
         else:
             self._state = advance(

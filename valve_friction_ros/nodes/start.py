@@ -1,23 +1,32 @@
 """Entry points of the nodes, light enough to be interrupted before a node is imported."""
 
 import importlib
+import os
+import signal
 import sys
 
 __all__ = ["identifier", "identifiers", "pressure_source", "simulator"]
 
 
+def _end(*_: object) -> None:
+    os._exit(0)
+
+
 def _start(node: str) -> int:
-    """Import and run a node; Ctrl-C while it is still being imported ends quietly too."""
-    try:
-        module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
-        if {"-h", "--help"} & set(sys.argv[1:]):
-            usage = importlib.import_module("valve_friction_ros.nodes.plumbing.usage")
-            print(usage.usage(node.split(".", maxsplit=1)[0], module.__doc__, module.PARAMETERS))  # noqa: T201
-            return 0
-        exit_code: int = module.main()
-    except KeyboardInterrupt:
+    """Import and run a node; Ctrl-C or SIGTERM while it is still being imported ends it at once."""
+    # An exception in the midst of an import may be lost there.
+    for request in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(request, _end)
+    module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        usage = importlib.import_module("valve_friction_ros.nodes.plumbing.usage")
+        print(usage.usage(node.split(".", maxsplit=1)[0], module.__doc__, module.PARAMETERS))  # noqa: T201
         return 0
-    return exit_code
+    exit_code: int = module.main()
+    # All is closed: Python would take a second more to take its modules apart.
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(exit_code)
 
 
 def identifier() -> int:

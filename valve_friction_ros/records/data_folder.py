@@ -1,5 +1,6 @@
 """Default folder of the files of nodes."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -7,9 +8,15 @@ __all__ = ["data_folder", "history_file"]
 
 
 def data_folder() -> Path:
-    """Return the package's folder under ROS_HOME, or under ~/.ros without it."""
-    home = os.environ.get("ROS_HOME")
-    return (Path(home) if home else Path.home() / ".ros") / "valve_friction_ros"
+    """Return the package's folder under ROS_HOME, or under ~/.ros without it.
+
+    Where the home directory is not known, the path begins with ``~``.
+    """
+    home = os.environ.get("ROS_HOME") or Path("~/.ros")
+    folder = Path(home) / "valve_friction_ros"
+    with contextlib.suppress(RuntimeError):
+        return folder.expanduser()
+    return folder
 
 
 def history_file() -> Path:

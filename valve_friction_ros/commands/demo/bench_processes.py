@@ -2,15 +2,20 @@
 
 import contextlib
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["NodeProcess", "quick_discovery", "running_nodes"]
+from valve_friction_ros.commands.demo.bench_client import BenchError
+
+__all__ = ["NodeProcess", "free_domain", "quick_discovery", "running_nodes"]
 
 _STOP_TIMEOUT = 5.0
+_DOMAINS = 100
+"""Domains 1 to 100: a larger number may collide with ports that the system gives away."""
 _PROFILE = Path(__file__).with_name("fast_discovery.xml")
 
 
@@ -31,6 +36,32 @@ def quick_discovery() -> dict[str, str]:
         "FASTRTPS_DEFAULT_PROFILES_FILE": str(_PROFILE),
     }
     return {name: value for name, value in wanted.items() if name not in os.environ}
+
+
+@contextlib.contextmanager
+def free_domain() -> Iterator[int]:
+    """Provide a ROS domain that the user has not set and no other demo of this machine uses.
+
+    A domain of a running bench would show its topics here, under the same names. An abstract
+    socket of the domain's number is held as long as the domain is in use.
+    """
+    set_already = os.environ.get("ROS_DOMAIN_ID", "0")
+    first = os.getpid() % _DOMAINS
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
+        for step in range(_DOMAINS):
+            number = 1 + (first + step) % _DOMAINS
+            if str(number) != set_already and _is_bound(claim, number):
+                yield number
+                return
+    raise BenchError("no ROS domain is free: end another demo")
+
+
+def _is_bound(claim: socket.socket, number: int) -> bool:
+    try:
+        claim.bind(f"\0valve_friction_ros/domain/{number}")
+    except OSError:  # in use
+        return False
+    return True
 
 
 def _command(node: NodeProcess, namespace: str) -> list[str]:

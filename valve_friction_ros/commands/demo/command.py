@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
 from valve_friction_ros.commands.demo.bench_processes import (
     NodeProcess,
+    free_domain,
     quick_discovery,
     running_nodes,
 )
@@ -146,7 +147,12 @@ def run(options: argparse.Namespace) -> int:
     console = OutputConsole(width=None if sys.stdout.isatty() else _PRINTED_WIDTH)
     require_picture_file(options.output)
     os.environ.update(quick_discovery())
-    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    with free_domain() as domain:
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        return _demonstrated(options, console)
+
+
+def _demonstrated(options: argparse.Namespace, console: Console) -> int:
     with running_nodes(_nodes(), _NAMESPACE):
         # Ctrl-C is Python's own: the handler of rclpy would end the context under the client.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

@@ -3,7 +3,6 @@
 import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -22,11 +21,14 @@ from valve_friction_ros.history import (
 )
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
+from valve_friction_ros.nodes.plumbing.worker import Worker
 
 __all__ = ["HistoryWriter"]
 
 _MOST_WAITING = 1000
 """Changes that wait for a file that cannot be written; then the oldest are given up."""
+_LONGEST = 60.0
+"""Time, s, after which a writing that has not ended is a problem; a busy file ends it sooner."""
 
 _T = TypeVar("_T")
 
@@ -42,8 +44,13 @@ class HistoryWriter:
         self._monitor = monitor
         self._valve = KeptValve(node.get_fully_qualified_name(), tag)
         path = node.get_parameter(HISTORY_FILE.name).value
-        self._file = HistoryFile(Path(path).expanduser()) if path else None
-        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="history")
+        try:
+            self._file = HistoryFile(Path(path).expanduser()) if path else None
+        except RuntimeError as error:  # pathlib's
+            raise ValueError(
+                f"{HISTORY_FILE.name} {path}: {error} Set HOME or ROS_HOME, or name another file"
+            ) from None
+        self._writer = Worker("history", finishes=True)
         self._waiting: deque[Callable[[HistoryFile], None]] = deque(maxlen=_MOST_WAITING)
         self._problem: str | None = None
         self._trend: Trend | None = None
@@ -60,7 +67,9 @@ class HistoryWriter:
 
     @property
     def problems(self) -> list[str]:
-        """Why the latest writing failed; empty if it did not."""
+        """Why the latest writing failed, or has not ended; empty if it did not."""
+        if (busy := self._writer.busy_for()) > _LONGEST:
+            return [f"the history is not written: {self.path} has not answered for {busy:.0f} s"]
         return [f"the history is not written: {self._problem}"] if self._problem else []
 
     @property

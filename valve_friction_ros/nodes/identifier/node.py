@@ -3,21 +3,22 @@
 import contextlib
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import JumpThreshold, TimeJump
+from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 
 from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.model import compile_kernels
+from valve_friction_ros.identification.preparation import compile_methods
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.level_log import LevelLog
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
+    IDENTIFICATION_LIMIT,
     INPUT_TIMEOUT,
     PARAMETERS,
     VALVE_TAG,
@@ -27,7 +28,7 @@ from valve_friction_ros.nodes.identifier.parameters import (
 from valve_friction_ros.nodes.identifier.report_service import written_report
 from valve_friction_ros.nodes.identifier.results import ResultTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
-from valve_friction_ros.nodes.identifier.status import friction_status, trend_values
+from valve_friction_ros.nodes.identifier.status import friction_status, stuck_status, trend_values
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.parameters import (
@@ -36,9 +37,11 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     values_of,
 )
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT
+from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.streams import Arrivals
 
 __all__ = ["PARAMETERS", "Identifier", "identification_worker", "main"]
@@ -48,10 +51,9 @@ _LOG_EVERY = 5.0
 
 
 @contextlib.contextmanager
-def identification_worker() -> Iterator[ThreadPoolExecutor]:
+def identification_worker() -> Iterator[Worker]:
     """Provide the thread that identifies; at the end, tasks that still wait are dropped."""
-    worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="identify")
-    worker.submit(compile_kernels)
+    worker = Worker("identify", compile_methods)
     try:
         yield worker
     finally:
@@ -66,13 +68,13 @@ class Identifier(PolledNode):
 
     Parameters
     ----------
-    worker : ThreadPoolExecutor
+    worker : Worker
         Identifies.
     namespace : str, optional
         Namespace of the valve, where it is not given by a ROS argument.
     """
 
-    def __init__(self, worker: ThreadPoolExecutor, namespace: str | None = None) -> None:
+    def __init__(self, worker: Worker, namespace: str | None = None) -> None:
         super().__init__("identifier", namespace=namespace)
         declare_parameters(self, PARAMETERS)
         values = values_of(self, CHANGEABLE)
@@ -85,6 +87,10 @@ class Identifier(PolledNode):
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
         self._inputs = ValveInputs(self, joint, self._take_samples)
+        pressure, stem, _ = self._inputs.names
+        self._readiness = Readiness(self, worker, f"identifies {pressure} and {stem}")
+        self._status_name = f"{self.get_fully_qualified_name()}: friction"
+        self._level_log = LevelLog(self)
         self._identifying = False
         self._identified_until: int | None = None
         waiting = ReentrantCallbackGroup()
@@ -102,7 +108,8 @@ class Identifier(PolledNode):
             "clear": self._clear,
         }.items():
             create_trigger_service(self, f"~/{name}", work, waiting)
-        self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
+        self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
         self._jump_handle = self.get_clock().create_jump_callback(
             JumpThreshold(
                 min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True
@@ -118,6 +125,21 @@ class Identifier(PolledNode):
     def poll(self) -> None:
         """Take the samples that have arrived."""
         self._inputs.take()
+        self._readiness.look()
+
+    def overdue(self) -> str | None:
+        """Say that the work under way has not ended within its limit, if so."""
+        limit, busy = self.get_parameter(IDENTIFICATION_LIMIT.name).value, self._worker.busy_for()
+        if busy <= limit:
+            return None
+        return (
+            f"the thread of identifications has not ended its work for {busy:.0f} s, beyond "
+            f"{IDENTIFICATION_LIMIT.name} ({limit:g} s): restart the node"
+        )
+
+    def stuck_status(self, problem: str) -> DiagnosticStatus:
+        """Return the status of a valve that nobody monitors."""
+        return stuck_status(self._status_name, self._history.valve.tag, problem)
 
     def _take_samples(self, arrivals: Arrivals) -> None:
         rejected, cleared = self._monitor.buffer.add_arrivals(arrivals)
@@ -137,7 +159,9 @@ class Identifier(PolledNode):
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
         self._inputs.take()
         self._monitor.buffer.clear(cause)
-        self.get_logger().warning(f"{cause}: the buffer was cleared")
+        self.get_logger().warning(
+            f"{cause}: the buffer was cleared", throttle_duration_sec=_LOG_EVERY
+        )
 
     async def _identify(self) -> str:
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
@@ -147,9 +171,10 @@ class Identifier(PolledNode):
         try:
             await self._identified(record)
         except RefusalError as refusal:
+            # What the inputs lack is the cause where there are no samples.
+            refused = RefusalError("; ".join((*self._input_problems(), str(refusal))))
             self._monitor.refuse(refusal)
-            self.get_logger().warning(f"identification refused: {refusal}")
-            refused = refusal
+            self.get_logger().warning(f"identification refused: {refused}")
         except InternalError:
             self._publish_diagnostics()
             raise
@@ -197,6 +222,7 @@ class Identifier(PolledNode):
                 result = await done_in(self._worker, identify_snapshot, *record)
                 self._monitor.accept(result, self.get_clock().now().nanoseconds)
                 self._results.publish(result, self._monitor)
+                self.get_logger().info(f"identified: {self._monitor.diagnosis().message}")
         except InternalError as error:
             self._monitor.fail(str(error))
             raise
@@ -224,7 +250,9 @@ class Identifier(PolledNode):
         self._baseline.put_in_force(baseline)
         await self._history.keep_baseline(baseline)
         self._publish_diagnostics()
-        return f"baseline: {baseline}{self._history.reservation}"
+        answer = f"baseline: {baseline}{self._history.reservation}"
+        self.get_logger().info(answer)
+        return answer
 
     async def _clear(self) -> str:
         self._inputs.take()
@@ -232,20 +260,31 @@ class Identifier(PolledNode):
         return "the buffer is empty; estimate and baseline are kept"
 
     def _input_problems(self) -> list[str]:
+        clock = self.get_clock()
+        if clock.ros_time_is_active and not clock.now().nanoseconds:
+            return ["no time on /clock, though use_sim_time is set: play a clock, or unset it"]
         return self._inputs.problems(self.get_parameter(INPUT_TIMEOUT.name).value)
 
     def _publish_diagnostics(self) -> None:
         self._inputs.take()
+        self._inputs.follow_publishers()
         now = self.get_clock().now()
         status = friction_status(
             self._monitor,
-            f"{self.get_fully_qualified_name()}: friction",
+            self._status_name,
             self._history.valve.tag,
             now.nanoseconds,
-            self._input_problems(),
+            [*filter(None, [self.overdue()]), *self._input_problems()],
             self._history.problems,
-            {**trend_values(self._history.trend), **self._schedule.values()},
+            {
+                **trend_values(self._history.trend),
+                **self._schedule.values(),
+                **self._readiness.values(),
+            },
         )
+        self._level_log.follow(status)
+        if self._readiness.is_slow:
+            status.message += f"; {self._readiness.problem}"
         message = DiagnosticArray(status=[status])
         message.header.stamp = now.to_msg()
         self._diagnostics_publisher.publish(message)

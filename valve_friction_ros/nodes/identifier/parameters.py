@@ -22,6 +22,7 @@ __all__ = [
     "CHANGEABLE",
     "HISTORY_DAYS",
     "HISTORY_FILE",
+    "IDENTIFICATION_LIMIT",
     "INPUT_TIMEOUT",
     "PARAMETERS",
     "PERIOD",
@@ -55,6 +56,12 @@ HISTORY_DAYS = ParameterSpec(
 INPUT_TIMEOUT = ParameterSpec(
     "input_timeout", 3.0, "Silence of an input after which it is reported [s]", (0.1, 86400.0)
 )
+IDENTIFICATION_LIMIT = ParameterSpec(
+    "identification_limit",
+    600.0,
+    "Time after which an identification that has not ended is reported as stuck [s]",
+    (1.0, 86400.0),
+)
 BASELINE = ParameterSpec(
     "baseline_coulomb_friction",
     math.nan,
@@ -85,6 +92,7 @@ CHANGEABLE = (
         "window", 60.0, "Length of the record that is kept and identified [s]", (0.1, 86400.0)
     ),
     INPUT_TIMEOUT,
+    IDENTIFICATION_LIMIT,
     ParameterSpec(
         "method",
         DEFAULT_METHOD,

@@ -10,7 +10,7 @@ from valve_friction_ros.health import Baseline, FrictionMonitor, Level, StatusSi
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING, Result
 
-__all__ = ["friction_status", "trend_values"]
+__all__ = ["friction_status", "stuck_status", "trend_values"]
 
 
 _EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
@@ -136,6 +136,12 @@ def friction_status(
         "; ".join([*input_problems, *upkeep_problems, diagnosis.message]),
         values,
     )
+
+
+def stuck_status(name: str, hardware_id: str, problem: str) -> DiagnosticStatus:
+    """Compose the status of a valve whose node is stuck."""
+    values = {"estimate_valid": "false", "NE 107": StatusSignal.CHECK_FUNCTION.value}
+    return _status(Level.ERROR, name, hardware_id, problem, values)
 
 
 def _status(

@@ -18,12 +18,17 @@ from valve_friction_ros.streams import Arrivals
 __all__ = ["ValveInputs"]
 
 
+_SILENCE = 0.5
+"""Time without messages, s, after which the quality of service is suspected."""
+
+
 class _Input:
     """One topic: its subscription, and the watch over it."""
 
     def __init__(
         self, node: Node, kind: type, topic: str, quality: QoSProfile, raw: bool = False
     ) -> None:
+        self._node = node
         self._polled = PolledSubscription(node, kind, topic, quality, raw)
         self.watch = InputWatch(node, self._polled.subscription)
 
@@ -32,6 +37,11 @@ class _Input:
         if messages:
             self.watch.arrived()
         return messages
+
+    def follow_publishers(self) -> None:
+        if self.watch.silence() > _SILENCE and self._polled.follow_publishers():
+            quality = self._polled.subscription.qos_profile.reliability.name.lower()
+            self._node.get_logger().info(f"{self.watch.topic} is taken as {quality}, as published")
 
 
 class ValveInputs:
@@ -61,6 +71,11 @@ class ValveInputs:
             self._hand_on(arrivals_of(pressures, stems, self._joint))
         for block in self._blocks.take():
             self._take_block(block.message)
+
+    def follow_publishers(self) -> None:
+        """Take from best-effort and from reliable publishers; to be called now and then."""
+        for one in (self._pressure, self._stem, self._blocks):
+            one.follow_publishers()
 
     def _take_block(self, message: Float64MultiArray) -> None:
         try:

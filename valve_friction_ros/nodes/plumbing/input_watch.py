@@ -1,25 +1,22 @@
 """Watch over an input topic: whether it arrives, and if not, why."""
 
-from collections.abc import Sequence
+import time
 
 from rclpy.node import Node
-from rclpy.qos import ReliabilityPolicy
 from rclpy.subscription import Subscription
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 __all__ = ["InputWatch"]
 
 
 class InputWatch:
-    """Says what is wrong with one subscribed topic."""
+    """Says what is wrong with one subscribed topic; silence is real time, also with sim time."""
 
     def __init__(self, node: Node, subscription: Subscription) -> None:
         self._node = node
-        self._subscription = subscription
         self._topic = subscription.topic_name
         package = subscription.msg_type.__module__.split(".")[0]
         self._type = f"{package}/msg/{subscription.msg_type.__name__}"
-        self._since = node.get_clock().now().nanoseconds
+        self._since = time.monotonic()
         self._has_arrived = False
 
     @property
@@ -29,21 +26,16 @@ class InputWatch:
 
     def arrived(self) -> None:
         """Note that a message has come."""
-        self._since = self._node.get_clock().now().nanoseconds
+        self._since = time.monotonic()
         self._has_arrived = True
 
     def silence(self) -> float:
         """Return the time since the last message, or the start, s."""
-        return float(self._node.get_clock().now().nanoseconds - self._since) / 1e9
+        return time.monotonic() - self._since
 
     def is_used(self) -> bool:
         """Return whether a message has ever come, or the topic has a publisher."""
         return self._has_arrived or self._node.count_publishers(self._topic) > 0
-
-    def _is_unreliable(self, publishers: Sequence[TopicEndpointInfo]) -> bool:
-        asked = self._subscription.qos_profile.reliability
-        offered = {info.qos_profile.reliability for info in publishers}
-        return asked == ReliabilityPolicy.RELIABLE and offered == {ReliabilityPolicy.BEST_EFFORT}
 
     def problem(self, timeout: float) -> str | None:
         """Say what is wrong if nothing has come for `timeout` seconds, else None."""
@@ -56,12 +48,6 @@ class InputWatch:
             cause = "nobody publishes it"
         elif others:
             cause = f"it is published as {', '.join(others)}, not {self._type}"
-        elif self._is_unreliable(publishers):
-            cause = (
-                "the quality of service does not match, its publisher is best effort and this "
-                "node asks for reliable: start this node with "
-                f"qos_overrides.{self._topic}.subscription.reliability:=best_effort"
-            )
         else:
             cause = "its publisher is silent"
         return f"no data on {self._topic} for {silence:.1f} s: {cause}"

@@ -21,7 +21,7 @@ def output_folder(given: str, usual: str, content: str) -> Iterator[Path]:
     path is unknown, or the block raises OSError.
     """
     try:
-        folder = Path(given).expanduser() if given else data_folder() / usual
+        folder = (Path(given) if given else data_folder() / usual).expanduser()
     except RuntimeError as error:  # pathlib's, where a home directory is unknown
         raise RefusalError(f"cannot write {content} into {given or '~/.ros'}: {error}") from None
     try:

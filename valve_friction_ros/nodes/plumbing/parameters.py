@@ -1,5 +1,6 @@
 """Declaration of node parameters, each with a description, a unit and a range."""
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -55,9 +56,29 @@ class ParameterSpec:
 
 
 def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
-    """Declare `specs` on `node`; raises rclpy's parameter exceptions for a bad override."""
-    for spec in specs:
+    """Declare `specs` on `node`; raises rclpy's parameter exceptions for a bad override.
+
+    A number may be set later as its text, because ``ros2 param load`` sends ``.nan`` and ``1e-06``
+    as texts.
+    """
+    declared = tuple(specs)
+    for spec in declared:
         node.declare_parameter(spec.name, spec.default, spec.descriptor())
+    numbers = {spec.name for spec in declared if isinstance(spec.default, float)}
+
+    def read_numbers(changes: list[Parameter]) -> list[Parameter]:
+        return [_read(change) if change.name in numbers else change for change in changes]
+
+    node.add_pre_set_parameters_callback(read_numbers)
+
+
+def _read(parameter: Parameter) -> Parameter:
+    """Return a number for a text that is one; else the parameter as it is."""
+    if parameter.type_ == Parameter.Type.STRING:
+        text = parameter.value.replace(".nan", "nan").replace(".inf", "inf")
+        with contextlib.suppress(ValueError):
+            return Parameter(parameter.name, value=float(text))
+    return parameter
 
 
 def values_of(

@@ -3,6 +3,7 @@
 import contextlib
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import (
     ConditionReachedException,
@@ -39,6 +40,20 @@ class PolledNode(Node):
 
     def poll(self) -> None:
         """Do the work that is due; called in every turn."""
+
+    def overdue(self) -> str | None:
+        """Say which work in another thread has not ended within its limit; None if there is none.
+
+        May be called in any thread.
+        """
+        return None
+
+    def stuck_status(self, problem: str) -> DiagnosticStatus | None:  # noqa: ARG002
+        """Return what is published in the node's stead while it is stuck; None for nothing.
+
+        May be called in any thread.
+        """
+        return None
 
 
 class TurnExecutor(SingleThreadedExecutor):

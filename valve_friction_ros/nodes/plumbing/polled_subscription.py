@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
@@ -56,14 +57,22 @@ class PolledSubscription:
     def __init__(
         self, node: Node, kind: type, topic: str, quality: QoSProfile, raw: bool = False
     ) -> None:
-        self._subscription: Subscription = node.create_subscription(
-            kind,
+        self._node = node
+        self._kind, self._raw = kind, raw
+        self._subscription = self._subscribed(topic, quality, qos_overrides())
+        self._reliability = quality.reliability  # as overridden
+
+    def _subscribed(
+        self, topic: str, quality: QoSProfile, overrides: QoSOverridingOptions | None
+    ) -> Subscription:
+        return self._node.create_subscription(
+            self._kind,
             topic,
             self._refuse,
             quality,
             callback_group=_NeverReady(),
-            qos_overriding_options=qos_overrides(),
-            raw=raw,
+            qos_overriding_options=overrides,
+            raw=self._raw,
         )
 
     @staticmethod
@@ -74,6 +83,26 @@ class PolledSubscription:
     def subscription(self) -> Subscription:
         """The subscription of rclpy."""
         return self._subscription
+
+    def follow_publishers(self) -> bool:
+        """Ask for what the publishers offer, if they are there; tell if that is something new.
+
+        That is best effort, which hears all of them, if one of them is; else what was asked for
+        at first. What has arrived and was not taken is lost, so this is for a silent topic.
+        """
+        topic, quality = self._subscription.topic_name, self._subscription.qos_profile
+        if not self._node.count_publishers(topic):
+            return False
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        offered = {info.qos_profile.reliability for info in publishers}
+        best_effort = ReliabilityPolicy.BEST_EFFORT in offered
+        wanted = ReliabilityPolicy.BEST_EFFORT if best_effort else self._reliability
+        if not offered or wanted == quality.reliability:
+            return False
+        self._node.destroy_subscription(self._subscription)
+        quality.reliability = wanted
+        self._subscription = self._subscribed(topic, quality, None)
+        return True
 
     def take(self) -> list[TakenMessage]:
         """Take what has arrived, oldest first; what exceeds 100,000 messages waits for the next."""

@@ -1,6 +1,6 @@
 """Starting and stopping nodes as a process."""
 
-import signal
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -12,6 +12,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
+from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
+from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
+from valve_friction_ros.nodes.plumbing.worker import workers_have_ended
 
 __all__ = ["run_node", "run_nodes"]
 
@@ -23,6 +26,8 @@ _LIVELY_TIME = 2.0
 _PAUSE_OF_A_NODE = 1e-3
 """Time, s, by which each node of a process lengthens the pause: ten times what its turn costs, so
 that a hundred nodes without any messages take a tenth of a core."""
+_WORKERS_PATIENCE = 2.0
+"""Time, s, that the end of the process leaves to what is being written."""
 
 _WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
 """What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
@@ -30,35 +35,28 @@ _WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, Va
 
 def _cannot_start(error: Exception) -> int:
     """Write what was wrong in one line, and return the exit code."""
-    print(f"cannot start: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
+    cause = " ".join(str(error).split())
+    if "log directory" in cause or "logging directory" in cause:  # rcl's words
+        cause += ": set ROS_LOG_DIR to a folder that can be written"
+    print(f"cannot start: {cause}", file=sys.stderr)  # noqa: T201
     return 2
 
 
-class _StopRequest:
-    """Whether Ctrl-C or SIGTERM has come.
-
-    A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
-    context down under a callback that is still publishing. So the request is only noted.
-    """
-
-    def __init__(self) -> None:
-        self.has_come = False
-        for request in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(request, self._note)
-
-    def _note(self, *_: object) -> None:
-        self.has_come = True
-
-
-def _run(nodes: Sequence[Node], executor: TurnExecutor, pause: float, stop: _StopRequest) -> None:
+def _run(
+    nodes: Sequence[PolledNode],
+    executor: TurnExecutor,
+    pause: float,
+    stop: StopRequest,
+    watchdog: Watchdog,
+) -> None:
     """Take turns until the stop is requested."""
-    polled = [node for node in nodes if isinstance(node, PolledNode)]
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
     while rclpy.ok() and not stop.has_come:
         is_lively = executor.turn()
-        for node in polled:
+        for node in nodes:
             node.poll()
+        watchdog.turned()
         now = time.monotonic()
         if is_lively:
             lively_until = now + _LIVELY_TIME
@@ -76,8 +74,26 @@ def run_nodes(
     they or rclpy refuse is written to stderr in one line. The ROS arguments are those of the
     process by default. The `pause` is the time between two turns, s, while no service is in use:
     for so long messages gather, and a first request waits.
+
+    Where a worker is still busy at the end, the process ends here, without it.
     """
-    stop = _StopRequest()
+    with StopRequest() as stop:
+        exit_code = _run_until(stop, create, arguments, pause)
+        have_ended = workers_have_ended(_WORKERS_PATIENCE)
+    if not have_ended:
+        # Python would wait for them, for a compilation or an identification of minutes.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(exit_code)
+    return exit_code
+
+
+def _run_until(
+    stop: StopRequest,
+    create: Callable[[], Iterable[Node]],
+    arguments: Sequence[str] | None,
+    pause: float,
+) -> int:
     nodes: list[Node] = []
     executor = None
     try:
@@ -93,10 +109,13 @@ def run_nodes(
         executor = TurnExecutor()
         for node in nodes:
             executor.add_node(node)
-        _run(nodes, executor, pause, stop)
+        polled = [node for node in nodes if isinstance(node, PolledNode)]
+        with Watchdog(polled) as watchdog:
+            _run(polled, executor, pause, stop, watchdog)
     except ExternalShutdownException:
         pass
     finally:
+        stop.is_followed = True
         # An executor that still holds the node's entities would keep them alive.
         if executor is not None:
             executor.shutdown()

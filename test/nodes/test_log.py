@@ -1,0 +1,28 @@
+"""What a node logs: that it is ready, each identification, baseline and change of level, once."""
+
+from live_nodes import NAMESPACE
+from records import quick_record
+
+
+def lines(process, words):
+    return [line for line in process.errors.splitlines() if words in line]
+
+
+def test_each_event_is_logged_once(live):
+    process = live.start_identifier({"input_timeout": 1.0})
+    client = live.client
+    client.wait_until(lambda: lines(process, "ready"), "the ready line")
+    client.wait_until(lambda: lines(process, "level OK → WARN"), "a change of level")
+    refusal = client.trigger("identify").message
+    assert f"no data on {NAMESPACE}/actuator_pressure for" in refusal
+    assert "its publisher is silent" in refusal
+    assert "no samples of actuator_pressure" in refusal
+    answer = client.identified(quick_record())
+    baseline = client.trigger("set_baseline").message
+    client.wait_until(lambda: len(lines(process, "level OK → WARN")) == 2, "silence again")
+    (ready,) = lines(process, "ready")
+    assert f"{NAMESPACE}/actuator_pressure and {NAMESPACE}/stem_state" in ready
+    identified = lines(process, "identified: ")
+    assert answer.split("; ")[-1] in identified[-1]
+    assert len(lines(process, baseline)) == 1
+    assert len(lines(process, "level WARN → OK")) == 1

@@ -1,0 +1,185 @@
+"""A node that is stuck says so, systemd is told nothing good of it, and it can be ended."""
+
+import contextlib
+import signal
+import socket
+import threading
+import time
+
+import pytest
+import stuck_identifiers
+from live_nodes import NAMESPACE, PATIENCE, values_of
+from records import quick_record
+from slow_identifier import FINISH, SCRIPT
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.nodes.plumbing.worker import Worker, workers_have_ended
+
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+WITHIN = 3.0
+"""Time, s, in which a node ends after a signal, as promised; a loaded machine adds to it."""
+
+
+class Systemd:
+    """The socket that systemd gives to a service, and what has come to it."""
+
+    def __init__(self, path):
+        self.path = str(path)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(self.path)
+        self._socket.setblocking(False)
+
+    def heard(self):
+        """Return what has come since the last call."""
+        states = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                states.append(self._socket.recv(100).decode())
+        return states
+
+    def close(self):
+        self._socket.close()
+
+
+@pytest.fixture
+def systemd(tmp_path, monkeypatch):
+    listener = Systemd(tmp_path / "notify")
+    monkeypatch.setenv("NOTIFY_SOCKET", listener.path)
+    monkeypatch.setenv("WATCHDOG_USEC", "2000000")
+    yield listener
+    listener.close()
+
+
+def wait_to_hear(client, systemd, state):
+    client.wait_until(lambda: state in systemd.heard(), f"{state} at systemd")
+
+
+def hears_no_watchdog(client, systemd):
+    """Whether no WATCHDOG=1 comes in a time in which several would."""
+    end = time.monotonic() + 2.0
+    systemd.heard()
+    client.wait_until(lambda: time.monotonic() > end, "two seconds")
+    return "WATCHDOG=1" not in systemd.heard()
+
+
+@pytest.fixture
+def stuck(live, tmp_path, systemd):
+    """Identifiers of two valves whose loop a file stops."""
+    process = live.start(
+        "identifiers",
+        {"valves": "[fv_101, fv_102]"},
+        script=stuck_identifiers.SCRIPT,
+        namespace=None,
+    )
+    wait_to_hear(live.client, systemd, "READY=1")
+    return process, tmp_path / stuck_identifiers.BLOCK
+
+
+def test_a_loop_that_stands_still(live, systemd, stuck):
+    process, block = stuck
+    client = live.client
+    client.next_status()
+    wait_to_hear(client, systemd, "WATCHDOG=1")
+    block.touch()
+    for valve in ("fv_101", "fv_102"):
+        status = client.next_status(
+            lambda one, valve=valve: one.hardware_id == valve and one.level == ERROR,
+            f"the end of {valve}'s monitoring",
+        )
+        assert status.name == f"/{valve}/identifier: friction"
+        assert status.message.startswith("stuck: the loop of this process has not turned for ")
+        assert values_of(status) == {"estimate_valid": "false", "NE 107": "C"}
+    assert hears_no_watchdog(client, systemd)
+    client.wait_until(lambda: "in poll_when_free" in process.errors, "the stacks")
+    assert process.errors.count("most recent call first") >= 2  # all threads
+
+    block.unlink()
+    client.next_status(lambda one: one.level != ERROR, "a status of the loop")
+    wait_to_hear(client, systemd, "WATCHDOG=1")
+    process.stop()
+    assert "STOPPING=1" in systemd.heard()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stuck_node_ends_all_the_same(live, stuck, number):
+    process, block = stuck
+    block.touch()
+    time.sleep(0.5)
+    live.client.watched.clear()
+    live.nodes.remove(process)
+    begin = time.monotonic()
+    process._process.send_signal(number)
+    assert process.exit_code() == 1
+    assert time.monotonic() - begin < WITHIN + 1.0
+    assert "is left so" in process.errors
+    assert "in poll_when_free" in process.errors
+
+
+def test_an_identification_that_does_not_return(live, tmp_path, systemd):
+    process = live.start_identifier(
+        {"input_timeout": 600.0, "identification_limit": 1.0}, script=SCRIPT
+    )
+    client = live.client
+    client.send_record(quick_record())
+    client.wait_for_buffered(1000)
+    running = client.request(Trigger, f"{NAMESPACE}/identifier/identify", Trigger.Request())
+    status = client.next_status(
+        lambda one: "beyond identification_limit (1 s)" in one.message, "a warning"
+    )
+    assert status.level == WARN
+    assert values_of(status)["NE 107"] == "C"
+    assert hears_no_watchdog(client, systemd)
+    (tmp_path / FINISH).touch()
+    assert client.wait_until_answered(running).success
+    client.next_status(lambda one: "identification_limit" not in one.message, "its end")
+    wait_to_hear(client, systemd, "WATCHDOG=1")
+    process.stop()
+
+
+def test_ctrl_c_leaves_an_identification_that_does_not_return(live):
+    process = live.start_identifier({"input_timeout": 600.0}, script=SCRIPT)
+    client = live.client
+    client.send_record(quick_record())
+    client.wait_for_buffered(1000)
+    client.request(Trigger, f"{NAMESPACE}/identifier/identify", Trigger.Request())
+    assert "already running" in client.trigger("identify").message
+    begin = time.monotonic()
+    process.stop()
+    assert time.monotonic() - begin < WITHIN + 1.0
+
+
+class TestWorker:
+    def test_it_tells_how_long_it_has_been_busy(self):
+        finish = threading.Event()
+        with Worker("test") as worker:
+            assert worker.busy_for() == 0.0
+            assert not worker.is_busy
+            done = worker.submit(finish.wait, PATIENCE)
+            while not worker.busy_for() > 0.05:
+                time.sleep(0.01)
+            assert worker.is_busy
+            finish.set()
+            assert done.result() is True
+            assert worker.busy_for() == 0.0
+
+    def test_preparation_comes_first(self):
+        finish, order = threading.Event(), []
+
+        def prepare():
+            finish.wait(PATIENCE)
+            order.append("prepared")
+
+        with Worker("test", prepare) as worker:
+            done = worker.submit(order.append, "worked")
+            assert worker.is_preparing
+            finish.set()
+            done.result()
+            assert not worker.is_preparing
+            assert order == ["prepared", "worked"]
+
+    @pytest.mark.parametrize("finishes", [True, False])
+    def test_the_end_waits_for_what_finishes(self, finishes):
+        with Worker("test", finishes=finishes) as worker:
+            worker.submit(time.sleep, 0.3)
+            assert workers_have_ended(PATIENCE) == finishes
+        assert workers_have_ended(0.0)
