@@ -19,11 +19,21 @@ from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit,
 from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING, SLIDING
 from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
 
-__all__ = ["NOISE_LIKE", "Budget", "Estimated", "estimated"]
+__all__ = ["NOISE_LIKE", "UNLIKELY", "Budget", "Estimated", "estimated"]
 
 _QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 NOISE_LIKE = 4.0
 """Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
+
+_NOT_QUITE = 1.5
+"""Inflation from which on the motion is not quite that of the model.
+
+What the model lacks may then be taken for a lag, which the work of the measured signals does not
+know; with noise alone the inflation is 1.0 to 1.3."""
+
+UNLIKELY = 12.0
+"""Penalty of the priors beyond which a fit is doubted: such imperfections together are two
+standard deviations and more above what their number makes usual."""
 
 _WIDEST = 3.0
 """Half width at another place, over that at the first, up to which it counts: a fit begins at
@@ -129,8 +139,8 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
     probability chance may have lowered. The one with the least imperfections among them gives the
     values; the intervals reach to what the others say, the less probable ones less far: along a
     bent valley the linear model at one place sees too little. Where the residual is more than
-    noise, the interval of the sliding friction also holds what the measured signals alone say
-    (`loop_friction`).
+    noise, or the imperfections are larger than usual, the interval of the sliding friction also
+    holds what the measured signals alone say (`loop_friction`).
     """
     fit = fits[0]
     stages = [(fit, stage) for stage in fit.stages]
@@ -160,7 +170,8 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
         if name == SLIDING:
             loop = loop_friction(fit.model, places[0][1].at)
             apart = abs(loop - first.value)
-            if fit.inflation > NOISE_LIKE or apart > _FAR * abs(loop):
+            unlike = fit.inflation > _NOT_QUITE or fit.stages[-1].penalty > UNLIKELY
+            if unlike or apart > _FAR * abs(loop):
                 width = math.hypot(width, apart + _LOOP * abs(first.value))
         width = max(width, _FINEST.get(name, _FINEST_OTHER) * abs(first.value))
         result[name] = Estimated(first.value, width, _budget(*places[0][:2], first))

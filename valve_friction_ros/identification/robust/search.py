@@ -12,6 +12,7 @@ from valve_friction_ros.identification.robust.fitted_record import (
     set_anew_at_rests,
 )
 from valve_friction_ros.identification.robust.imperfections import TIMING, deviations
+from valve_friction_ros.identification.robust.intervals import UNLIKELY
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, fit
 from valve_friction_ros.identification.robust.starts import (
     lagging,
@@ -30,10 +31,6 @@ _STRIBECK_SPEEDS = (0.4e-3, 1.2e-3, 4e-3)
 _LIMIT_VELOCITIES = (2e-4, 6e-4)
 _SUSPICIOUS = 2.0
 """Inflation of a residual beyond which other starts are tried: half of it is not noise."""
-
-_UNLIKELY = 12.0
-"""Penalty of the priors beyond which other starts are tried: such imperfections together are two
-standard deviations and more above what their number makes usual."""
 
 _START_NOISE = 3.0
 _START_TIME = 5e-3
@@ -274,7 +271,7 @@ class _Search:
         if "slip_force" in self.all:
             branches = [self.slipping, self.falling, self.stopping]
         for branch in branches:
-            is_likely = best.inflation < _SUSPICIOUS and best.stages[-1].penalty < _UNLIKELY
+            is_likely = best.inflation < _SUSPICIOUS and best.stages[-1].penalty < UNLIKELY
             if is_likely or not self.may_go_on:
                 break
             best = min(best, branch(best), key=lambda one: one.objective)

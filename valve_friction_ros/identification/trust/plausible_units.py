@@ -189,7 +189,10 @@ def _least_time_constant(recording: Recording) -> float:
     columns = np.column_stack(
         [velocity, place - place.mean(), np.sign(velocity), np.ones_like(velocity)]
     )
-    columns /= np.linalg.norm(columns, axis=0)[None, :]
+    lengths = np.linalg.norm(columns, axis=0)
+    if not lengths.all():
+        return 0.0
+    columns /= lengths[None, :]
     sizes = np.linalg.norm(velocity), np.linalg.norm(place - place.mean())
     columns *= moving[:, None]
     solved = np.linalg.lstsq(columns, pressure * moving, rcond=None)[0]
