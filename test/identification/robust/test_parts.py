@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.identification.robust.bounded_step import bounded_minimum
+from valve_friction_ros.identification.robust.broad_model import ABSENT, BroadModel
+from valve_friction_ros.identification.robust.fitted_record import fitted_record
+from valve_friction_ros.identification.robust.imperfections import TIMING
+from valve_friction_ros.identification.robust.starts import lagging
 from valve_friction_ros.identification.robust.weights import inflation
-from valve_friction_ros.model.stamped import StampedSignal
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.signals.stamped_noise import stamped_noise
 
 
@@ -41,3 +46,61 @@ def test_lasting_residuals_are_inflated_by_their_length():
     """Blocks of 64 equal numbers: a mean over them has 64 times the variance of white noise."""
     scaled = np.repeat(np.random.default_rng(0).standard_normal(4096), 64)
     assert inflation(scaled, 64) == pytest.approx(64.0, rel=0.1)
+
+
+def test_starts_with_a_lag_keep_the_whole_delay():
+    """A sliding stem follows the force by F_v/k and the lags together."""
+    at = {"spring_constant": 2e5, "viscous_friction": 1.2e4, **ABSENT}
+    starts = lagging(at, 0.04)
+    assert len(starts) == 25
+    for start in starts:
+        lags = sum(start[name] for name in TIMING)
+        assert start["stem_lag"] >= 0
+        if start["viscous_friction"] > 0.1 * at["viscous_friction"]:
+            assert lags + start["viscous_friction"] / 2e5 == pytest.approx(0.06)
+        else:
+            assert lags >= 0.054
+
+
+@pytest.fixture(scope="module")
+def model():
+    """Return the model of a slow triangle, with noise of the pressure only."""
+    time = np.arange(20_000) * 1e-3
+    pressure = 1e5 + 2e4 * np.abs((time / 10.0) % 2.0 - 1.0)
+    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3).position
+    generator = np.random.default_rng(0)
+    record = StampedRecord(
+        StampedSignal(time, pressure + 50.0 * generator.standard_normal(time.size)),
+        StampedSignal(time, position + 1e-6 * generator.standard_normal(time.size)),
+    )
+    return BroadModel(fitted_record(record, BENCH_VALVE), LOW_FRICTION.spring_constant)
+
+
+TRUE = {
+    **ABSENT,
+    "mass": LOW_FRICTION.mass,
+    "viscous_friction": LOW_FRICTION.viscous_friction,
+    "coulomb_friction": LOW_FRICTION.coulomb_friction,
+    "spring_constant": LOW_FRICTION.spring_constant,
+    "spring_preload": LOW_FRICTION.spring_preload,
+}
+
+
+def test_presliding_leaves_the_sliding_level(model):
+    """F_c is what a sliding stem needs, however far its bristles bend before."""
+    at = {**TRUE, "start_position": model.record.start}
+    stiff, soft = (model.readings({**at, "presliding": bend})[0] for bend in (0.0, 2e-5))
+    velocity = np.abs(model.simulate(at).velocity)[model.record.cells.astype(int)]
+    cells = np.arange(velocity.size)
+    sliding = (velocity > 1e-4) & (cells > 0.2 * cells.size)
+    away = np.abs(soft - stiff)
+    assert np.median(away[sliding]) < 1e-7
+    assert away.max() > 1e-5
+
+
+def test_difference_of_the_halves_is_foreseen(model):
+    """The squares of half the difference sum up to what the noise of the pressure explains."""
+    at = {**TRUE, "start_position": model.record.start}
+    even, odd = (model.record.position - model.readings(at)) * model.weights
+    apart = 0.25 * float(np.sum((even - odd) ** 2))
+    assert 0.2 * model.foreseen_difference < apart < 1.2 * model.foreseen_difference

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
@@ -24,6 +25,9 @@ _LONGEST_PERIOD = 5e-3
 
 _MOST_STEPS = 12_500
 """Steps of the simulation in a record; those of a longer record are longer, up to four times."""
+
+_MOST_SAMPLES = 16_000
+"""Steps of a record whose pressure cannot be smoothed: there they are means of its samples."""
 
 _SAMPLES_A_WINDOW = 32
 _SLOW = 0.1
@@ -197,6 +201,14 @@ class _Smoothed(NamedTuple):
         )
         return _Smoothed(whole, np.stack([even, odd]), variance, self.window)
 
+    def averaged(self, length: int) -> "_Smoothed":
+        """Return its means over `length` steps about each; their noise is not taken as less."""
+        whole, even, odd = (
+            scipy.ndimage.uniform_filter1d(row, length, mode="nearest")
+            for row in (self.whole, *self.halves)
+        )
+        return _Smoothed(whole, np.stack([even, odd]), self.variance, self.window)
+
 
 def _noise_on_grid(signal: StampedSignal, grid: NDArray[np.float64], noise: float) -> float:
     """Return the deviation of white noise that averages as the interpolated noise does.
@@ -306,6 +318,9 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
         pressure, grid = pressure.at(grid, fine), fine
     else:
         stride = max(min(pressure.window // _SAMPLES_A_WINDOW, int(longest / finest + 1e-9)), 1)
+        if grid.size > _MOST_SAMPLES * stride and pressure.variance.any():
+            stride = math.ceil(grid.size / _MOST_SAMPLES)
+            pressure = pressure.averaged(stride)
         period = stride * finest
         pressure, grid = pressure.at(grid, grid[::stride]), grid[::stride]
     lost = _gaps(drive, grid) | _gaps(stem, grid)
