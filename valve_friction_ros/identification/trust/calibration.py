@@ -52,10 +52,12 @@ def calibrated(one: Parameter, share: float) -> Parameter:
     """Widen the interval of an estimate by a relative standard uncertainty of its scale.
 
     Both are independent, and add in squares. The verdict follows from the wider interval; as the
-    record determines the value all the same, it is weak at most. A given value stays.
+    record determines the value all the same, it is weak at most. A given value stays, and one
+    without an interval.
     """
     error = share * abs(one.value)
-    if not error > 0 or one.verdict is Verdict.FIXED or one.uncalibrated is not None:
+    is_estimate = one.half_width >= 0 and one.verdict is not Verdict.FIXED
+    if not (error > 0 and is_estimate) or one.uncalibrated is not None:
         return one
     width = math.hypot(one.half_width, _COVERAGE * error)
     wide = width / abs(one.value)
