@@ -186,15 +186,6 @@ def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(li
     )
     assert known == pytest.approx(float(values["baseline_sliding_friction [N]"]))
 
-    (shown,) = client.parameters(NODE, "baseline_coulomb_friction")
-    assert math.isnan(shown), "a baseline of the sliding friction alone"
-    assert client.set_together(NODE, {"warn_ratio": 1.3}).successful
-    assert "baseline_sliding_friction [N]" in client.status_values()
-    assert client.set_together(NODE, {"baseline_coulomb_friction": math.nan}).successful
-    client.next_status(
-        lambda status: "baseline_sliding_friction [N]" not in values_of(status), "no baseline"
-    )
-
 
 def test_a_baseline_of_no_use_is_refused(live):
     live.start_identifier({"input_timeout": 600.0, "timing_uncertainty": 0.1})
