@@ -78,8 +78,7 @@ def _identified(growth: float, seed: int) -> Result:
 
 @cache
 def _baseline() -> Baseline:
-    friction = _identified(1.0, _BASELINE_SEED).parameters["coulomb_friction"]
-    return Baseline(friction.value, friction.half_width)
+    return Baseline.of(_identified(1.0, _BASELINE_SEED))
 
 
 def diagnosed(growth: float, seed: int) -> Diagnosed:

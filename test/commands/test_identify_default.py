@@ -7,6 +7,7 @@ import pytest
 from answers import KEYS, column, none_for_nan, row_of, values
 
 from valve_friction_ros.identification import (
+    CALIBRATION,
     UNITS,
     IdentificationSettings,
     identify_robust,
@@ -147,4 +148,27 @@ class TestTimingUncertainty:
     def test_impossible(self, refusal, path, bench_options, text):
         assert refusal(path, *bench_options, f"--timing-uncertainty={text}").startswith(
             "timing_uncertainty must"
+        )
+
+
+class TestCalibration:
+    OPTIONS = ("--area-uncertainty=0.01", "--drive-scale-uncertainty=0.02")
+
+    def test_it_reaches_settings_intervals_and_budget(self, printed, path, bench_options):
+        exact = [*bench_options, "--timing-uncertainty", "0"]
+        found = printed(path, *exact, *self.OPTIONS, "--position-scale-uncertainty=0.03")
+        known = printed(path, *exact)["parameters"]["spring_constant"]
+        settings = found["settings"]
+        assert [settings[name] for name in CALIBRATION] == [0.01, 0.02, 0.03]
+        spring = found["parameters"]["spring_constant"]
+        error = math.hypot(0.01, 0.02, 0.03) * known["value"]
+        assert spring["value"] == known["value"]
+        assert spring["half_width"] == pytest.approx(math.hypot(known["half_width"], 2 * error))
+        budget = found["evidence"]["uncertainty_budget"]["spring_constant"]
+        assert budget["calibration"] == pytest.approx(error)
+
+    @pytest.mark.parametrize("text", ["-0.01", "nan", "2"])
+    def test_impossible(self, refusal, path, bench_options, text):
+        assert refusal(path, *bench_options, f"--area-uncertainty={text}").startswith(
+            "area_uncertainty must"
         )

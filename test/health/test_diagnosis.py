@@ -15,7 +15,12 @@ from valve_friction_ros.health import (
     diagnose,
     percentage,
 )
-from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    Parameter,
+    Verdict,
+    identify_refined,
+)
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.model import BENCH_VALVE, Valve
 
@@ -425,3 +430,39 @@ class TestLimits:
     def test_out_of_order(self, limits):
         with pytest.raises(ValueError, match=r"^limits must obey 0 < low_ratio < 1 < warn_ratio <"):
             FrictionLimits(**limits)
+
+
+class TestCalibration:
+    """The same area and sensors on both sides scale both frictions alike."""
+
+    @pytest.fixture(scope="class")
+    def assessed(self, loose_record, tight_record):
+        """Function of settings: the results of the healthy and of the tightened valve."""
+
+        def build(valve=BENCH_VALVE, **settings):
+            given = IdentificationSettings(assumed_mass=1.6, **settings)
+            return [identify_refined(one, valve, given) for one in (loose_record, tight_record)]
+
+        return build
+
+    def test_it_does_not_change_the_comparison(self, assessed):
+        """Bit for bit, though it makes every friction weak."""
+        ratios, baselines = [], []
+        for share in (0.0, 0.1):
+            healthy, grown = assessed(drive_scale_uncertainty=share)
+            baselines.append(Baseline.of(healthy))
+            ratios.append(diagnose(grown, BENCH_VALVE, baselines[-1]).ratio)
+        assert grown.parameters["coulomb_friction"].verdict is Verdict.WEAK
+        assert grown.parameters["sliding_friction"].verdict is Verdict.WEAK
+        assert baselines[0] == baselines[1]
+        assert repr(ratios[0]) == repr(ratios[1])
+        assert ratios[0].low > 1.25
+
+    def test_a_scale_that_is_wrong_cancels(self, assessed):
+        """An area of 1.1 times the true one: 1.1 times the friction, and the same ratio."""
+        wrong = dataclasses.replace(BENCH_VALVE, diaphragm_area=1.1 * BENCH_VALVE.diaphragm_area)
+        ratios = []
+        for valve in (BENCH_VALVE, wrong):
+            healthy, grown = assessed(valve)
+            ratios.append(diagnose(grown, valve, Baseline.of(healthy)).ratio.value)
+        assert ratios[1] == pytest.approx(ratios[0], rel=1e-3)

@@ -1,6 +1,7 @@
 """The history's file: what goes in comes out, and what plain SQL finds in it."""
 
 import math
+import re
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from valve_friction_ros.health import Baseline, SlidingFriction
 from valve_friction_ros.history import FrictionPoint, HistoryFile, KeptBaseline, KeptValve, schema
 from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification.trust.calibration import calibrated
 
 
 @pytest.fixture
@@ -23,11 +25,19 @@ def history(tmp_path):
 SLIDING = SlidingFriction(205.5, 3.25, 9.5e-3)
 
 
+VERSION_2 = Path(__file__).with_name("history_of_version_2.sql").read_text()
+"""Identifications, a refusal and baselines, as dumped by that version."""
+
+OF_VERSION_2 = {
+    "version": "0.1.0",
+    "settings": re.search(r"INTO \"settings\" VALUES\(1,'(.*)'\);", VERSION_2)[1],
+}
+
+
 def write_version_2(history):
-    """Write the file, as dumped by that version: identifications, a refusal, baselines."""
     history.path.parent.mkdir(parents=True)
     connection = sqlite3.connect(history.path)
-    connection.executescript(Path(__file__).with_name("history_of_version_2.sql").read_text())
+    connection.executescript(VERSION_2)
     connection.close()
 
 
@@ -61,6 +71,20 @@ def test_what_goes_in_comes_out(history):
         assert same(one, other)
 
 
+def test_a_trend_leaves_the_calibration_out(history):
+    """It is common to all points; the half width that is shown holds it."""
+    widened = calibrated(parameter("coulomb_friction", 100.0, 2.0), 0.02)
+    entry = success(parameters={widened.name: widened})
+    history.add(entry)
+    (found,) = history.entries()
+    kept = found.parameters[widened.name]
+    assert same(kept, widened)
+    assert kept.half_width == pytest.approx(20**0.5)
+    point = FrictionPoint(START, 100.0, 2.0)
+    assert history.points(VALVE.name, "refined") == (point,)
+    assert found.point() == entry.point() == point
+
+
 def test_a_file_of_version_1_is_read_and_extended(history):
     """Version 1 had no published values; a file that is only read stays as it is."""
     write_version_2(history)
@@ -69,7 +93,7 @@ def test_a_file_of_version_1_is_read_and_extended(history):
     connection.execute("PRAGMA user_version = 1")
     connection.close()
     old = history.entries()
-    assert same(old[0], success(version="0.1.0"))
+    assert same(old[0], success(**OF_VERSION_2))
     assert select(history, "PRAGMA user_version") == [(1,)]
     friction = replace(parameter("coulomb_friction", 150.0), published=151.0)
     new = success(START + 9 * DAY, parameters={"coulomb_friction": friction})
@@ -83,9 +107,9 @@ class TestVersion2:
 
     BASELINE = Baseline(140.0, 2.0)
     ENTRIES = (
-        success(version="0.1.0"),
-        success(START + DAY, 210.0, 4.0, baseline=BASELINE, version="0.1.0"),
-        refused(START + 2 * DAY, version="0.1.0"),
+        success(**OF_VERSION_2),
+        success(START + DAY, 210.0, 4.0, baseline=BASELINE, **OF_VERSION_2),
+        refused(START + 2 * DAY, **OF_VERSION_2),
     )
 
     def is_whole(self, history):

@@ -1,7 +1,11 @@
 """The choice of a method, and what each makes of a record with a gap."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from records import simulated
 
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
@@ -21,6 +25,7 @@ from valve_friction_ros.model import (
     HIGH_FRICTION,
     Recording,
     SensorNoise,
+    TriangleWave,
     converter_response,
     simulate,
 )
@@ -177,3 +182,49 @@ class TestTimingUncertainty:
     def test_impossible(self, impossible):
         with pytest.raises(ValueError, match=r"^timing_uncertainty must"):
             IdentificationSettings(timing_uncertainty=impossible)
+
+
+class TestCalibration:
+    SETTINGS = IdentificationSettings(
+        timing_uncertainty=0.0, area_uncertainty=0.03, position_scale_uncertainty=0.04
+    )
+    SHARES = (("coulomb_friction", 0.03), ("sliding_friction", 0.03), ("spring_constant", 0.05))
+
+    @pytest.fixture(scope="class")
+    def slow(self):
+        return simulated(
+            TriangleWave(period=20.0).sample(np.arange(5000) / 100), 0.01, HIGH_FRICTION
+        )
+
+    @pytest.mark.parametrize("method", sorted({*METHODS} - {"best", "published"}))
+    def test_it_widens_the_intervals_of_every_method(self, whole, slow, method):
+        """And changes no value; without it the parameters are those of the method itself."""
+        record = slow if method == "signature" else whole
+        plain = IdentificationSettings(timing_uncertainty=0.0)
+        known = identify(record, BENCH_VALVE, plain, method)
+        found = identify(record, BENCH_VALVE, self.SETTINGS, method)
+        assert {one.uncalibrated for one in known.parameters.values()} == {None}
+        for name, one in found.parameters.items():
+            assert repr(one.without_calibration) == repr(known.parameters[name]), name
+        budget = found.evidence["uncertainty_budget"]
+        for name, share in self.SHARES:
+            one, before = found.parameters[name], known.parameters[name]
+            added = 2 * share * before.value
+            assert one.half_width == pytest.approx(math.hypot(before.half_width, added), rel=1e-12)
+            assert budget[name]["calibration"] == pytest.approx(added / 2, rel=1e-12)
+            assert budget[name]["record"] > 0
+
+    def test_the_published_method_has_none_to_widen(self, whole):
+        found = identify(whole, BENCH_VALVE, self.SETTINGS, "published")
+        assert np.isnan([found.parameters[name].half_width for name, _ in self.SHARES]).all()
+        assert "uncertainty_budget" not in found.evidence
+
+    def test_an_area_that_is_wrong_lies_within_it(self, whole):
+        """By 5 %: all forces are, and so are the springs."""
+        wrong = replace(BENCH_VALVE, diaphragm_area=1.05 * BENCH_VALVE.diaphragm_area)
+        for share, holds in ((0.0, False), (0.03, True)):
+            settings = IdentificationSettings(timing_uncertainty=0.0, area_uncertainty=share)
+            found = identify(whole, wrong, settings).parameters
+            for name in ("coulomb_friction", "spring_constant"):
+                low, high = found[name].interval
+                assert (low < TRUTH[name] < high) == holds, name

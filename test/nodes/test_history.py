@@ -7,7 +7,7 @@ from histories import DAY, START, VALVE, as_kept, success
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 
-from valve_friction_ros.health import Baseline
+from valve_friction_ros.health import Baseline, SlidingFriction
 from valve_friction_ros.history import MONTH, FrictionPoint, HistoryFile, KeptBaseline, trend_of
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
@@ -85,6 +85,19 @@ class TestBaseline:
         (line,) = logged(live, node, "baseline coulomb friction 140 N")
         assert "from the parameter baseline_coulomb_friction" in line
         assert "not used: baseline coulomb friction 152.7 ± 1 N, set 2026-09-21 14:13 UTC" in line
+
+    def test_one_of_the_sliding_friction_alone_ends_with_nan(self, live, history):
+        """The parameter shows nan all the time; only setting it ends the baseline."""
+        alone = Baseline(sliding=SlidingFriction(200.0, 4.0, 8e-3))
+        history.set_baseline(VALVE, KeptBaseline(alone, START, START))
+        live.start_identifier(PATIENT)
+        key, client = "baseline_sliding_friction [N]", live.client
+        assert first_values(live)[key] == "200"
+        assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
+        assert client.set_together(NODE, {"warn_ratio": 1.3}).successful
+        assert client.status_values()[key] == "200"
+        assert client.set_together(NODE, {"baseline_coulomb_friction": math.nan}).successful
+        client.next_status(lambda status: key not in values_of(status), "no baseline")
 
 
 def test_what_was_answered_survives_a_kill(live, history):

@@ -102,3 +102,15 @@ def test_the_timing_uncertainty_widens_the_intervals(client):
         assert told[uncertainty] == expected.parameters["viscous_friction"].half_width
     assert told[0.0] < told[0.2]
     assert client.set_together(NODE, {"timing_uncertainty": np.nan}).successful
+
+
+def test_the_calibration_widens_the_intervals(client):
+    shares = {"area_uncertainty": 0.03, "position_scale_uncertainty": 0.04}
+    assert client.set_together(NODE, shares).successful
+    client.identified(quick_record())
+    told = client.half_widths("coulomb_friction", "spring_constant")
+    expected = identify(quick_record(), BENCH_VALVE, IdentificationSettings(**shares)).parameters
+    for name, share in (("coulomb_friction", 0.03), ("spring_constant", 0.05)):
+        one = expected[name]
+        assert told[name] == one.half_width > 2 * share * one.value
+    assert client.set_together(NODE, dict.fromkeys(shares, 0.0)).successful

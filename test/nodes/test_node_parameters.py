@@ -44,6 +44,9 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"warn_ratio": 1.0}, "1 < warn_ratio"),
     ({"low_ratio": 1.0}, "low_ratio < 1"),
     ({"assumed_mass": -1.0}, "assumed_mass"),
+    ({"area_uncertainty": -0.01}, "area_uncertainty"),
+    ({"drive_scale_uncertainty": 0.5}, "drive_scale_uncertainty must be at least 0 and below 0.5"),
+    ({"position_scale_uncertainty": 2.0}, "position_scale_uncertainty"),
     ({"position_bias": 1e-3, "fixed.spring_preload": 200.0}, "exclude each other"),
     (
         {"method": "guess"},

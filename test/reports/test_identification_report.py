@@ -105,16 +105,17 @@ class TestUncertaintyBudget:
             "standard uncertainty",
             "by the record",
             "by the timing",
+            "by the calibration",
         ]
         assert table.rows == (
-            ("Coulomb friction F_c [N]", "17", "0.72"),
-            ("spring constant k [N/m]", "1382", "0"),
+            ("Coulomb friction F_c [N]", "17", "0.72", "0"),
+            ("spring constant k [N/m]", "1382", "0", "0"),
         )
         assert words.text.startswith("Where the intervals come from.")
 
     def test_its_sources_are_those_of_the_method(self, with_budget):
         told = rows(with_budget({"coulomb_friction": {"weather": 2.0}}), "Uncertainty budget")
-        assert told == {"Coulomb friction F_c [N]": ("2",)}
+        assert told == {"Coulomb friction F_c [N]": ("2", "0")}
 
     def test_a_given_parameter_has_none(self, with_friction):
         record = with_friction(150.0, 0.0, Verdict.FIXED)
@@ -143,11 +144,29 @@ class TestUncertaintyBudget:
         ("given", "told"), [(None, "0.04 s, by default"), (0.0, "0 s, as given")]
     )
     def test_the_timing_that_it_counts_with(self, with_budget, given, told):
-        record = with_budget({"coulomb_friction": {"record": 1.0}}, timing_uncertainty=given)
+        budget = {"coulomb_friction": {"record": 1.0, "timing": 0.5}}
+        record = with_budget(budget, timing_uncertainty=given)
         settings = rows(record, "Settings and versions")
         (found,) = (value for name, value in settings.items() if name.startswith("timing"))
         assert found == (told,)
         assert "derivative window" not in settings  # of no samples
+
+    def test_calibration(self, with_friction):
+        """It is in the budget, and left out of the comparison, which says so."""
+        record = with_friction(150.0, 3.0, baseline=Baseline(100.0, 4.0))
+        settings = dataclasses.replace(record.result.settings, area_uncertainty=0.02)
+        result = dataclasses.replace(record.result, settings=settings)
+        wide = dataclasses.replace(record, result=result)
+        assert rows(wide, "Uncertainty budget")["Coulomb friction F_c [N]"] == ("1.5", "3")
+        told = rows(wide, "Settings and versions")
+        assert told["relative standard uncertainty of the diaphragm area"] == ("2 %",)
+        assert not [name for name in told if "sensor" in name or name.startswith("timing")]
+        told, before = (rows(one, FRICTION) for one in (wide, record))
+        (words,) = told.pop("uncertainty of the calibration")
+        assert words.startswith("left out of this comparison: the same area and sensors")
+        for name in ("excess friction", "friction over baseline", "level"):
+            assert told[name] == before[name]
+        assert "uncertainty of the calibration" not in before
 
 
 @pytest.mark.parametrize(

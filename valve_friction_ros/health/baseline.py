@@ -56,6 +56,9 @@ class SlidingFriction:
 class Baseline:
     """Friction of the healthy valve: Coulomb friction, sliding friction, or both.
 
+    Its intervals leave out the uncertainties of area and sensor scales, which cancel in the ratio
+    of two frictions that the same sensors measured.
+
     Attributes
     ----------
     coulomb_friction : float or None
@@ -106,9 +109,10 @@ class Baseline:
 
         Raises RefusalError if neither is known to `LARGEST_SHARE`; the message names why.
         """
-        frictions = {"coulomb_friction": result.parameters["coulomb_friction"]}
+        names = ["coulomb_friction"]
         if SLIDING in result.parameters and result.sliding_speed > 0:
-            frictions[SLIDING] = result.parameters[SLIDING]
+            names.append(SLIDING)
+        frictions = {name: result.parameters[name].without_calibration for name in names}
         for one in frictions.values():
             if one.value < 0:
                 raise RefusalError(

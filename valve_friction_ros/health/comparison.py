@@ -57,7 +57,10 @@ class Ratio(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A friction and that of the baseline, N, each with half the width of its 95 % interval."""
+    """A friction and that of the baseline, N, each with half the width of its 95 % interval.
+
+    The intervals are those without calibration.
+    """
 
     now: tuple[float, float]
     healthy: tuple[float, float]
@@ -104,11 +107,12 @@ def carried(
     sliding, viscous = parameters.get(SLIDING), parameters.get("viscous_friction")
     if sliding is None or not (sliding.value > 0 and sliding.half_width >= 0 and speed > 0):
         return None
+    sliding = sliding.without_calibration
     if not 1 / LARGEST_SPEED_RATIO <= to.speed / speed <= LARGEST_SPEED_RATIO:
         return None
     slope = width = 0.5 * sliding.value / speed
     if viscous is not None and viscous.half_width >= 0:
-        slope, width = viscous.value, viscous.half_width
+        slope, width = viscous.value, viscous.without_calibration.half_width
     step = to.speed - speed
     value = sliding.value + slope * step
     if not value > 0:
@@ -128,6 +132,10 @@ def compared(
     surely changed further, or, where neither has surely changed, the one known better: a lag
     between the signals changes the sliding friction and not F_c, and the viscous part hides the
     growth of F_c.
+
+    The uncertainties of area and sensor scales are left out of both sides: the same area and
+    sensors scale both frictions alike, and a common scale cancels in the ratio. After a new
+    calibration the baseline must be set anew.
 
     Parameters
     ----------
@@ -153,7 +161,7 @@ def compared(
                 SLIDING,
                 healthy.speed,
             )
-    coulomb = parameters[_COULOMB]
+    coulomb = parameters[_COULOMB].without_calibration
     if baseline.coulomb_friction is not None and coulomb.value >= 0:
         by_coulomb = Comparison(
             (coulomb.value, coulomb.half_width), (baseline.coulomb_friction, baseline.half_width)

@@ -215,10 +215,13 @@ def friction_point(
     """Return the point of an identification in a trend, or None.
 
     Where the baseline has a sliding friction, it is the sliding friction carried to that speed;
-    else F_c. Only an identified or weak friction counts: a fixed friction was not measured, and a
+    else F_c. Its interval leaves the calibration out, which is common to all points and the
+    baseline. Only an identified or weak friction counts: a fixed friction was not measured, and a
     friction that is not identifiable has no value.
     """
     one = parameters.get(trended(baseline))
+    if one is not None:
+        one = one.without_calibration
     if one is None or one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
         return None
     if not 0 <= one.half_width < _ENDLESS:

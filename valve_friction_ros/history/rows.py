@@ -4,6 +4,7 @@ import math
 import sqlite3
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
@@ -121,6 +122,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
             verdict=one.verdict.value,
             reason=one.reason,
             published=one.published,
+            uncalibrated_half_width=one.uncalibrated and one.uncalibrated.half_width,
         )
 
 
@@ -169,7 +171,7 @@ def _place(parameter: Parameter) -> int:
 
 
 def _parameter(row: sqlite3.Row) -> Parameter:
-    return Parameter(
+    shown = Parameter(
         row["name"],
         _number(row["value"]),
         _number(row["standard_error"]),
@@ -178,6 +180,10 @@ def _parameter(row: sqlite3.Row) -> Parameter:
         row["reason"],
         published=_number(_cell(row, "published")),
     )
+    width = _cell(row, "uncalibrated_half_width")
+    if width is None:
+        return shown
+    return replace(shown, uncalibrated=replace(shown, standard_error=math.nan, half_width=width))
 
 
 def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:

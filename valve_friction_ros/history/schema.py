@@ -12,7 +12,8 @@ __all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
 SCHEMA_VERSION = 3
 """The database's user_version.
 
-Version 1 has no published values, version 2 no sliding friction in baselines and ratios."""
+Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
+and no half widths without calibration."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -72,6 +73,7 @@ CREATE TABLE parameter (
     verdict TEXT NOT NULL,
     reason TEXT NOT NULL,
     published REAL,
+    uncalibrated_half_width REAL,
     PRIMARY KEY (identification_id, name)
 ) WITHOUT ROWID;
 """
@@ -130,6 +132,7 @@ _STEPS = {
     1: ("ALTER TABLE parameter ADD COLUMN published REAL",),
     2: (
         *(f"ALTER TABLE identification ADD COLUMN {name} {kind}" for name, kind in _ADDED.items()),
+        "ALTER TABLE parameter ADD COLUMN uncalibrated_half_width REAL",
         "DROP VIEW friction",
         "DROP INDEX baseline_of_valve",
         "ALTER TABLE baseline RENAME TO former_baseline",

@@ -27,7 +27,12 @@ from valve_friction_ros.identification.rendering import (
 )
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.robust.method import TIMING_UNCERTAINTY, identify_robust
-from valve_friction_ros.identification.settings import FIXABLE, IdentificationSettings
+from valve_friction_ros.identification.settings import (
+    CALIBRATION,
+    FIXABLE,
+    MOST_UNCERTAIN,
+    IdentificationSettings,
+)
 from valve_friction_ros.identification.signature.force_balance import identify_signature
 from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
 from valve_friction_ros.identification.signature.valve_signature import (
@@ -49,10 +54,12 @@ from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS
 
 __all__ = [
+    "CALIBRATION",
     "DEFAULT_METHOD",
     "FIXABLE",
     "FORMER_METHODS",
     "METHODS",
+    "MOST_UNCERTAIN",
     "PARAMETER_UNITS",
     "SLIDING",
     "TIMING_UNCERTAINTY",

@@ -14,6 +14,7 @@ from valve_friction_ros.identification.drawing import Drawing, Exhibit
 from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
+from valve_friction_ros.identification.trust.calibration import with_calibration
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -72,7 +73,8 @@ class Result:
     settings : IdentificationSettings
         Settings of the identification.
     parameters : mapping of str to Parameter
-        By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`.
+        By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`. The
+        uncertainties of area and sensor scales in `settings` are in their intervals.
     fit : float
         Share of the stem's movement that the model reproduces, at most 1; of the force where no
         stem is simulated.
@@ -133,9 +135,12 @@ class Result:
     sliding_speed: float = math.nan
 
     def __post_init__(self) -> None:
-        """Freeze the mappings."""
-        for name in ("parameters", "evidence"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        """Widen the intervals by the calibration, for every method; freeze the mappings."""
+        parameters, evidence = with_calibration(
+            self.parameters, self.evidence, self.settings, self.recording.driven_by
+        )
+        object.__setattr__(self, "parameters", MappingProxyType(parameters))
+        object.__setattr__(self, "evidence", MappingProxyType(evidence))
 
     @property
     def values(self) -> dict[str, float]:

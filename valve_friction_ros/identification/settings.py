@@ -11,7 +11,14 @@ from valve_friction_ros.model.checks import (
     require_positive,
 )
 
-__all__ = ["FIXABLE", "PUBLISHED_WINDOW", "REGRESSED", "IdentificationSettings"]
+__all__ = [
+    "CALIBRATION",
+    "FIXABLE",
+    "MOST_UNCERTAIN",
+    "PUBLISHED_WINDOW",
+    "REGRESSED",
+    "IdentificationSettings",
+]
 
 PUBLISHED_WINDOW = 31
 """Derivative window d of the paper, samples (Appendix A)."""
@@ -27,6 +34,18 @@ REGRESSED = (
 
 FIXABLE = (*REGRESSED, "static_friction", "limit_velocity")
 """Parameters that can be fixed at a known value instead of being identified."""
+
+CALIBRATION: Mapping[str, str] = MappingProxyType(
+    {
+        "area_uncertainty": "the diaphragm area",
+        "drive_scale_uncertainty": "the scale of the pressure (or force) sensor",
+        "position_scale_uncertainty": "the scale of the position sensor",
+    }
+)
+"""Settings that are relative standard uncertainties, and of what."""
+
+MOST_UNCERTAIN = 0.5
+"""Relative standard uncertainty of a scale from which its 95 % interval holds zero."""
 
 _MAY_BE_NEGATIVE = ("spring_preload",)
 _POSITIVE = ("mass", "limit_velocity")
@@ -60,6 +79,11 @@ class IdentificationSettings:
         damping of transmitters, a volume before the diaphragm. Only the method ``robust`` uses it,
         by default 0.04 s, a plant without special care; zero, as on the bench, means that the
         signals certainly belong together.
+    area_uncertainty, drive_scale_uncertainty, position_scale_uncertainty : float
+        Relative standard uncertainties (GUM), 0.02 for 2 %, of the diaphragm area, of the scale of
+        the pressure sensor (for a drive that is a force: of the force sensor), and of the scale of
+        the position sensor; from 0, the default, to below 0.5. They widen the intervals of every
+        method. A common scale cancels in the ratio to the baseline, so they are left out there.
 
     Raises
     ------
@@ -85,6 +109,9 @@ class IdentificationSettings:
     position_bias: float | None = None
     assumed_mass: float = 1.0
     timing_uncertainty: float | None = None
+    area_uncertainty: float = 0.0
+    drive_scale_uncertainty: float = 0.0
+    position_scale_uncertainty: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -103,6 +130,12 @@ class IdentificationSettings:
         require_positive("assumed_mass", self.assumed_mass)
         if self.timing_uncertainty is not None:
             require_non_negative("timing_uncertainty", self.timing_uncertainty)
+        for name in CALIBRATION:
+            if not 0 <= getattr(self, name) < MOST_UNCERTAIN:
+                raise ValueError(
+                    f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got "
+                    f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
+                )
         object.__setattr__(self, "fixed", MappingProxyType(self._checked_fixed()))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)

@@ -33,9 +33,9 @@ _VERDICTS = (
 _FRICTION = "Friction against its baseline"
 _BUDGET = (
     "Where the intervals come from. By the record: its noise, what the model leaves of the motion, "
-    "and the imperfections of the valve. By the timing: a lag between the signals. The 95 % "
-    "interval is twice the root of the sum of their squares, or wider where other models are "
-    "nearly as probable."
+    "and the imperfections of the valve. By the timing: a lag between the signals. By the "
+    "calibration: the scales of diaphragm area and sensors. The 95 % interval is twice the root of "
+    "the sum of their squares, or wider where other models are nearly as probable."
 )
 _NO_STEM = (
     "The spring is zero or not identifiable, so the stem cannot be simulated: no force returns it. "

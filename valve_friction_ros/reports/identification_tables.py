@@ -13,7 +13,12 @@ import scipy
 
 import valve_friction_ros
 from valve_friction_ros.health import compared, dead_band, percentage
-from valve_friction_ros.identification import TIMING_UNCERTAINTY, Verdict, two_digits
+from valve_friction_ros.identification import (
+    CALIBRATION,
+    TIMING_UNCERTAINTY,
+    Verdict,
+    two_digits,
+)
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
 
@@ -118,6 +123,14 @@ def friction_table(record: IdentifiedRecord) -> Table:
         found = compared(record.result.parameters, record.result.sliding_speed, baseline)
     if found is not None and (ratio := diagnosis.ratio) is not None:
         excess, width = found.excess
+        if any(one.uncalibrated for one in record.result.parameters.values()):
+            rows.append(
+                (
+                    "uncertainty of the calibration",
+                    "left out of this comparison: the same area and sensors scale both frictions "
+                    "alike, which cancels in their ratio",
+                )
+            )
         rows += [
             ("excess friction", f"{excess:+.4g} ± {width:.2g} N"),
             (
@@ -175,6 +188,7 @@ def settings_table(record: IdentifiedRecord) -> Table:
         ("method", shown["method"]),
         *([("derivative window", f"{window} samples, {source}")] if window else []),
         *_timing(shown),
+        *_calibration(settings),
         *(result.drawing.settings or {}).items(),
         ("given parameters", fixed or "none"),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
@@ -201,11 +215,21 @@ def settings_table(record: IdentifiedRecord) -> Table:
 
 def _timing(shown: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return the timing uncertainty of a method that counts with one."""
-    if "uncertainty_budget" not in shown["evidence"]:
+    budget = shown["evidence"].get("uncertainty_budget", {})
+    if not any("timing" in sources for sources in budget.values()):
         return []
     given = shown["settings"]["timing_uncertainty"]
     told = f"{TIMING_UNCERTAINTY:g} s, by default" if given is None else f"{given:g} s, as given"
     return [("timing uncertainty, standard deviation of the lag between the signals", told)]
+
+
+def _calibration(settings: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the relative standard uncertainties of the scales that have one."""
+    return [
+        (f"relative standard uncertainty of {what}", percentage(settings[name]))
+        for name, what in CALIBRATION.items()
+        if settings[name]
+    ]
 
 
 def _versions() -> str:

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 
 from valve_friction_ros.identification import (
+    CALIBRATION,
     DEFAULT_METHOD,
     FIXABLE,
     METHODS,
@@ -53,6 +54,15 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard deviation in s of the whole lag between the signals, of the method robust; "
         f"by default {TIMING_UNCERTAINTY:g}",
     )
+    for name, what in CALIBRATION.items():
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=float,
+            default=getattr(defaults, name),
+            metavar="SHARE",
+            help=f"relative standard uncertainty of {what}, 0.02 for 2 %%: widens every interval "
+            "(%(default)g)",
+        )
     parser.add_argument(
         "--order",
         type=int,
@@ -97,5 +107,6 @@ def identification_settings(
         fixed=_fixed(options.fix, known),
         position_bias=options.position_bias,
         timing_uncertainty=options.timing_uncertainty,
+        **{name: getattr(options, name) for name in CALIBRATION},
         assumed_mass=known.get("mass", defaults.assumed_mass),
     )

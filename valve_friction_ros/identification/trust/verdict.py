@@ -1,7 +1,7 @@
 """The verdict on an identified number: how far it can be trusted."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from valve_friction_ros.identification.units import PARAMETER_UNITS
@@ -46,6 +46,9 @@ class Parameter:
         wide, SI unit; else nan.
     published : float
         Estimate of the published method, SI unit; nan where that method refused the record.
+    uncalibrated : Parameter or None
+        The same before the uncertainty of area and sensor scales widened its interval; None where
+        there is no such uncertainty.
     """
 
     name: str
@@ -56,6 +59,15 @@ class Parameter:
     reason: str = ""
     magnitude_bound: float = math.nan
     published: float = math.nan
+    uncalibrated: "Parameter | None" = field(default=None, repr=False)
+
+    @property
+    def without_calibration(self) -> "Parameter":
+        """The parameter as record and timing know it, to be compared with another such one.
+
+        The same area and sensors scale both numbers alike, which cancels in their ratio.
+        """
+        return self.uncalibrated or self
 
     @property
     def unit(self) -> str:

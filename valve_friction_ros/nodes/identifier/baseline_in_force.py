@@ -1,6 +1,7 @@
 """The baseline in force: parameter, service and history all set it here."""
 
 import math
+from collections.abc import Iterable
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -28,7 +29,8 @@ class BaselineInForce:
     """Puts a baseline in force: that of the parameter, of ``~/set_baseline`` or of the history.
 
     The parameter shows F_c of the baseline in force, nan where that has only a sliding friction. A
-    parameter that is set to another value stands for an exact F_c, and no sliding friction.
+    parameter that is set to another value stands for an exact F_c, and no sliding friction; nan
+    leaves no baseline.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor) -> None:
@@ -37,7 +39,7 @@ class BaselineInForce:
 
     def begin(self, kept: KeptBaseline | None, history: Path | None) -> None:
         """Take the baseline of the parameter, or else of the history, and log which."""
-        self.follow_parameter()
+        self._monitor.baseline = baseline_from(values_of(self._node, (BASELINE,)))
         given, log = self._monitor.baseline, self._node.get_logger()
         if given is not None:
             source = f"from the parameter {BASELINE.name}"
@@ -50,12 +52,14 @@ class BaselineInForce:
 
     def put_in_force(self, baseline: Baseline) -> None:
         """Compare with this baseline from now on."""
-        self._monitor.baseline = baseline
         shown = math.nan if baseline.coulomb_friction is None else baseline.coulomb_friction
         self._node.set_parameters([Parameter(BASELINE.name, value=shown)])
+        self._monitor.baseline = baseline  # after the node has followed the parameter
 
-    def follow_parameter(self) -> None:
-        """Put the parameter's baseline in force, unless its value is in force already."""
+    def follow_parameter(self, changes: Iterable[Parameter]) -> None:
+        """Follow a change of the parameter, unless its value is in force already."""
+        if BASELINE.name not in {one.name for one in changes}:
+            return
         given = baseline_from(values_of(self._node, (BASELINE,)))
-        if _value(given) != _value(self._monitor.baseline):
+        if given is None or _value(given) != _value(self._monitor.baseline):
             self._monitor.baseline = given

@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
+from rclpy.parameter import Parameter
 
 from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
 from valve_friction_ros.identification import RefusalError
@@ -149,10 +150,10 @@ class Identifier(PolledNode):
         if cleared is not None:
             self.get_logger().warning(cleared, throttle_duration_sec=_LOG_EVERY)
 
-    def _take_parameters(self, _: object) -> None:
+    def _take_parameters(self, changes: list[Parameter]) -> None:
         self._inputs.take()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
-        self._baseline.follow_parameter()
+        self._baseline.follow_parameter(changes)
         self._schedule.follow()
 
     def _on_time_jump(self, jump: TimeJump) -> None:

@@ -6,9 +6,11 @@ from typing import Any
 
 from valve_friction_ros.health import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.identification import (
+    CALIBRATION,
     DEFAULT_METHOD,
     FIXABLE,
     METHODS,
+    MOST_UNCERTAIN,
     TIMING_UNCERTAINTY,
     UNITS,
     IdentificationSettings,
@@ -115,6 +117,15 @@ CHANGEABLE = (
         f"volume before the diaphragm; .nan: {TIMING_UNCERTAINTY:g}, a plant without special care; "
         "0: the signals surely belong together",
     ),
+    *(
+        ParameterSpec(
+            name,
+            getattr(_DEFAULTS, name),
+            f"Relative standard uncertainty of {what} [-], 0.02 for 2 %: widens every interval",
+            (0.0, MOST_UNCERTAIN),
+        )
+        for name, what in CALIBRATION.items()
+    ),
     ParameterSpec(
         "polynomial_order", _DEFAULTS.order, "Order n of the derivative polynomial [-]", (2, 20)
     ),
@@ -175,6 +186,7 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
             position_bias=optional(values["position_bias"]),
             assumed_mass=values["assumed_mass"],
             timing_uncertainty=optional(values["timing_uncertainty"]),
+            **{name: values[name] for name in CALIBRATION},
         ),
         method=values["method"],
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),
