@@ -101,7 +101,7 @@ class TestGap:
             assert low < getattr(LOW_FRICTION, name) < high, name
         friction = answer["parameters"]["coulomb_friction"]
         assert friction["half_width"] < 0.25 * friction["value"]  # the first alarm
-        left_out = [note for note in answer["warnings"] if note.endswith(" are left out")]
+        left_out = [note for note in answer["warnings"] if note.endswith(" left out")]
         assert len(left_out) == 2
         assert {entry["published"] for entry in answer["parameters"].values()} == {None}
 

@@ -1,5 +1,7 @@
 """Identification every so many seconds, by the node's clock."""
 
+import math
+
 import pytest
 from builtin_interfaces.msg import Time
 from histories import as_kept
@@ -94,14 +96,16 @@ def test_by_simulated_time(live):
 
         client.wait_until(met, "a status")
 
-    def skip_after(time):  # the first clock comes long after zero, so the schedule is due at once
-        def condition(stamp, status):
-            age = float(values_of(status).get("scheduled_skip_age [s]", "inf"))
-            return skipped("no samples")(status) and stamp_of(stamp) / SECOND - age > time
-
-        return condition
+    def skipped_at(stamp, status):
+        age = float(values_of(status).get("scheduled_skip_age [s]", "nan"))
+        return stamp_of(stamp) / SECOND - age if skipped("no samples")(status) else math.nan
 
     tick_until(lambda _, status: "/clock" not in status.message, 0)
     reached = now
-    tick_until(skip_after(reached), 1)
-    assert 100 <= now - reached < 3 * 100
+    # The first clock comes long after zero, so the schedule is due at once, and 100 s later.
+    tick_until(lambda *one: skipped_at(*one) >= reached, 1)
+    tick_until(lambda *one: skipped_at(*one) >= reached + 100, 1)
+    times = {round(skipped_at(*one)) for one in client.statuses if skipped_at(*one) > 0}
+    first, second = sorted(times)[0], sorted(times)[-1]
+    assert reached <= first < reached + 100 <= second < reached + 300
+    assert sum(time < reached + 100 for time in times) == 1

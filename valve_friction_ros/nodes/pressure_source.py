@@ -1,6 +1,7 @@
 """Node `pressure_source`: a bench's pressure signal on a topic."""
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -32,6 +33,11 @@ __all__ = ["PARAMETERS", "PressureSource", "main"]
 
 _PAUSE = 0.02
 """Time between two blocks of samples, s."""
+
+_BLOCK = 50
+_LONGEST = 0.5
+"""Samples published together, and time, s, after which the rest waits for the next turn: a reliable
+subscription that is not emptied holds its publisher up, and the node must end when it is asked."""
 
 _SQUARE = SquareWave()
 
@@ -131,20 +137,24 @@ class PressureSource(PolledNode):
             self._start = now
             self._sent = 0
         elapsed = (now - self._start) / 1e9 * self._speed
-        due = int(elapsed / self._period) + 1 - self._sent
-        if due <= 0:
-            return
-        sample = self._sent + np.arange(due)
+        due = int(elapsed / self._period) + 1
+        until = time.monotonic() + _LONGEST
+        while self._sent < due and time.monotonic() < until:
+            self._publish(min(due - self._sent, _BLOCK), self._start)
+
+    def _publish(self, count: int, start: int) -> None:
+        """Publish the next `count` samples of a signal that began at `start`, ns."""
+        sample = self._sent + np.arange(count)
         pressure = self._response(self._excitation.sample(sample * self._period))
         if self._noise > 0:
-            pressure = pressure + self._noise * self._random.standard_normal(due)
+            pressure = pressure + self._noise * self._random.standard_normal(count)
         message = FluidPressure(variance=self._noise**2)
         message.header.frame_id = "actuator"
         for index, value in zip(sample, pressure, strict=True):
-            message.header.stamp = time_message(self._start + round(index * self._period * 1e9))
+            message.header.stamp = time_message(start + round(index * self._period * 1e9))
             message.fluid_pressure = float(value)
             self._publisher.publish(message)
-        self._sent += due
+        self._sent += count
 
     def _response(self, command: np.ndarray) -> np.ndarray:
         """Pass a block through the converter, continuing from the block before."""

@@ -1,6 +1,7 @@
 """Node `simulator`: a valve with Karnopp friction on real topics."""
 
 import sys
+import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -43,8 +44,10 @@ __all__ = ["PARAMETERS", "Simulator", "main"]
 _PAUSE = 0.02
 """Time between two looks for pressures, s: as often as `pressure_source` sends some."""
 
-_MOST = 1_000
-"""Pressures that the stem follows in one turn."""
+_LONGEST = 0.5
+"""Time, s, for which the stem follows pressures in one turn: a reliable subscription that is not
+emptied holds its publisher up, and the node must end when it is asked."""
+
 _MOST_WAITING = 20_000
 """Pressures that wait until the model is compiled; then the oldest are given up."""
 
@@ -105,7 +108,8 @@ class Simulator(PolledNode):
         self._waiting.extend(taken.message for taken in self._pressures.take())
         if not self._readiness.look():
             return
-        for _ in range(min(len(self._waiting), _MOST)):
+        until = time.monotonic() + _LONGEST
+        while self._waiting and time.monotonic() < until:
             self._follow(self._waiting.popleft())
 
     def _follow(self, message: FluidPressure) -> None:

@@ -22,7 +22,7 @@ from valve_friction_ros.identification.robust.fitted_record import FittedRecord
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.weights import reading_weights
 
-__all__ = ["ABSENT", "BroadModel", "Simulated"]
+__all__ = ["ABSENT", "SWINGING", "BroadModel", "Simulated"]
 
 ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
 """Nothing imperfect; the mass has to be set."""
@@ -33,7 +33,7 @@ _LARGEST_COARSENESS = 10.0
 _STEPPED = 30
 """Time of a step with an event over that of one that takes a short cut."""
 
-_SWINGING = 2e-3
+SWINGING = 2e-3
 _OVER_SWING = 1e-3
 """A delay F_v/k, s, below which a stem may swing, and the change by which to differentiate there:
 through the swings a small one means nothing."""
@@ -157,7 +157,7 @@ class BroadModel:
         """Return the change of a straight coordinate by which to differentiate."""
         spring = max(at["spring_constant"], 1e-6)
         dry = max(abs(at["coulomb_friction"]), 1e-6) / spring
-        if name == "viscous_friction" and at[name] / spring < _SWINGING:
+        if name == "viscous_friction" and at[name] / spring < SWINGING:
             return _OVER_SWING
         if name == "slip_force":
             return IMPERFECTIONS[name].step * dry

@@ -8,6 +8,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.robust.broad_model import SWINGING
 from valve_friction_ros.identification.robust.coordinates import MAIN
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.numbers import (
@@ -110,11 +111,23 @@ def _budget(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> Budget:
 
 
 def _half_width(fit: PosteriorFit, stage: Stage, number: ReportedNumber) -> float:
-    """Half width at one place; what the fit has not done yet is added in full."""
+    """Half width at one place; what the fit has not done yet is added in full.
+
+    Where the stem swings, F_v is taken to be unknown by the delay k·τ that a lag makes up for.
+    """
     gradient = _vector(fit, number)
     variance = float(gradient @ stage.covariance @ gradient) + number.definition**2
+    if _swings(stage) and "delay" in fit.names:
+        lag = fit.precision[fit.names.index("delay")] ** -0.5
+        viscous = number.gradient.get("viscous_friction", 0.0)
+        variance += (viscous * stage.at["spring_constant"] * lag) ** 2
     left = abs(float(gradient @ _possible(fit)))
     return _QUANTILE * math.sqrt(max(variance, 0.0)) + left
+
+
+def _swings(stage: Stage) -> bool:
+    """Return whether F_v is so small that the stem swings, and the linear model means little."""
+    return stage.at["viscous_friction"] < SWINGING * stage.at["spring_constant"]
 
 
 def _possible(fit: PosteriorFit) -> NDArray[np.float64]:
@@ -136,7 +149,8 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
     """Return the reported numbers with their intervals, of the best fit and its competitors.
 
     Of the places that the best fit came by, and of the ends of the others, those count whose
-    probability chance may have lowered. The one with the least imperfections among them gives the
+    probability chance may have lowered. Among those with all coordinates, and with a viscous
+    friction that keeps the stem from swinging, the one with the least imperfections gives the
     values; the intervals reach to what the others say, the less probable ones less far: along a
     bent valley the linear model at one place sees too little. Where the residual is more than
     noise, or the imperfections are larger than usual, the interval of the sliding friction also
@@ -152,7 +166,9 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
         for stage, cost in zip(stages, costs, strict=True)
         if cost - least < chance
     ]
-    places.sort(key=lambda place: place[1].penalty)
+    places.sort(
+        key=lambda place: (place[0].names != fit.names, _swings(place[1]), place[1].penalty)
+    )
     readings = [reported_numbers(fit.model, stage.at) for _, stage, _ in places]
     result = {}
     for name, first in readings[0].items():
