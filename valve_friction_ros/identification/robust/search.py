@@ -151,12 +151,10 @@ class _Search:
         best = min(apart, key=lambda one: one.objective)
         return self.fit(best.at, names, _MORE_STEPS)
 
-    def slipping(self, full: PosteriorFit) -> PosteriorFit:
-        """Fit friction that falls as soon as the stem moves."""
-        starts = []
-        overall = {**self.base, **overall_spring(self.model.record)}
-        plain = {**self.base, **{name: full.at[name] for name in (*MAIN, *TIMING)}}
-        for at in (self.base, plain, overall):
+    def slip_starts(self, *places: Coordinates) -> list[Coordinates]:
+        """Return starts whose friction falls as soon as the stem moves."""
+        starts: list[Coordinates] = []
+        for at in places:
             total = max(at["coulomb_friction"], 0.1 * self.sliding.friction)
             for share in _SLIP_SHARES:
                 for slip in _SLIPS:
@@ -169,6 +167,13 @@ class _Search:
                             "slip_force": slip * share * total,
                         }
                     )
+        return starts
+
+    def slipping(self, full: PosteriorFit) -> PosteriorFit:
+        """Fit friction that falls as soon as the stem moves."""
+        overall = {**self.base, **overall_spring(self.model.record)}
+        plain = {**self.base, **{name: full.at[name] for name in (*MAIN, *TIMING)}}
+        starts = self.slip_starts(self.base, plain, overall)
         names = (*self.main, "slip_force")
         near = nearest(self.model, starts)[:_TRIED]
         trials = [self.fit(one, names, _MORE_STEPS) for one in near]
@@ -258,15 +263,27 @@ class _Search:
                 best, others = deeper, [*others, best]
         return [best, *others]
 
+    def start(self) -> Coordinates:
+        """Fit few coordinates, without and with a slip, each with its likeliest lag."""
+        plain = self.lagged(splits(self.sliding, self.base), self.main)
+        if "slip_force" not in self.all:
+            return plain.at
+        slipping = self.slip_starts(self.base, {**self.base, **plain.at})
+        slipped = self.lagged(slipping, (*self.main, "slip_force"))
+        return min(plain, slipped, key=lambda one: one.objective).at
+
+    def lagged(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
+        """Fit from the nearest start, and again from there with the likeliest lag."""
+        plain = self.fit(nearest(self.model, starts)[0], names, _FEW_STEPS)
+        if not self.timing:
+            return plain
+        lags = [plain.at, *lagging(plain.at, self.prior.timing_uncertainty)]
+        near = nearest(self.model, lags)[0]
+        return self.fit(near, tuple(dict.fromkeys((*names, *self.timing))), _FEW_STEPS)
+
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
-        starts = splits(self.sliding, self.base)
-        plain = self.fit(nearest(self.model, starts)[0], self.main, _FEW_STEPS).at
-        if self.timing:
-            lags = [plain, *lagging(plain, self.prior.timing_uncertainty)]
-            lagged = nearest(self.model, lags)[0]
-            plain = self.fit(lagged, (*self.main, *self.timing), _FEW_STEPS).at
-        best = self.full(plain)
+        best = self.full(self.start())
         branches = [self.stopping]
         if "slip_force" in self.all:
             branches = [self.slipping, self.falling, self.stopping]
