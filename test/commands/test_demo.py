@@ -336,10 +336,16 @@ def test_the_whole_story(ros_environment, tmp_path):
         assert float(published) == pytest.approx(float(true), rel=1e-3)
         assert abs(float(refined_value) - float(true)) <= 3 * float(half_width)
     assert len(re.findall(r"static_friction N \S+ \S+ \S+ % – not identifiable", words)) == 2
-    assert re.search(
-        r"/diagnostics ERROR: excess friction: coulomb friction is 3\.97 \(3\.9\d to 3\.9\d\) "
-        "times its baseline; the stem ignores reversals smaller than 21 % of its travel",
+    said = re.search(
+        r"/diagnostics ERROR: excess friction: sliding friction at (\S+) mm/s is (\S+) "
+        r"\((\S+) to (\S+)\) times its baseline; "
+        "the stem ignores reversals smaller than 21 % of its travel",
         words,
     )
+    assert said
+    speed, ratio, low, high = map(float, said.groups())
+    grown = (606.0 + 44800.0 * 1e-3 * speed) / (152.7 + 4865.0 * 1e-3 * speed)
+    assert low < ratio < high
+    assert ratio == pytest.approx(grown, rel=5e-3)
     assert "outside the tolerance" not in words
     assert output.read_bytes().startswith(PNG)

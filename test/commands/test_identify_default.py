@@ -136,7 +136,7 @@ class TestTimingUncertainty:
     def test_signals_that_surely_belong_together_have_no_share(self, printed, path, bench_options):
         """And leave the work of friction less uncertain; all values are finite still."""
         sure = printed(path, *bench_options, "--timing-uncertainty", "0")
-        unsure = printed(path, *bench_options, "--timing-uncertainty", "0.2")
+        unsure = printed(path, *bench_options, "--timing-uncertainty", "0.08")
         assert set(timing(sure).values()) == {0.0}
         assert min(timing(unsure).values()) > 0
         widths = [one["parameters"]["sliding_friction"]["half_width"] for one in (sure, unsure)]

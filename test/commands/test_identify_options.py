@@ -52,7 +52,7 @@ class TestOptions:
         assert answer["evidence"]["published_window"] == answer["derivative_window"] == 15
         assert answer["settings"]["order"] == 4
         expected = identify_refined(quick_record, BENCH_VALVE, settings)
-        assert column(answer, "published") == expected.estimate.values
+        assert column(answer, "published") == {**expected.estimate.values, "sliding_friction": None}
         assert known(answer) == {
             name: value for name, value in expected.values.items() if not math.isnan(value)
         }
@@ -69,7 +69,7 @@ class TestOptions:
         path.write_text("diaphragm_area: 0.089\npressure_reference: 41740.0\n")
         once = printed(quick_csv, *bench_options, *REFINED, "--fix", "mass=1.6")
         twice = printed(quick_csv, "--valve", path, *REFINED, "--fix", "mass=3.2")
-        doubled = {name: 2 * value for name, value in column(once, "published").items()}
+        doubled = {name: value and 2 * value for name, value in column(once, "published").items()}
         assert column(twice, "published") == doubled
         assert known(twice) == pytest.approx(
             {name: 2 * value for name, value in known(once).items()}, rel=1e-6
@@ -90,7 +90,8 @@ class TestOptions:
         assert known(found) == pytest.approx(known(expected), rel=1e-9)
         for answer in (found, expected):
             del answer["settings"]["assumed_mass"]  # of the valve file
-        refined = ("parameters", "fit", "rms", "systematic_misfit")
+        assert found["sliding_speed"] == pytest.approx(expected["sliding_speed"], rel=1e-9)
+        refined = ("parameters", "fit", "rms", "systematic_misfit", "sliding_speed")
         assert {key: found[key] for key in found if key not in refined} == {
             key: expected[key] for key in expected if key not in refined
         }

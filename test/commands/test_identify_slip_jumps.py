@@ -64,12 +64,12 @@ class TestSlipJumps:
     def test_a_slip_jump_tells_the_static_friction(self, printed, file_of, options):
         answer = printed(file_of(SLIPPING), *options)
         self.assert_true(answer, SLIPPING)
-        assert list(answer["parameters"]) == list(UNITS)
+        assert list(answer["parameters"]) == [*UNITS, "sliding_friction"]
 
     def test_a_fall_of_the_friction_is_told_with_its_speed(self, printed, file_of, options):
         answer = printed(file_of(FALLING), *options)
         self.assert_true(answer, FALLING)
-        assert list(answer["parameters"]) == [*UNITS, "stribeck_velocity"]
+        assert list(answer["parameters"]) == [*UNITS, "stribeck_velocity", "sliding_friction"]
         entry = answer["parameters"]["stribeck_velocity"]
         assert set(entry) == PARAMETER_KEYS
         assert (entry["unit"], entry["published"]) == ("m/s", None)
