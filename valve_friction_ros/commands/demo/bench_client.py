@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 
 from valve_friction_ros.model import Recording
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
 from valve_friction_ros.streams import RecordBuffer
 from valve_friction_ros.streams.record_buffer import Snapshot
@@ -50,12 +51,19 @@ class BenchClient(Node):
             service: self.create_client(Trigger, f"{self._identifier}/{service}")
             for service in ("identify", "set_baseline", "clear")
         }
-        self.create_subscription(FluidPressure, "actuator_pressure", self._on_pressure, stream())
-        self.create_subscription(JointState, "stem_state", self._on_stem, stream())
+        # Taken in blocks, as the nodes do: a callback a sample would take most of a processor.
+        self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
+        self._stems = PolledSubscription(self, JointState, "stem_state", stream())
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
         self.create_subscription(
             Float64MultiArray, f"{self._identifier}/sweep", self._on_sweep, LATCHED
         )
+
+    def _take(self) -> None:
+        for taken in self._pressures.take():
+            self._on_pressure(taken.message)
+        for taken in self._stems.take():
+            self._on_stem(taken.message)
 
     def _on_pressure(self, message: FluidPressure) -> None:
         self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
@@ -115,6 +123,7 @@ class BenchClient(Node):
             if time.monotonic() > deadline:
                 raise BenchError(f"no {what} within {timeout:g} s")
             self._executor.spin_once(timeout_sec=_POLL)
+            self._take()
 
     def _result(self, future: Future, timeout: float, what: str) -> Any:
         self.wait(future.done, timeout, f"answer of {what}")
