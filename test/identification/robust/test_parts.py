@@ -7,6 +7,8 @@ from valve_friction_ros.identification.robust.bounded_step import bounded_minimu
 from valve_friction_ros.identification.robust.broad_model import ABSENT, BroadModel
 from valve_friction_ros.identification.robust.fitted_record import fitted_record
 from valve_friction_ros.identification.robust.imperfections import TIMING
+from valve_friction_ros.identification.robust.intervals import Budget
+from valve_friction_ros.identification.robust.sentences import main_doubt
 from valve_friction_ros.identification.robust.starts import lagging
 from valve_friction_ros.identification.robust.weights import inflation
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
@@ -104,3 +106,11 @@ def test_difference_of_the_halves_is_foreseen(model):
     even, odd = (model.record.position - model.readings(at)) * model.weights
     apart = 0.25 * float(np.sum((even - odd) ** 2))
     assert 0.2 * model.foreseen_difference < apart < 1.2 * model.foreseen_difference
+
+
+def test_every_source_has_words():
+    """Also the place of the stem at first, which is no imperfection of a plant."""
+    for name in (*ABSENT, "start_position"):
+        doubt = main_doubt(Budget(1.0, 0.0, {name: 2.0}), 0.2)
+        assert doubt.startswith("its interval is ±20 % of its value: the record does not determine")
+    assert main_doubt(Budget(1.0, 0.0, {"drift": 0.1}), 0.2).endswith("leaves of the motion")

@@ -28,6 +28,7 @@ _LEAST = {
 }
 """Least size of an imperfection that is worth a sentence, in its own unit."""
 
+_START = "where the stem was at first"
 _SHARE = 0.2
 """Share of the variance from which on a source is named."""
 
@@ -78,7 +79,7 @@ def main_doubt(budget: Budget, width: float) -> str:
     """Name what makes an interval wide: the imperfections that the record leaves open."""
     total = sum(source**2 for source in budget.sources.values()) + budget.record**2
     named = [
-        IMPERFECTIONS[name].words
+        _START if name == "start_position" else IMPERFECTIONS[name].words
         for name, source in sorted(budget.sources.items(), key=lambda item: -item[1])
         if source**2 > _SHARE * total
     ]
