@@ -34,10 +34,11 @@ class Bound:
 
 
 def _share(what: str, part: int, whole: int, least: float) -> Bound:
-    share = part / whole if whole else math.nan
-    return Bound(
-        f"{what}: at least {least:.0%}", f"{part} of {whole} ({share:.1%})", not share < least
-    )
+    required = f"{what}: at least {least:.0%}"
+    if not whole:
+        return Bound(required, "not measured", False)
+    share = part / whole
+    return Bound(required, f"{part} of {whole} ({share:.1%})", share >= least)
 
 
 def _largest(what: str, seconds: Sequence[float], most: float) -> Bound:
