@@ -298,10 +298,11 @@ class _Search:
 def search(record: FittedRecord, prior: Prior) -> list[PosteriorFit]:
     """Find the most probable model of a record, and the ones that compete with it.
 
-    The sliding friction of a regression is split into F_c and F_v in several ways; the way whose
-    simulated stem is nearest starts a fit of the Karnopp model alone, and that a fit with all
-    imperfections. Where the residual is more than noise, a friction that falls with speed and a
-    dead zone are tried as well.
+    The sliding friction of a regression is split into F_c and F_v in several ways, without and
+    with a slip. The way whose simulated stem is nearest starts a fit of the Karnopp model alone,
+    that one with the likeliest lag, and the better of both a fit with all imperfections. Where the
+    residual is more than noise, a slip, a friction that falls with speed and a dead zone are tried
+    as well. At the end viscous friction is traded for lag, both ways along their common valley.
 
     Raises
     ------
