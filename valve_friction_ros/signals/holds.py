@@ -25,10 +25,11 @@ def without_repeats(signal: StampedSignal) -> StampedSignal:
     signal that is not held is returned as it is. Where a source sent the same value again, the
     sample in its place is kept.
     """
-    changes = np.flatnonzero(np.diff(signal.value)) + 1
+    steps = np.diff(signal.value)
+    changes = np.flatnonzero(steps) + 1
     if changes.size < _FEWEST:
         return signal
-    runs, jumps = np.diff(changes), np.abs(np.diff(signal.value)[changes - 1])
+    runs, jumps = np.diff(changes), np.abs(steps[changes - 1])
     shortest = float(np.quantile(runs, 2 * _FEW))
     hold = float(np.median(runs[runs < 2 * shortest]))
     is_steady = np.mean(runs < _SHORTER * hold) < _FEW

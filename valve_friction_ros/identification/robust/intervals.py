@@ -183,7 +183,6 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
         if name == SLIDING:
             lost = fit.model.record.lost / fit.model.record.duration
             width = math.hypot(width, _LOST * lost * abs(first.value))
-        if name == SLIDING:
             loop = loop_friction(fit.model, places[0][1].at)
             apart = abs(loop - first.value)
             unlike = fit.inflation > _NOT_QUITE or fit.stages[-1].penalty > UNLIKELY

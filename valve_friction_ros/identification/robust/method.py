@@ -18,6 +18,7 @@ from valve_friction_ros.identification.robust.search import Prior, search
 from valve_friction_ros.identification.robust.sentences import found_imperfections
 from valve_friction_ros.identification.robust.verdicts import fit_misfit, fit_verdicts
 from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.identification.trust.calibration import BUDGET
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
     require_enough_samples,
@@ -119,7 +120,7 @@ def identify_robust(
         ),
         evidence={
             **({} if published is None else sweep_evidence(published)),
-            "uncertainty_budget": {
+            BUDGET: {
                 name: {"record": one.budget.record, "timing": one.budget.timing}
                 for name, one in numbers.items()
             },

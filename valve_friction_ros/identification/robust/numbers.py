@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.broad_model import BroadModel
 from valve_friction_ros.identification.robust.coordinates import Coordinates
+from valve_friction_ros.identification.trust.sliding import mean_over_distance, mean_speed
 
 __all__ = ["ReportedNumber", "loop_friction", "reported_numbers"]
 
@@ -43,23 +43,18 @@ class ReportedNumber:
     definition: float
 
 
-def _weighted(values: NDArray[np.float64], speed: NDArray[np.float64]) -> float:
-    """Mean over the distance that the stem slides."""
-    return float(np.sum(values * speed) / max(np.sum(speed), np.finfo(float).tiny))
-
-
 def _sliding(model: BroadModel, at: Coordinates) -> ReportedNumber:
     """Return ∫|F_friction|·|dx| / ∫|dx| of the simulated stem."""
     slow = model.record.slow
     velocity = model.simulate(at).velocity
     speed = np.abs(velocity)
-    mean = _weighted(speed, speed)
-    place, age = _weighted(slow.place, speed), _weighted(slow.age, speed)
-    low = _weighted(slow.slowness, speed)
+    mean = mean_speed(speed)
+    place, age = mean_over_distance(slow.place, speed), mean_over_distance(slow.age, speed)
+    low = mean_over_distance(slow.slowness, speed)
     dry, viscous = at["coulomb_friction"], at["viscous_friction"]
     falling = 0.0
     if at["stribeck_velocity"] > 0:
-        falling = _weighted(np.exp(-((speed / at["stribeck_velocity"]) ** 2)), speed)
+        falling = mean_over_distance(np.exp(-((speed / at["stribeck_velocity"]) ** 2)), speed)
     share = 1 + at["along_travel"] * place + at["in_record"] * age + at["at_low_speed"] * low
     value = dry * share + viscous * mean + at["slip_force"] * falling
     gradient = {
