@@ -6,6 +6,7 @@ PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
 BENCH_ARGS ?=
 REALITY_ARGS ?=
+CHURN_ARGS ?=
 MUTANTS_ARGS ?=
 
 SHELL := /bin/bash
@@ -71,6 +72,10 @@ reality: venv  ## the estimate on valves and sensors with imperfections; REALITY
 .PHONY: bench
 bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.speed $(BENCH_ARGS)
+
+.PHONY: churn
+churn: venv  ## nodes under clients that come and go for an hour; CHURN_ARGS="--minutes 5" for less
+	@"$(VENV)/bin/python" -m benchmark.churn $(CHURN_ARGS)
 
 .PHONY: mutants
 mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some

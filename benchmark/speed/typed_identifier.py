@@ -9,6 +9,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.nodes.identifier import node as identifier
+from valve_friction_ros.nodes.identifier.workers import running_workers
 from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
@@ -57,8 +58,8 @@ def main() -> int:
     for create in ("create_publisher", "create_subscription"):  # with its callbacks for events
         setattr(identifier.Identifier, create, getattr(Node, create))
     rclpy.init()
-    with identifier.identification_worker() as worker:
-        node = identifier.Identifier(worker)
+    with running_workers() as workers:
+        node = identifier.Identifier(workers)
         try:
             rclpy.spin(node)
         except (KeyboardInterrupt, ExternalShutdownException):

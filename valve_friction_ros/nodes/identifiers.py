@@ -7,10 +7,10 @@ from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
 from valve_friction_ros.nodes.identifier import parameters
-from valve_friction_ros.nodes.identifier.node import Identifier, identification_worker
+from valve_friction_ros.nodes.identifier.node import Identifier
+from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
 from valve_friction_ros.nodes.plumbing.running import run_nodes
-from valve_friction_ros.nodes.plumbing.worker import Worker
 
 __all__ = ["PARAMETERS", "identifiers_of_valves", "main"]
 
@@ -21,7 +21,7 @@ PARAMETERS = (_VALVES, *parameters.PARAMETERS)
 """Its own, and those of its identifiers."""
 
 
-def identifiers_of_valves(worker: Worker) -> Iterator[Node]:
+def identifiers_of_valves(workers: Workers) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve of its parameter.
 
     Raises
@@ -44,7 +44,7 @@ def identifiers_of_valves(worker: Worker) -> Iterator[Node]:
     for place in places:
         validate_namespace(place)
     for place in places:
-        identifier = Identifier(worker, place)
+        identifier = Identifier(workers, place)
         yield identifier
         if identifier.get_namespace() != place:
             raise ValueError(
@@ -55,8 +55,8 @@ def identifiers_of_valves(worker: Worker) -> Iterator[Node]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the nodes."""
-    with identification_worker() as worker:
-        return run_nodes(lambda: identifiers_of_valves(worker), arguments)
+    with running_workers() as workers:
+        return run_nodes(lambda: identifiers_of_valves(workers), arguments)
 
 
 if __name__ == "__main__":

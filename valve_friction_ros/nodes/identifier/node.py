@@ -1,8 +1,7 @@
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
-import contextlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -12,7 +11,6 @@ from rclpy.parameter import Parameter
 
 from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.identification.preparation import compile_methods
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -31,6 +29,7 @@ from valve_friction_ros.nodes.identifier.results import ResultTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
 from valve_friction_ros.nodes.identifier.status import friction_status, stuck_status, trend_values
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
+from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
@@ -42,23 +41,12 @@ from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT
-from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.streams import Arrivals
 
-__all__ = ["PARAMETERS", "Identifier", "identification_worker", "main"]
+__all__ = ["PARAMETERS", "Identifier", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
-
-
-@contextlib.contextmanager
-def identification_worker() -> Iterator[Worker]:
-    """Provide the thread that identifies; at the end, tasks that still wait are dropped."""
-    worker = Worker("identify", compile_methods)
-    try:
-        yield worker
-    finally:
-        worker.shutdown(wait=False, cancel_futures=True)
 
 
 class Identifier(PolledNode):
@@ -69,19 +57,19 @@ class Identifier(PolledNode):
 
     Parameters
     ----------
-    worker : Worker
-        Identifies.
+    workers : Workers
+        Its threads, which identifiers of one process share.
     namespace : str, optional
         Namespace of the valve, where it is not given by a ROS argument.
     """
 
-    def __init__(self, worker: Worker, namespace: str | None = None) -> None:
+    def __init__(self, workers: Workers, namespace: str | None = None) -> None:
         super().__init__("identifier", namespace=namespace)
         declare_parameters(self, PARAMETERS)
         values = values_of(self, CHANGEABLE)
         require_valid(values)
         reject_invalid(self, CHANGEABLE, require_valid)
-        self._worker = worker
+        self._workers = workers
         self._monitor = FrictionMonitor(monitor_settings(values))
         tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
         self._results = ResultTopics(self)
@@ -89,7 +77,7 @@ class Identifier(PolledNode):
         joint = self.get_parameter(JOINT.name).value
         self._inputs = ValveInputs(self, joint, self._take_samples)
         pressure, stem, _ = self._inputs.names
-        self._readiness = Readiness(self, worker, f"identifies {pressure} and {stem}")
+        self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
         self._level_log = LevelLog(self)
         self._identifying = False
@@ -130,11 +118,15 @@ class Identifier(PolledNode):
 
     def overdue(self) -> str | None:
         """Say that the work under way has not ended within its limit, if so."""
-        limit, busy = self.get_parameter(IDENTIFICATION_LIMIT.name).value, self._worker.busy_for()
+        limit = self.get_parameter(IDENTIFICATION_LIMIT.name).value
+        busy, thread = max(
+            (self._workers.identify.busy_for(), "identifications"),
+            (self._workers.files.busy_for(), "bags and reports"),
+        )
         if busy <= limit:
             return None
         return (
-            f"the thread of identifications has not ended its work for {busy:.0f} s, beyond "
+            f"the thread of {thread} has not ended its work for {busy:.0f} s, beyond "
             f"{IDENTIFICATION_LIMIT.name} ({limit:g} s): restart the node"
         )
 
@@ -220,7 +212,7 @@ class Identifier(PolledNode):
         self._identifying = True
         try:
             with bugs_reported(self, known=self._monitor.internal_error):
-                result = await done_in(self._worker, identify_snapshot, *record)
+                result = await done_in(self._workers.identify, identify_snapshot, *record)
                 self._monitor.accept(result, self.get_clock().now().nanoseconds)
                 self._results.publish(result, self._monitor)
                 self.get_logger().info(f"identified: {self._monitor.diagnosis().message}")
@@ -233,7 +225,8 @@ class Identifier(PolledNode):
     async def _save(self) -> str:
         self._inputs.take()
         try:
-            return str(await saved_bag(self, self._monitor, self._inputs.names, self._worker))
+            names, files = self._inputs.names, self._workers.files
+            return str(await saved_bag(self, self._monitor, names, files))
         except RefusalError as refusal:
             self.get_logger().warning(f"the buffer was not saved: {refusal}")
             raise
@@ -241,7 +234,7 @@ class Identifier(PolledNode):
     async def _report(self) -> str:
         try:
             tag = self._history.valve.tag
-            return str(await written_report(self, self._monitor, tag, self._worker))
+            return str(await written_report(self, self._monitor, tag, self._workers.files))
         except RefusalError as refusal:
             self.get_logger().warning(f"no report was written: {refusal}")
             raise
@@ -293,8 +286,8 @@ class Identifier(PolledNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    with identification_worker() as worker:
-        return run_node(lambda: Identifier(worker), arguments)
+    with running_workers() as workers:
+        return run_node(lambda: Identifier(workers), arguments)
 
 
 if __name__ == "__main__":

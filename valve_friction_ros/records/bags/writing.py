@@ -4,6 +4,7 @@ import errno
 import heapq
 import os
 import shutil
+import struct
 import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -37,25 +38,40 @@ _LARGEST_STAMP = (2**31 - 1) * 1_000_000_000
 
 _NOTHING = np.zeros(0)
 
+_STAMP, _VALUE = struct.Struct("<iI"), struct.Struct("<d")
+_STAMP_PLACE = 4
+"""A header begins a message, behind four bytes of the encoding."""
+_MARK = 1.2345e67
+"""Stands for the value of a sample."""
+
+
+def _messages(samples: Samples, message: object, kind: str) -> Iterator[tuple[int, str, bytes]]:
+    """Yield stamp, type and bytes of each sample: those of `message`, with stamp and value put in.
+
+    Encoding each by itself would take five times as long.
+    """
+    data = bytearray(encode(message, kind))
+    place = data.index(_VALUE.pack(_MARK))
+    for stamp, value in zip(samples.stamps.tolist(), samples.values.tolist(), strict=True):
+        _STAMP.pack_into(data, _STAMP_PLACE, *divmod(stamp, 1_000_000_000))
+        _VALUE.pack_into(data, place, value)
+        yield stamp, kind, bytes(data)
+
 
 def _pressures(samples: Samples) -> Iterator[tuple[int, str, bytes]]:
-    kind = TYPES.types[PRESSURE_TYPE]
-    for stamp, pressure in zip(samples.stamps.tolist(), samples.values.tolist(), strict=True):
-        message = kind(header=header(stamp), fluid_pressure=pressure, variance=0.0)
-        yield stamp, PRESSURE_TYPE, encode(message, PRESSURE_TYPE)
+    message = TYPES.types[PRESSURE_TYPE](header=header(0), fluid_pressure=_MARK, variance=0.0)
+    return _messages(samples, message, PRESSURE_TYPE)
 
 
 def _positions(samples: Samples, joint: str) -> Iterator[tuple[int, str, bytes]]:
-    kind = TYPES.types[STEM_TYPE]
-    for stamp, position in zip(samples.stamps.tolist(), samples.values, strict=True):
-        message = kind(
-            header=header(stamp),
-            name=[joint] if joint else [],
-            position=np.array([position]),
-            velocity=_NOTHING,
-            effort=_NOTHING,
-        )
-        yield stamp, STEM_TYPE, encode(message, STEM_TYPE)
+    message = TYPES.types[STEM_TYPE](
+        header=header(0),
+        name=[joint] if joint else [],
+        position=np.array([_MARK]),
+        velocity=_NOTHING,
+        effort=_NOTHING,
+    )
+    return _messages(samples, message, STEM_TYPE)
 
 
 def _write(folder: Path, snapshot: Snapshot, names: StreamNames) -> None:

@@ -1,0 +1,1 @@
+"""Nodes that stream while clients, and whole participants, come and go by the thousands."""

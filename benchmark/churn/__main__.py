@@ -1,0 +1,137 @@
+"""Let clients come and go against streaming nodes: python -m benchmark.churn, or `make churn`."""
+
+import argparse
+import contextlib
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmark.churn.crowd import Crowd
+from benchmark.churn.ledger import Ledger
+from benchmark.churn.places import nodes, process_of
+from benchmark.churn.processes import NodeProcess, Usage
+from benchmark.churn.summary import rows
+from benchmark.speed.table import machine_shape, rows_table
+from valve_friction_ros.commands.demo.bench_processes import free_domain
+
+__all__ = ["main"]
+
+_WIDTH_OF_A_FILE = 120
+_TURN = 0.05
+_LOOK = 10.0
+_SETTLED = 60.0
+_SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where Fast DDS has its files
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="churn", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0, help="how long (%(default)g)")
+    parser.add_argument("--at-once", type=int, default=4, help="visitors at a time (%(default)s)")
+    parser.add_argument("--seed", type=int, help="of all chance; default: drawn, and printed")
+    parser.add_argument("--folder", type=Path, help="of ledger and logs; default: a new one")
+    return parser
+
+
+def _shared_memory() -> tuple[int, float]:
+    """Return the number of Fast DDS's files and what they hold, MB."""
+    sizes = []
+    for file in _SHARED_MEMORY.glob("*fastrtps*"):
+        with contextlib.suppress(FileNotFoundError):
+            sizes.append(file.stat().st_blocks * 512)
+    return len(sizes), sum(sizes) / 1e6
+
+
+@contextlib.contextmanager
+def _environment() -> Iterator[int]:
+    """Provide a domain of this machine that nobody else uses."""
+    with free_domain() as domain:
+        os.environ |= {
+            "ROS_DOMAIN_ID": str(domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "RCUTILS_COLORIZED_OUTPUT": "0",
+        }
+        yield domain
+
+
+def _run(folder: Path, seconds: float, crowd: Crowd, ledger: Ledger) -> None:
+    """Run the plant and the crowd, then end the plant."""
+    processes: dict[str, NodeProcess] = {}
+    try:
+        for name, node in nodes(folder).items():
+            processes[name] = NodeProcess(node, folder / f"{name}.log")
+        crowd.begin(folder, seconds)
+        _watch(processes, seconds, crowd, ledger)
+        crowd.end()
+    finally:
+        crowd.end(0.0)
+        for number, (name, process) in enumerate(processes.items()):
+            if process.exit_code() is None:
+                took = process.end((signal.SIGINT, signal.SIGTERM)[number % 2])
+                code = process.exit_code()
+                ledger.add("ending", node=name, alive=seconds, seconds=took, code=code)
+
+
+def _watch(processes: dict[str, NodeProcess], seconds: float, crowd: Crowd, ledger: Ledger) -> None:
+    """Let the crowd come and go until the time is over or a node has died."""
+    begin = next_look = time.monotonic()
+    early: dict[str, Usage] = {}
+    most = (0, 0.0)
+    while (elapsed := time.monotonic() - begin) < seconds:
+        crowd.turn()
+        if time.monotonic() > next_look:
+            next_look += _LOOK
+            most = max(most, _shared_memory(), key=lambda one: one[1])
+            if _have_died(processes, ledger):
+                break
+            if not early and elapsed > min(_SETTLED, seconds / 2):
+                early = {name: process.usage() for name, process in processes.items()}
+        time.sleep(_TURN)
+    for name, process in processes.items():
+        if process.exit_code() is None and name in early:
+            ledger.add("node", name=name, **process.usage().since(early[name]))
+    ledger.add("shared memory", files=most[0], megabytes=most[1])
+
+
+def _have_died(processes: dict[str, NodeProcess], ledger: Ledger) -> bool:
+    """Note the nodes that are gone, and those that hang, with their stacks in their logs."""
+    died = False
+    for event in [one for one in ledger.events() if one["kind"] == "hang"]:
+        hung = processes[process_of(event["service"])]
+        if hung.exit_code() is None:
+            hung.write_stacks()
+    for name, process in processes.items():
+        if process.exit_code() is not None:
+            ledger.add("died", name=name, code=process.exit_code())
+            died = True
+    return died
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the churn; return 1 if a goal is missed."""
+    options = _parser().parse_args(arguments)
+    seed = random.SystemRandom().randrange(2**31) if options.seed is None else options.seed
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="churn_"))
+    folder.mkdir(parents=True, exist_ok=True)
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
+    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
+    with _environment() as domain:
+        console.print(f"seed {seed}, domain {domain}, ledger and logs in {folder}", soft_wrap=True)
+        ledger = Ledger(folder / "ledger.jsonl")
+        _run(folder, 60 * options.minutes, Crowd(ledger, seed, options.at_once), ledger)
+    found = list(rows(list(ledger.events())))
+    console.print(rows_table(f"{options.minutes:g} minutes of churn", found))
+    missed = [row for row in found if row.met is False]
+    for row in missed:
+        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""Nodes as processes: how they end, what they hold, and where they hang."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmark.churn.places import Node
+
+__all__ = ["CODES", "PATIENCE", "NodeProcess", "Usage"]
+
+CODES = (0, -signal.SIGINT, -signal.SIGTERM)
+"""Exit codes of a node that was told to end; those of the signals before Python minds them."""
+PATIENCE = 20.0
+"""Time, s, after which a process that was told to end is hung."""
+_TICKS, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
+_STACKS_PATIENCE = 60.0
+_EXECUTABLES = Path(sys.executable).parent
+
+
+class Usage(NamedTuple):
+    """What a process has used until a time (s): processor time (s), memory (MB), threads."""
+
+    time: float
+    processor: float
+    memory: float
+    threads: int
+
+    def since(self, earlier: "Usage") -> dict[str, float]:
+        """Return the cores used since then, and memory and threads then and now."""
+        return {
+            "cores": (self.processor - earlier.processor) / (self.time - earlier.time),
+            "early_memory": earlier.memory,
+            "memory": self.memory,
+            "early_threads": earlier.threads,
+            "threads": self.threads,
+        }
+
+
+class NodeProcess:
+    """A node that runs, and writes its log into a file.
+
+    Parameters
+    ----------
+    node : Node
+        What is run.
+    log : Path
+        File of its output, with the stacks of all its threads if it hangs.
+    """
+
+    def __init__(self, node: Node, log: Path) -> None:
+        self.log = log
+        with log.open("ab") as stream:
+            self._process = subprocess.Popen(
+                [_EXECUTABLES / node.executable, "--ros-args", *node.arguments],
+                env=os.environ | {"PYTHONFAULTHANDLER": "1"},
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+
+    def exit_code(self) -> int | None:
+        """Return the exit code; None while it runs."""
+        return self._process.poll()
+
+    def end(self, request: signal.Signals) -> float | None:
+        """Send a signal; return the time to the end of the process, s.
+
+        A process that hangs leaves its stacks in its log and is killed; None is returned.
+        """
+        begin = time.monotonic()
+        self._process.send_signal(request)
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.write_stacks()
+            return None
+        return time.monotonic() - begin
+
+    def write_stacks(self) -> None:
+        """Write the stacks of all threads, of C where gdb is there and of Python; kill it."""
+        debugger: Sequence[str] = ("gdb", "-p", str(self._process.pid), "-batch", "-ex")
+        if shutil.which(debugger[0]):
+            with self.log.open("ab") as stream:
+                subprocess.run(
+                    [*debugger, "thread apply all bt"],
+                    stdout=stream,
+                    stderr=subprocess.STDOUT,
+                    timeout=_STACKS_PATIENCE,
+                    check=False,
+                )
+        self._process.send_signal(signal.SIGABRT)  # Python's handler writes its stacks
+        try:
+            self._process.wait(_STACKS_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def usage(self) -> Usage:
+        """Return what it has used so far, and what it holds."""
+        place = Path(f"/proc/{self._process.pid}")
+        fields = (place / "stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        return Usage(
+            time.monotonic(),
+            (int(fields[11]) + int(fields[12])) / _TICKS,
+            int((place / "statm").read_text(encoding="ascii").split()[1]) * _PAGE / 1e6,
+            len(list((place / "task").iterdir())),
+        )

@@ -1,0 +1,97 @@
+"""What the churn counts, and which of its goals are missed."""
+
+import signal
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from benchmark.churn.audit import missing_samples
+from benchmark.churn.ledger import Ledger
+from benchmark.churn.places import RATE, Node
+from benchmark.churn.processes import NodeProcess
+from benchmark.churn.summary import rows
+
+GOOD = (
+    {"kind": "visit", "end": "gone"},
+    {"kind": "visit", "end": "killed"},
+    {"kind": "call", "service": "/fv_101/identifier/identify", "seconds": 0.4},
+    {"kind": "samples", "topic": "/p", "first": 0, "last": 60, "count": 16, "missing": 0},
+    {"kind": "samples", "topic": "/p", "first": 30, "last": 90, "count": 16, "missing": 0},
+    {"kind": "diagnostics", "longest": 1.2},
+    {"kind": "ending", "node": "simulator", "seconds": 0.2, "code": 0},
+)
+BAD = {
+    "never answered": {"kind": "call", "service": "/fv_101/identifier/save", "seconds": None},
+    "answered after more than 5 s": {"kind": "call", "service": "/a/b/c", "seconds": 5.1},
+    "services not found in 30 s": {"kind": "undiscovered", "service": "/a/b/c"},
+    "samples lost": dict(GOOD[3], missing=1),
+    "longest silence on /diagnostics": {"kind": "diagnostics", "longest": 6.0},
+    "ended after more than 3 s": dict(GOOD[6], seconds=3.1),
+    "ended with another code": dict(GOOD[6], code=1),
+    "nodes that died or hung": {"kind": "died", "name": "simulator", "code": -6},
+}
+
+
+def missed(events):
+    return [row.item for row in rows(events) if row.met is False]
+
+
+def test_a_good_run_misses_nothing():
+    assert missed(GOOD) == []
+    found = {row.item: row.ours for row in rows(GOOD)}
+    assert found["participants that came and went"] == 2
+    assert found["of them killed"] == 1
+    assert found["stream looked at, both signals"] == pytest.approx(90e-9)
+    assert found["times at which the look came too late"] == 0
+
+
+@pytest.mark.parametrize("item", BAD)
+def test_each_failure_misses_its_goal(item):
+    assert missed([*GOOD, BAD[item]]) == [item]
+
+
+def test_a_run_without_a_look_at_the_samples_has_not_shown_that_none_is_lost():
+    assert missed([one for one in GOOD if one["kind"] != "samples"]) == ["samples lost"]
+
+
+def test_missing_samples_are_counted_within_the_record():
+    stamps = np.arange(1000) * (1_000_000_000 // RATE) + 5
+    assert missing_samples(stamps) == 0
+    assert missing_samples(np.delete(stamps, [3, 4, 700])) == 3
+    assert missing_samples(stamps[:0]) == 0
+
+
+def test_ledger_keeps_the_order(tmp_path):
+    ledger = Ledger(tmp_path / "ledger.jsonl")
+    ledger.add("call", service="/a", seconds=None)
+    ledger.add("visit", end="µ")
+    assert [(one["kind"], one.get("end")) for one in ledger.events()] == [
+        ("call", None),
+        ("visit", "µ"),
+    ]
+
+
+def test_hung_process_leaves_its_stacks(tmp_path, monkeypatch):
+    hangs = tmp_path / "hangs"
+    hangs.write_text(
+        f"#!{sys.executable}\n"
+        "import signal, time\n"
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "def sleeping_for_ever():\n"
+        "    print('ready', flush=True)\n"
+        "    while True: time.sleep(1)\n"
+        "sleeping_for_ever()\n"
+    )
+    hangs.chmod(0o755)
+    monkeypatch.setattr("benchmark.churn.processes._EXECUTABLES", tmp_path)
+    monkeypatch.setattr("benchmark.churn.processes.PATIENCE", 0.2)
+    monkeypatch.setattr("benchmark.churn.processes.shutil.which", lambda _: None)
+    process = NodeProcess(Node("hangs", ()), tmp_path / "log")
+    deadline = time.monotonic() + 30
+    while "ready" not in process.log.read_text() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert process.end(signal.SIGTERM) is None
+    assert "sleeping_for_ever" in process.log.read_text()
+    assert process.exit_code() == -signal.SIGABRT
