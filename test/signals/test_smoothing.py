@@ -57,6 +57,13 @@ class TestCorners:
         assert found.size == 2
         assert np.abs(found - [5200, 10_400]).max() <= 2
 
+    @pytest.mark.parametrize("left", [45, 60, 79])
+    def test_near_the_end_of_the_record(self, left):
+        """Candidates behind which no samples are left say nothing, and warn of nothing."""
+        signal = 50.0 * np.maximum(np.arange(300.0) - (300 - left), 0.0)
+        found = find_corners(signal + white(300), 1.0, 40)
+        np.testing.assert_array_equal(found, [300 - left])
+
     def test_none_in_a_smooth_signal_nor_in_a_noiseless_one(self):
         smooth = 1000 * np.sin(2 * np.pi * np.arange(5000) / 5000)
         assert find_corners(smooth + white(5000), 1.0, 40).size == 0

@@ -35,6 +35,10 @@ _CORNER_SHARPNESS = 3.0
 """Ratio of a corner's jump to the jumps one window away. Chosen: at a corner of a ramp they are
 zero, on a parabola equal; three separates both in noise."""
 
+_LEAST_DETERMINANT = 1e-9
+"""Determinant of two unit vectors below which they are parallel but for rounding. One sample
+after a corner gives 1e-15, two give 0.05 and more."""
+
 _CORNER_SCALES = (1, 2, 4)
 """Windows over which corners are searched, over the shortest. Chosen: a slope's noise falls with
 the 1.5th power of the window, so the longest finds corners eight times smaller."""
@@ -69,7 +73,8 @@ def _localised(signal: NDArray[np.float64], corner: int, window: int) -> int:
     """Move a corner, within half a window, to where the signal bends most.
 
     The model of the signal is a parabola, plus a second parabola that begins at zero at the corner.
-    The corner with the smallest residual is returned.
+    The corner with the smallest residual is returned. Where too few samples follow a candidate to
+    tell its parabola from a line, it is left out.
     """
     first, last = max(corner - window, 0), min(corner + window, signal.size)
     place = np.linspace(-1.0, 1.0, last - first)
@@ -81,8 +86,12 @@ def _localised(signal: NDArray[np.float64], corner: int, window: int) -> int:
     stretch = signal[first:last] - signal[corner]
     a, b, c = ((one * one).sum(0), (one * two).sum(0), (two * two).sum(0))
     p, q = stretch @ one, stretch @ two
-    explained = (c * p * p - 2 * b * p * q + a * q * q) / (a * c - b * b)
-    return int(candidates[np.argmax(explained)])
+    determinant = a * c - b * b
+    told = determinant > _LEAST_DETERMINANT * a * c
+    if not told.any():
+        return corner
+    explained = (c * p * p - 2 * b * p * q + a * q * q)[told] / determinant[told]
+    return int(candidates[told][np.argmax(explained)])
 
 
 def find_corners(signal: NDArray[np.float64], noise: float, window: int) -> NDArray[np.intp]:
