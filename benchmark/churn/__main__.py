@@ -17,7 +17,7 @@ from benchmark.churn.crowd import Crowd
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import nodes, process_of
 from benchmark.churn.processes import NodeProcess, Usage
-from benchmark.churn.summary import rows
+from benchmark.churn.summary import hung_services, rows
 from benchmark.speed.table import machine_shape, rows_table
 from valve_friction_ros.commands.demo.bench_processes import free_domain
 
@@ -101,16 +101,14 @@ def _watch(processes: dict[str, NodeProcess], seconds: float, crowd: Crowd, ledg
 
 def _have_died(processes: dict[str, NodeProcess], ledger: Ledger) -> bool:
     """Note the nodes that are gone, and those that hang, with their stacks in their logs."""
-    died = False
-    for event in [one for one in ledger.events() if one["kind"] == "hang"]:
-        hung = processes[process_of(event["service"])]
+    for service in hung_services(list(ledger.events())):
+        hung = processes[process_of(service)]
         if hung.exit_code() is None:
             hung.write_stacks()
-    for name, process in processes.items():
-        if process.exit_code() is not None:
-            ledger.add("died", name=name, code=process.exit_code())
-            died = True
-    return died
+    dead = {name: code for name, one in processes.items() if (code := one.exit_code()) is not None}
+    for name, code in dead.items():
+        ledger.add("died", name=name, code=code)
+    return bool(dead)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,16 +7,34 @@ from typing import Any
 
 import numpy as np
 
+from benchmark.churn.places import process_of
 from benchmark.churn.processes import CODES
 from benchmark.churn.visitor import ANSWER_LIMIT
 from benchmark.speed.rows import Row
 
-__all__ = ["END_LIMIT", "rows"]
+__all__ = ["END_LIMIT", "hung_services", "rows"]
 
 END_LIMIT = 3.0
 """Time, s, within which a node ends when it is told to."""
 _SILENCE_LIMIT = 5.0
 _Events = Sequence[Mapping[str, Any]]
+
+
+def hung_services(events: _Events) -> list[str]:
+    """Return the services without an answer whose process has answered nobody else meanwhile.
+
+    One client may lose its answers; a node that hangs answers none.
+    """
+    answered: dict[str, float] = {}
+    for one in events:
+        if one["kind"] == "call" and one["seconds"] is not None:
+            answered[process_of(one["service"])] = one["time"]
+    return [
+        one["service"]
+        for one in events
+        if one["kind"] == "unanswered twice"
+        and answered.get(process_of(one["service"]), 0.0) < one["since"]
+    ]
 
 
 def _calls(calls: _Events) -> Iterator[Row]:
@@ -83,6 +101,7 @@ def rows(events: _Events) -> Iterator[Row]:
     )
     yield Row("that failed or hung themselves", odd, "")
     yield from _calls(of("call"))
+    yield Row("clients that were never answered, twice", len(of("unanswered twice")), "")
     undiscovered = len(of("undiscovered"))
     yield Row("services not found in 30 s", undiscovered, "", goal="none", met=undiscovered == 0)
     yield from _samples(of("samples"), len(of("unsaved")))

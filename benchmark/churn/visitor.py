@@ -79,8 +79,9 @@ class Visitor:
                 success=getattr(answer, "success", None),
                 message=getattr(answer, "message", ""),
             )
+            since = time.time()
             if answer is None and self._answer(client, request) is None:
-                self._ledger.add("hang", service=name)
+                self._ledger.add("unanswered twice", service=name, since=since)
             return answer
         finally:
             self.node.destroy_client(client)

@@ -11,7 +11,7 @@ from benchmark.churn.audit import missing_samples
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import RATE, Node
 from benchmark.churn.processes import NodeProcess
-from benchmark.churn.summary import rows
+from benchmark.churn.summary import hung_services, rows
 
 GOOD = (
     {"kind": "visit", "end": "gone"},
@@ -50,6 +50,14 @@ def test_a_good_run_misses_nothing():
 @pytest.mark.parametrize("item", BAD)
 def test_each_failure_misses_its_goal(item):
     assert missed([*GOOD, BAD[item]]) == [item]
+
+
+def test_a_node_that_answers_others_does_not_hang():
+    lost = {"kind": "unanswered twice", "service": "/fv_101/identifier/save", "since": 10.0}
+    answer = {"kind": "call", "service": "/fv_101/identifier/clear", "seconds": 0.1, "time": 20.0}
+    other = dict(answer, service="/fv_201/identifier/clear")
+    assert hung_services([lost, answer]) == []
+    assert hung_services([lost, dict(answer, time=5.0), other]) == [lost["service"]]
 
 
 def test_a_run_without_a_look_at_the_samples_has_not_shown_that_none_is_lost():
