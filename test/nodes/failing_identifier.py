@@ -8,14 +8,14 @@ MENDED = "mended"
 """Name of the file, in the node's working directory, that takes the fault away."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes.identifier import node as identifier
+    from valve_friction_ros.nodes.identifier import identification, node
 
-    identify = identifier.identify_snapshot
+    identify = identification.identify_snapshot
 
     def identify_or_fail(*arguments):
         if not Path(MENDED).exists():
             raise ZeroDivisionError("nobody\nforesaw it")
         return identify(*arguments)
 
-    identifier.identify_snapshot = identify_or_fail
-    sys.exit(identifier.main())
+    identification.identify_snapshot = identify_or_fail
+    sys.exit(node.main())

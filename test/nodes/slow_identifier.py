@@ -8,9 +8,9 @@ FINISH = "finish"
 """Name of the file, in the node's working directory, that lets an identification end."""
 
 if __name__ == "__main__":
-    from valve_friction_ros.nodes.identifier import node as identifier
+    from valve_friction_ros.nodes.identifier import identification, node
 
-    identify_once = identifier.identify_snapshot
+    identify_once = identification.identify_snapshot
 
     def identify_again_and_again(*arguments):
         while True:
@@ -18,5 +18,5 @@ if __name__ == "__main__":
             if Path(FINISH).exists():
                 return estimate
 
-    identifier.identify_snapshot = identify_again_and_again
-    sys.exit(identifier.main())
+    identification.identify_snapshot = identify_again_and_again
+    sys.exit(node.main())

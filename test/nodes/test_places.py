@@ -66,12 +66,12 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
         "import sys, time\n"
         "from pathlib import Path\n"
         "import valve_friction_ros.nodes.plumbing.readiness as readiness\n"
-        "from valve_friction_ros.nodes.identifier import node\n"
+        "from valve_friction_ros.nodes.identifier import node, workers\n"
         "readiness._QUICK = 0.0\n"
         "def prepare():\n"
         "    while not Path('prepared').exists():\n"
         "        time.sleep(0.05)\n"
-        "node.compile_methods = prepare\n"
+        "workers.compile_methods = prepare\n"
         "sys.exit(node.main())\n"
     )
     process = live.start("identifier", {"input_timeout": 600.0}, script=script)

@@ -9,11 +9,12 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
+from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.identification import Identification
 from valve_friction_ros.nodes.identifier.level_log import LevelLog
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
@@ -30,7 +31,7 @@ from valve_friction_ros.nodes.identifier.schedule import Schedule
 from valve_friction_ros.nodes.identifier.status import friction_status, stuck_status, trend_values
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
+from valve_friction_ros.nodes.plumbing.background import InternalError
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     reject_invalid,
@@ -72,7 +73,6 @@ class Identifier(PolledNode):
         self._workers = workers
         self._monitor = FrictionMonitor(monitor_settings(values))
         tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
-        self._results = ResultTopics(self)
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
         self._inputs = ValveInputs(self, joint, self._take_samples)
@@ -80,8 +80,9 @@ class Identifier(PolledNode):
         self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
         self._level_log = LevelLog(self)
-        self._identifying = False
-        self._identified_until: int | None = None
+        self._identification = Identification(
+            self, self._monitor, ResultTopics(self), workers.identify
+        )
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
@@ -89,14 +90,14 @@ class Identifier(PolledNode):
         self._baseline.begin(self._history.prepare(), self._history.path)
         self._history.read_trend()
         self.add_post_set_parameters_callback(self._take_parameters)
-        for name, work in {
-            "identify": self._identify,
-            "save": self._save,
-            "report": self._report,
-            "set_baseline": self._set_baseline,
-            "clear": self._clear,
-        }.items():
-            create_trigger_service(self, f"~/{name}", work, waiting)
+        for name, work, failure in (
+            ("identify", self._identify, ""),
+            ("save", self._save, "the buffer was not saved"),
+            ("report", self._report, "no report was written"),
+            ("set_baseline", self._set_baseline, ""),
+            ("clear", self._clear, ""),
+        ):
+            create_trigger_service(self, f"~/{name}", work, waiting, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
         self._jump_handle = self.get_clock().create_jump_callback(
@@ -158,11 +159,10 @@ class Identifier(PolledNode):
 
     async def _identify(self) -> str:
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
-        if self._identifying:
-            raise RefusalError("an identification is already running: wait for it")
-        record, refused = self._copied_buffer(), None
+        self._inputs.take()
+        record, refused = self._identification.record(), None
         try:
-            await self._identified(record)
+            await self._identification.run(record)
         except RefusalError as refusal:
             # What the inputs lack is the cause where there are no samples.
             refused = RefusalError("; ".join((*self._input_problems(), str(refusal))))
@@ -181,16 +181,12 @@ class Identifier(PolledNode):
     async def _identify_as_scheduled(self) -> None:
         """Identify the buffer; a record that cannot be identified leaves everything as it is."""
         self._inputs.take()
-        newest = self._monitor.buffer.newest_stamp
-        if self._identifying:
-            self._schedule.skip("an identification was already running")
-            return
-        if newest is not None and newest == self._identified_until:
+        if self._identification.has_nothing_new:
             self._schedule.stall()
             return
-        record = self._copied_buffer()
         try:
-            await self._identified(record)
+            record = self._identification.record()
+            await self._identification.run(record)
         except (RefusalError, InternalError) as error:
             self._schedule.skip(str(error))
             return
@@ -198,46 +194,13 @@ class Identifier(PolledNode):
         await self._history.keep(record)
         self._publish_diagnostics()
 
-    def _copied_buffer(self) -> IdentificationInput:
-        self._inputs.take()
-        self._identified_until = self._monitor.buffer.newest_stamp
-        return self._monitor.input()
-
-    async def _identified(self, record: IdentificationInput) -> None:
-        """Identify a record in the worker, then take over and publish the result.
-
-        Raises RefusalError if the record cannot be identified, and InternalError if a bug is met;
-        the monitor shows the bug until an identification succeeds.
-        """
-        self._identifying = True
-        try:
-            with bugs_reported(self, known=self._monitor.internal_error):
-                result = await done_in(self._workers.identify, identify_snapshot, *record)
-                self._monitor.accept(result, self.get_clock().now().nanoseconds)
-                self._results.publish(result, self._monitor)
-                self.get_logger().info(f"identified: {self._monitor.diagnosis().message}")
-        except InternalError as error:
-            self._monitor.fail(str(error))
-            raise
-        finally:
-            self._identifying = False
-
     async def _save(self) -> str:
         self._inputs.take()
-        try:
-            names, files = self._inputs.names, self._workers.files
-            return str(await saved_bag(self, self._monitor, names, files))
-        except RefusalError as refusal:
-            self.get_logger().warning(f"the buffer was not saved: {refusal}")
-            raise
+        return str(await saved_bag(self, self._monitor, self._inputs.names, self._workers.files))
 
     async def _report(self) -> str:
-        try:
-            tag = self._history.valve.tag
-            return str(await written_report(self, self._monitor, tag, self._workers.files))
-        except RefusalError as refusal:
-            self.get_logger().warning(f"no report was written: {refusal}")
-            raise
+        tag = self._history.valve.tag
+        return str(await written_report(self, self._monitor, tag, self._workers.files))
 
     async def _set_baseline(self) -> str:
         baseline = self._monitor.result_as_baseline()

@@ -14,13 +14,18 @@ __all__ = ["create_trigger_service"]
 
 
 def create_trigger_service(
-    node: Node, name: str, work: Callable[[], Awaitable[str]], group: CallbackGroup
+    node: Node,
+    name: str,
+    work: Callable[[], Awaitable[str]],
+    group: CallbackGroup,
+    failure: str = "",
 ) -> None:
     """Create a std_srvs/Trigger service.
 
     The coroutine `work` returns the message of a success, or raises RefusalError with the reason;
     anything else that it raises is answered as an internal error. `group` is reentrant, if other
-    callbacks shall run while the work waits.
+    callbacks shall run while the work waits. A refusal is logged behind the words of `failure`, if
+    there are any.
     """
 
     async def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -30,6 +35,8 @@ def create_trigger_service(
             response.success = True
         except (RefusalError, InternalError) as error:
             response.message = str(error)
+            if failure and isinstance(error, RefusalError):
+                node.get_logger().warning(f"{failure}: {error}")
         return response
 
     node.create_service(Trigger, name, answer, qos_profile=REQUESTS, callback_group=group)
