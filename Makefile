@@ -2,6 +2,7 @@
 
 PYTHON ?= python3
 VENV ?= .venv
+OLDEST ?= .venv-oldest
 PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
 BENCH_ARGS ?=
@@ -39,6 +40,23 @@ demo: venv  ## friction of a simulated valve grows, and is diagnosed, in under t
 .PHONY: test
 test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some
 	@"$(VENV)/bin/python" -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
+
+# What depends most on the libraries, in a few minutes: figures, reports, tables, kernels, statistics.
+OLDEST_TESTS = $(addprefix test/,test_package.py test_front_door.py model/test_simulation.py \
+    model/test_value_types.py signals identification/published identification/test_refusals.py records \
+    health/test_diagnosis.py history/test_file.py history/test_trend.py figures reports reproduction \
+    commands/test_identify_table.py nodes/test_start.py nodes/test_without_bag_libraries.py)
+
+.PHONY: test-oldest
+test-oldest:  ## some tests with the oldest versions that the package declares
+	@$(python-found)
+	@code=0; "$(PYTHON)" requirements/install.py "$(OLDEST)" oldest || code=$$?; \
+	case $$code in \
+	0) NUMBA_CACHE_DIR="$(abspath $(OLDEST))/numba" \
+	    "$(OLDEST)/bin/python" -m pytest -n 2 --dist loadfile $(PYTEST_ARGS) $(OLDEST_TESTS) ;; \
+	3) ;; \
+	*) exit $$code ;; \
+	esac
 
 .PHONY: lint
 lint: venv-test  ## ruff and mypy
@@ -84,7 +102,7 @@ mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="
 
 .PHONY: clean
 clean:  ## remove what make and colcon made
-	@rm -rf -- "$(VENV)" build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	@rm -rf -- "$(VENV)" "$(OLDEST)" build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
 	@find . -name __pycache__ -type d -prune -exec rm -rf -- {} +
 
 define python-found

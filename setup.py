@@ -29,20 +29,22 @@ setup(
         (f"share/{NAME}/config", files("config/*.yaml")),
         (f"share/{NAME}/launch", files("launch/*.launch.py")),
     ],
-    install_requires=[
+    install_requires=[  # the oldest versions that `make test-oldest` tests
         "setuptools",
-        "backports.zstd",
-        "Jinja2",
-        "lz4",
-        "matplotlib",
-        "numba",
-        "numpy",
-        "PyYAML",
-        "rich",
-        "rosbags",
-        "scipy",
+        "Jinja2>=3.1.2",
+        "matplotlib>=3.6.3",
+        "numba>=0.58.1",
+        "numpy>=1.26.4",
+        "PyYAML>=6.0.1",
+        "rich>=13.7.1",
+        "scipy>=1.11.4",
     ],
-    extras_require={"test": ["pytest"]},  # by which `colcon test` knows that there are tests
+    extras_require={
+        # Private names of rosbags 0.11 are used.
+        "bags": ["backports.zstd", "lz4", "rosbags>=0.11.9,<0.12"],
+        # By pytest among them `colcon test` knows that there are tests.
+        "test": ["hypothesis", "pytest", "pytest-timeout"],
+    },
     zip_safe=False,
     entry_points={
         "console_scripts": [

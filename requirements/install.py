@@ -1,7 +1,9 @@
-"""Make or reuse the virtual environment: `python3 requirements/install.py .venv [test]`.
+"""Make or reuse the virtual environment: `python3 requirements/install.py .venv [test | oldest]`.
 
 run.txt goes in, ros.txt where no ROS 2 Jazzy is sourced, the package itself as an editable install,
-and with `test` what test.txt lists. It is made anew when Python, ROS or one of the files changed.
+and with `test` what test.txt lists; with `oldest` oldest.txt in place of run.txt and test.txt.
+It is made anew when Python, ROS or one of the files changed. Where the versions of oldest.txt
+cannot be had, it ends with one line and the exit code 3.
 This file must parse on any Python, to say that it is too old.
 """
 
@@ -12,6 +14,8 @@ import subprocess
 import sys
 
 PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+NOT_HERE = 3
+"""Exit code where this machine can have no such environment."""
 MESSAGES = ("diagnostic_msgs", "sensor_msgs", "std_msgs", "std_srvs")
 
 
@@ -20,12 +24,21 @@ def stop(text, *words):
     sys.exit("make: " + text % words)
 
 
-def check_python():
+def skip(reason):
+    """End with one line and `NOT_HERE`: what oldest.txt pins cannot be had."""
+    print("make: the oldest versions are not tested here: " + reason, flush=True)
+    sys.exit(NOT_HERE)
+
+
+def check_python(oldest):
     """Refuse a Python that the pinned wheels do not serve, or that cannot make environments."""
     here = "%d.%d" % sys.version_info[:2]
     if not (3, 10) <= sys.version_info[:2] <= (3, 13):
         stop("Python 3.10 to 3.13 is needed and %s is %s: choose another, as in `make "
              "PYTHON=python3.12 demo`", sys.executable, here)  # fmt: skip
+    if oldest and sys.version_info[:2] > (3, 12):
+        skip("requirements/oldest.txt is for CPython 3.10 to 3.12 and %s is %s; choose another, as "
+             "in `make PYTHON=python3.12 test-oldest`" % (sys.executable, here))  # fmt: skip
     try:
         import ensurepip  # noqa: F401 - packaged apart from Python by Debian and Ubuntu
     except ImportError:
@@ -64,13 +77,14 @@ def read(*path):
         return stream.read()
 
 
-def main(path, test):
+def main(path, test, oldest):
     """Bring the environment at `path` up to date; its `made-by-make` holds what it came from."""
-    check_python()
+    check_python(oldest)
     import venv
 
     system = sourced_ros()
-    wheels = ["requirements/run.txt"] + ([] if system else ["requirements/ros.txt"])
+    libraries = "requirements/oldest.txt" if oldest else "requirements/run.txt"
+    wheels = [libraries] + ([] if system else ["requirements/ros.txt"])
     sources = ["requirements/install.py", "requirements/build.txt", "setup.py", "setup.cfg"]
     found = read(path, "made-by-make")
     made = repr((sys.version, os.path.realpath(sys.executable), os.path.abspath(path), PROJECT))
@@ -83,7 +97,10 @@ def main(path, test):
             command, check=False, cwd=PROJECT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
         if done.returncode != 0:
-            sys.stderr.write(done.stdout.decode(errors="replace"))
+            output = done.stdout.decode(errors="replace")
+            if oldest and "No matching distribution found" in output:
+                skip(output.strip().splitlines()[-1])
+            sys.stderr.write(output)
             stop("set-up failed, for the reason above: mend it and run make again")
 
     def install(*words):
@@ -118,6 +135,6 @@ def main(path, test):
 
 if __name__ == "__main__":
     try:
-        main(os.path.abspath(sys.argv[1]), "test" in sys.argv[2:])
+        main(os.path.abspath(sys.argv[1]), "test" in sys.argv[2:], "oldest" in sys.argv[2:])
     except KeyboardInterrupt:
         stop("set-up interrupted: run make again to complete it")

@@ -53,19 +53,99 @@ def imported_modules(path):
     return {name.partition(".")[0] for name in names}
 
 
-def test_manifest_names_every_message_package_and_library():
+LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
+    "jinja2": ("python3-jinja2", "Jinja2"),
+    "matplotlib": ("python3-matplotlib", "matplotlib"),
+    "numba": ("python3-numba", "numba"),
+    "numpy": ("python3-numpy", "numpy"),
+    "rich": ("python3-rich", "rich"),
+    "scipy": ("python3-scipy", "scipy"),
+    "yaml": ("python3-yaml", "PyYAML"),
+}
+BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
+
+
+def exec_depends():
     root = ET.parse(PROJECT / "package.xml").getroot()
-    declared = {element.text for element in root.iter("exec_depend")}
-    keys = {"yaml": "python3-yaml", "jinja2": "python3-jinja2"} | {
-        name: f"python3-{name}" for name in ("matplotlib", "numba", "numpy", "rich", "scipy")
-    }
-    # rosbags brings the libraries that it reads bags with.
-    keys |= dict.fromkeys(("rosbags", "backports", "lz4"), "python3-rosbags-pip")
+    return {element.text for element in root.iter("exec_depend")}
+
+
+def third_party_imports():
+    """Modules from outside the package and Python, with the files that import them."""
     optional = {"pandas"}  # only `Result.to_frame` needs it, and says so
     own = set(sys.stdlib_module_names) | {NAME} | optional
     for path in [*(PROJECT / NAME).rglob("*.py"), *(PROJECT / "launch").glob("*.py")]:
         for module in imported_modules(path) - own:
-            assert keys.get(module, module) in declared, f"{path.name} imports {module}"
+            yield module, path
+
+
+def test_manifest_names_every_message_package_and_library():
+    declared = exec_depends()
+    assert not [key for key in declared if key.endswith("-pip")]
+    imported = {module for module, _ in third_party_imports()}
+    assert imported >= LIBRARIES.keys() | BAG_LIBRARIES.keys()
+    assert {key for key in declared if key.startswith("python3-")} == {
+        key for key, _ in LIBRARIES.values()
+    }
+    for module, path in third_party_imports():
+        if module in BAG_LIBRARIES:
+            assert path.parent == PROJECT / NAME / "records" / "bags"
+        else:
+            assert LIBRARIES.get(module, (module,))[0] in declared, f"{path.name}: {module}"
+
+
+def requirements(name):
+    """What setup.py gives for a keyword."""
+    tree = ast.parse(setup_text())
+    (found,) = (
+        ast.literal_eval(word.value)
+        for word in ast.walk(tree)
+        if isinstance(word, ast.keyword) and word.arg == name
+    )
+    return found
+
+
+def parted(requirement):
+    """Name and limits of a requirement."""
+    return re.fullmatch(r"([\w.-]+)(.*)", requirement).groups()
+
+
+def pins(file):
+    """Versions that a file of pinned requirements names, those for the oldest Python first."""
+    found = {}
+    for line in (PROJECT / "requirements" / file).read_text().splitlines():
+        if match := re.match(r"([\w.-]+)==([^\s;]+)", line):
+            found.setdefault(match[1], match[2])
+    return found
+
+
+def test_setup_names_every_library():
+    required = {parted(each)[0] for each in requirements("install_requires")}
+    assert required == {"setuptools", *(name for _, name in LIBRARIES.values())}
+    bags = {parted(each)[0] for each in requirements("extras_require")["bags"]}
+    assert bags == set(BAG_LIBRARIES.values())
+
+
+def test_the_oldest_versions_are_those_that_are_tested():
+    minima = dict(map(parted, requirements("install_requires")))
+    assert minima.pop("setuptools") == ""
+    oldest = pins("oldest.txt")
+    assert minima == {name: f">={oldest[name]}" for name in minima}
+    assert not oldest.keys() & set(BAG_LIBRARIES.values())
+
+
+def test_the_newest_versions_are_those_that_are_installed():
+    pinned = pins("run.txt")
+    for name in (*(name for _, name in LIBRARIES.values()), *BAG_LIBRARIES.values()):
+        assert name in pinned
+
+
+def test_the_remedy_is_the_extra():
+    bags = requirements("extras_require")["bags"]
+    text = (PROJECT / NAME / "records" / "bags" / "libraries.py").read_text()
+    remedy = re.search(r"pip install ([^`]+)`", text)[1]
+    assert sorted(word.strip("'") for word in remedy.split()) == sorted(bags)
+    assert f"pip install {remedy}" in (PROJECT / "README.md").read_text()
 
 
 def test_entry_points_exist():

@@ -32,7 +32,7 @@ def panels(figure):
 
 
 def title_of(figure):
-    return " ".join(figure.get_suptitle().split())
+    return " ".join(figure._suptitle.get_text().split())
 
 
 def points(line):
@@ -184,7 +184,7 @@ class TestVerdict:
         figure.draw_without_rendering()
         box = figure._suptitle.get_window_extent()
         assert box.x1 < figure.bbox.x1
-        assert len(figure.get_suptitle().splitlines()) > 2
+        assert len(figure._suptitle.get_text().splitlines()) > 2
 
     def test_beyond_the_travel(self, with_parameters):
         tight = with_parameters(

@@ -9,7 +9,6 @@ from binascii import crc32
 
 import numpy as np
 import pytest
-from backports import zstd
 from bags import (
     PRESSURE,
     START,
@@ -30,6 +29,7 @@ from valve_friction_ros.records.recordings import ReadingOptions, holds_force, r
 from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.streams import RecordBuffer
 
+zstd = pytest.importorskip("backports.zstd")
 STORAGES = ["mcap", "sqlite3"]
 KINDS = [(s, c) for s in STORAGES for c in ("none", "file", "message")] + [("mcap", "storage")]
 PERIOD = 1_000_000

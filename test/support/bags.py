@@ -1,6 +1,10 @@
 """Bags for tests, written by rosbags."""
 
 import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")  # not there where only rosdep installed
+
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 

@@ -1,15 +1,19 @@
 """The page of a figure: its size, its title, the style of its panels."""
 
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-__all__ = ["dress", "titled_figure"]
+__all__ = ["dress", "labelled_in", "legend_above", "titled_figure"]
 
 _TITLE_WIDTH = 95
 """Characters of a line of the title, which fill the width of the figure."""
+
+_LEGEND_PAD = 0.2
+"""Room above and below the legend of a figure, in heights of its letters."""
 
 
 def titled_figure(title: str) -> Figure:
@@ -26,3 +30,33 @@ def dress(panels: Iterable[Axes]) -> None:
     for axes in panels:
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
+
+
+def labelled_in(panels: Iterable[Axes]) -> dict[str, Artist]:
+    """Return what a legend of panels lists, by its label, each label once."""
+    return {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+
+
+def legend_above(
+    figure: Figure, entries: Mapping[str, Artist], columns: int, place: str = "center"
+) -> None:
+    """Put a legend at the upper edge of a figure without a title, and its panels below it.
+
+    `place` is left, center or right. Needs no more than matplotlib 3.6, to which a legend outside
+    the panels is unknown.
+    """
+    legend = figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc=f"upper {place}",
+        ncols=columns,
+        frameon=False,
+        borderaxespad=_LEGEND_PAD,
+    )
+    pad = 2 * _LEGEND_PAD * legend.prop.get_size_in_points() / 72 * figure.dpi
+    share = (legend.get_window_extent().height + pad) / figure.bbox.height
+    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - share))

@@ -8,7 +8,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from valve_friction_ros.figures.case import Case
-from valve_friction_ros.figures.page import dress
+from valve_friction_ros.figures.page import dress, labelled_in, legend_above
 from valve_friction_ros.figures.panels import (
     COLOURS,
     draw_panels,
@@ -89,7 +89,7 @@ def comparison_figure(comparison: StemComparison) -> Figure:
     axes.plot(time, comparison.simulated[some] * 1e3, "k:", lw=1.2, label="simulated")
     axes.set_ylabel("stem [mm]")
     axes.set_xlabel("time [s]")
-    figure.legend(loc="outside upper right", ncols=2, frameon=False)
+    legend_above(figure, labelled_in([axes]), columns=2, place="right")
     dress((axes,))
     return figure
 

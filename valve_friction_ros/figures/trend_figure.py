@@ -9,6 +9,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from valve_friction_ros.figures.page import labelled_in, legend_above
 from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.health import Baseline, friction_words
 from valve_friction_ros.history import Trend, ValveHistory, trended
@@ -63,14 +64,7 @@ def trend_figure(histories: Sequence[ValveHistory]) -> Figure:
     panels = figure.subplots(len(histories), squeeze=False)[:, 0]
     for axes, history in zip(panels, histories, strict=True):
         _draw(axes, history)
-    legend = {
-        label: handle
-        for axes in panels
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        legend.values(), legend.keys(), loc="outside upper center", ncols=4, frameon=False
-    )
+    legend_above(figure, labelled_in(panels), columns=4)
     return figure
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.files import is_bag
-from valve_friction_ros.records.bags.reading import read_bag
+from valve_friction_ros.records.bags.kind import is_bag
+from valve_friction_ros.records.bags.libraries import bag_libraries
 from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.csv_recording import CsvFormat, drive_column, read_csv
 from valve_friction_ros.records.recorded_valve import RecordedValve
@@ -67,9 +67,12 @@ def read_recordings(
     Raises
     ------
     ValueError, RefusalError
-        If nothing can be read: one line with file, cause and remedy.
+        If nothing can be read: one line with cause and remedy. So also for a bag without the
+        libraries that bags need.
     """
     options = options or ReadingOptions()
     if is_bag(path):
+        with bag_libraries():
+            from valve_friction_ros.records.bags.reading import read_bag  # noqa: PLC0415
         return read_bag(path, valve, options.topics, options.stretch)
     return (RecordedValve(path, "", read_csv(path, valve, options.csv, options.stretch)),)

@@ -6,9 +6,11 @@ from pathlib import Path
 from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.parameters import SAVE_FOLDER
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+from valve_friction_ros.records.bags.libraries import bag_libraries
 from valve_friction_ros.records.bags.topics import StreamNames
 
 __all__ = ["saved_bag"]
@@ -19,7 +21,7 @@ async def saved_bag(
 ) -> Path:
     """Write what the buffer holds now as a bag, in a thread of `worker`; return its path.
 
-    Raises RefusalError if it cannot be written.
+    Raises RefusalError if it cannot be written, or the libraries that bags need are not there.
     """
     given = node.get_parameter(SAVE_FOLDER.name).value
     name = file_name(node, node.get_clock().now().nanoseconds)
@@ -27,7 +29,11 @@ async def saved_bag(
 
     def write() -> Path:
         # Costs memory and time at the start, and most nodes never save.
-        from valve_friction_ros.records.bags.writing import write_bag  # noqa: PLC0415
+        try:
+            with bag_libraries():
+                from valve_friction_ros.records.bags.writing import write_bag  # noqa: PLC0415
+        except ValueError as error:
+            raise RefusalError(str(error)) from None
 
         mass = settings.identification.assumed_mass
         with output_folder(given, "saved", "a bag") as folder:

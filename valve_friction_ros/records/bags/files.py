@@ -10,35 +10,15 @@ from tempfile import TemporaryDirectory
 import yaml
 from backports import zstd
 
+from valve_friction_ros.records.bags.kind import MCAP, ROS_1, SQLITE, ZSTD, first_bytes
 from valve_friction_ros.records.bags.rosbags_internals import McapFile
 from valve_friction_ros.records.bags.salvage import SalvagedMcap
 from valve_friction_ros.records.bags.sqlite_file import SqliteFile
 from valve_friction_ros.records.bags.storage import Storage
 
-__all__ = ["is_bag", "opened", "storage_files"]
-
-_MCAP = b"\x89MCAP0\r\n"
-_SQLITE = b"SQLite format 3\0"
-_ZSTD = b"\x28\xb5\x2f\xfd"
-_ROS_1 = b"#ROSBAG V"
+__all__ = ["opened", "storage_files"]
 
 _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
-_SUFFIXES = (".mcap", ".db3", ".zstd", ".bag")
-
-
-def _first_bytes(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        return stream.read(16)
-
-
-def is_bag(path: Path) -> bool:
-    """Return whether a file or folder is a bag, by its content or its ending, and no CSV file."""
-    if path.is_dir() or path.suffix in _SUFFIXES:
-        return True
-    try:
-        return _first_bytes(path).startswith((_MCAP, _SQLITE, _ZSTD, _ROS_1))
-    except OSError:
-        return False
 
 
 def _in_order(path: Path) -> list[str | int]:
@@ -88,7 +68,7 @@ def storage_files(path: Path) -> tuple[list[Path], list[str]]:
 @contextlib.contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
     """Unpack a file that was compressed as a whole; of a cut file, the part that is there."""
-    if not _first_bytes(path).startswith(_ZSTD):
+    if not first_bytes(path).startswith(ZSTD):
         yield path
         return
     with TemporaryDirectory() as folder:
@@ -104,13 +84,13 @@ def _unpacked(path: Path) -> Iterator[Path]:
 
 def _is_mcap(path: Path, start: bytes) -> bool:
     """Return True for MCAP, False for SQLite3, by the first bytes; refuse anything else."""
-    if start.startswith((_MCAP, _SQLITE)):
-        return start.startswith(_MCAP)
+    if start.startswith((MCAP, SQLITE)):
+        return start.startswith(MCAP)
     if not start and path.stat().st_size:
         raise ValueError(f"{path}: nothing of it can be unpacked: copy or record it anew")
     if not start:
         raise ValueError(f"{path}: the file is empty: nothing was recorded, or copied")
-    if start.startswith(_ROS_1):
+    if start.startswith(ROS_1):
         raise ValueError(f"{path}: a bag of ROS 1: convert it by rosbags-convert")
     raise ValueError(f"{path}: neither MCAP nor SQLite3, whatever its name says: record it anew")
 
@@ -124,7 +104,7 @@ def opened(path: Path, salvage: bool) -> Iterator[Storage]:
     its messages are gone through.
     """
     with _unpacked(path) as file:
-        is_mcap = _is_mcap(path, _first_bytes(file))
+        is_mcap = _is_mcap(path, first_bytes(file))
         if is_mcap and salvage:
             yield SalvagedMcap(file)
             return

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from valve_friction_ros.figures.page import dress
+from valve_friction_ros.figures.page import dress, labelled_in, legend_above
 from valve_friction_ros.figures.panels import COLOURS, thinned
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.checks.parameter_checks import NOTATION
@@ -47,7 +47,7 @@ def estimates_figure(result: BenchResult) -> Figure:
         axes.ticklabel_format(axis="y", useOffset=False)
     for axes in panels[1]:
         axes.set_xlabel("threshold δv [m/s]")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=5)
+    legend_above(figure, labelled_in([panels[0, 0]]), columns=5)
     dress(panels.flat)
     return figure
 
@@ -66,7 +66,7 @@ def quality_figure(result: BenchResult) -> Figure:
     panels[2].set_xlabel("threshold δv [m/s]")
     for axes in panels:
         _mark(axes, result)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    legend_above(figure, labelled_in([panels[0]]), columns=3)
     dress(panels)
     return figure
 
@@ -102,6 +102,6 @@ def validation_figure(
         panels[1].set_ylabel("paper's model 2\nerror [µm]")
     panels[-1].set_ylabel("our models\nerror [µm]")
     panels[-1].set_xlabel("time [s]")
-    figure.legend(*stem.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    legend_above(figure, labelled_in([stem]), columns=4)
     dress(panels)
     return figure

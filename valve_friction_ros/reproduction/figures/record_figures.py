@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from valve_friction_ros.figures import draw_curves
-from valve_friction_ros.figures.page import dress
+from valve_friction_ros.figures.page import dress, labelled_in, legend_above
 from valve_friction_ros.figures.panels import COLOURS, thinned
 from valve_friction_ros.reproduction import paper
 from valve_friction_ros.reproduction.experiments import Experiment
@@ -65,7 +65,7 @@ def excitations_figure(result: BenchResult) -> Figure:
     for axes, (title, experiment, duration) in zip(panels.flat, shown, strict=True):
         _draw_pressure(axes, experiment, min(duration, experiment.measured.duration))
         axes.set_title(title)
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    legend_above(figure, labelled_in([panels[0, 0]]), columns=2)
     dress(panels.flat)
     return figure
 
@@ -91,7 +91,7 @@ def input_output_figure(low: BenchResult, high: BenchResult) -> Figure:
         bottom.set_xlabel("time [s]")
     panels[0, 0].set_ylabel("pressure [kPa]")
     panels[1, 0].set_ylabel("stem position [mm]")
-    figure.legend(*panels[1, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    legend_above(figure, labelled_in([panels[1, 0]]), columns=2)
     dress(panels.flat)
     return figure
 

@@ -1,0 +1,76 @@
+"""Without the libraries that bags need: all else works, and a bag is refused with the remedy."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PROJECT = Path(__file__).resolve().parents[2]
+LIBRARIES = ("apsw", "backports", "lz4", "rosbags")
+LINE = re.compile(
+    r"bags need rosbags, lz4 and backports.zstd \(No module named '\w+'\): "
+    r"run `pip install 'rosbags>=0.11.9,<0.12' lz4 backports.zstd`"
+)
+
+
+@pytest.fixture(autouse=True)
+def without_libraries(monkeypatch, tmp_path):
+    """Modules of these names that fail as those that are not there do."""
+    folder = tmp_path / "missing"
+    folder.mkdir()
+    for name in LIBRARIES:
+        text = f"raise ModuleNotFoundError(\"No module named '{name}'\", name='{name}')\n"
+        (folder / f"{name}.py").write_text(text)
+    path = [str(folder), str(PROJECT), os.environ.get("PYTHONPATH")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
+
+
+def identify(*arguments):
+    command = [sys.executable, "-m", "valve_friction_ros", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("identifiers", {"valves": "[fv_101]"}), ("simulator", {}), ("pressure_source", {})],
+)
+def test_a_node_starts(live, name, parameters):
+    process = live.start(name, parameters)
+    live.client.wait_until(lambda: "ready" in process.errors, "the ready line")
+
+
+def test_save_is_refused_and_the_identifier_goes_on(live):
+    process = live.start_identifier()
+    live.client.wait_until(lambda: "ready" in process.errors, "the ready line")
+    for _ in range(2):
+        response = live.client.trigger("save")
+        assert not response.success
+        assert LINE.fullmatch(response.message), response.message
+
+
+def test_csv_is_identified_and_a_bag_is_refused(loose_record, bench_yaml, tmp_path):
+    columns = np.c_[loose_record.time, loose_record.pressure, loose_record.position]
+    file = tmp_path / "record.csv"
+    np.savetxt(file, columns, "%.12g", ",", header="time_s,pressure_pa,position_m", comments="")
+    options = ("--valve", bench_yaml, "--method", "published")
+    done = identify("identify", file, *options)
+    assert done.returncode == 0, done.stderr
+    bag = tmp_path / "bag.mcap"
+    bag.write_bytes(b"\x89MCAP0\r\n")
+    done = identify("identify", bag, *options)
+    assert done.returncode == 2
+    assert LINE.fullmatch(done.stderr.strip().removeprefix("valve_friction identify: "))
+
+
+def test_a_folder_tells_which_are_bags(bench_yaml, tmp_path):
+    folder = tmp_path / "records"
+    folder.mkdir()
+    (folder / "bag.mcap").write_bytes(b"\x89MCAP0\r\n")
+    output = tmp_path / "rows.csv"
+    done = identify("identify-folder", folder, "--valve", bench_yaml, "--output", output)
+    assert done.returncode == 2, done.stderr
+    assert LINE.search(output.read_text())
