@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import time
 from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
@@ -130,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
         try:
-            figure = figures.trend_figure(histories)
+            figure = figures.trend_figure(histories, time.time_ns())
         except ValueError as error:
             raise ValueError(f"--plot: {error} by --valve") from None
     try:

@@ -14,6 +14,7 @@ from valve_friction_ros.figures.panels import (
     draw_panels,
     draw_record,
     draw_signature,
+    number,
 )
 from valve_friction_ros.health import dead_band, percentage
 from valve_friction_ros.identification import Result
@@ -21,7 +22,7 @@ from valve_friction_ros.identification import Result
 __all__ = ["friction_figure", "identification_figure"]
 
 
-def friction_figure(cases: Sequence[Case], title: str) -> Figure:
+def friction_figure(cases: Sequence[Case], title: str, notes: Sequence[str] = ()) -> Figure:
     """Draw one or several identified records of a valve.
 
     Parameters
@@ -30,6 +31,8 @@ def friction_figure(cases: Sequence[Case], title: str) -> Figure:
         One to four, in the order of time.
     title : str
         One sentence, printed above the panels.
+    notes : sequence of str
+        Printed below them, in small letters.
 
     Returns
     -------
@@ -45,7 +48,7 @@ def friction_figure(cases: Sequence[Case], title: str) -> Figure:
         raise ValueError(f"one to {len(COLOURS)} cases can be drawn, got {len(cases)}")
     own = [[one for one in case.drawing.panels if not one.is_detail] for case in cases]
     names = [panel.name for panel in own[0]]
-    figure = titled_figure(title)
+    figure = titled_figure(title, notes)
     rows: list[Any]
     if names:
         rows = [["pressure"] * 2, ["stem"] * 2, *([name, "signature"] for name in names)]
@@ -66,7 +69,9 @@ def friction_figure(cases: Sequence[Case], title: str) -> Figure:
 
 def identification_figure(result: Result) -> Figure:
     """Draw a recording and its identification, each number with its verdict."""
-    return friction_figure([Case.of("recording", result)], _title(result))
+    return friction_figure(
+        [Case.of("recording", result)], _title(result), result.to_dict()["warnings"]
+    )
 
 
 def _title(result: Result) -> str:
@@ -77,11 +82,11 @@ def _title(result: Result) -> str:
         parts.append(f"dead band {percentage(share)} of travel")
     if shown["rms"] is not None:
         parts.append(f"fit {100 * shown['fit']:.2f} %")
-    return "; ".join((*parts, *shown["warnings"]))
+    return "; ".join(parts)
 
 
 def _with_verdict(symbol: str, parameter: Mapping[str, Any]) -> str:
     value, verdict = parameter["value"], parameter["verdict"]
     if value is None:
-        return f"{symbol} {verdict}"
-    return f"{symbol} {value:.4g} {parameter['unit']} ({verdict})"
+        return f"${symbol}$ {verdict}"
+    return f"${symbol}$ {number(value)} {parameter['unit']} ({verdict})"

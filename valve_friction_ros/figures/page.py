@@ -1,7 +1,7 @@
 """The page of a figure: its size, its title, the style of its panels."""
 
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -9,19 +9,32 @@ from matplotlib.figure import Figure
 
 __all__ = ["dress", "labelled_in", "legend_above", "titled_figure"]
 
-_TITLE_WIDTH = 95
-"""Characters of a line of the title, which fill the width of the figure."""
+_TITLE_WIDTH, _NOTE_WIDTH = 95, 130
+"""Characters of a line of the title and of the notes, which fill the width of the figure."""
+
+_MOST_NOTES = 3
+"""Notes on a figure; more would take the room of the panels."""
 
 _LEGEND_PAD = 0.2
 """Room above and below the legend of a figure, in heights of its letters."""
 
 
-def titled_figure(title: str) -> Figure:
-    """Return an empty figure with `title`, wrapped, above it."""
+def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
+    """Return an empty figure with `title`, wrapped, above it, and the first notes below it.
+
+    The title is of this package; notes may hold text from outside, which is never read as maths.
+    """
     figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
     figure.suptitle(
         textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
     )
+    if notes:
+        shown = [f"note: {note}" for note in notes[:_MOST_NOTES]]
+        if len(notes) > _MOST_NOTES:
+            shown.append(f"and {len(notes) - _MOST_NOTES} more notes, which the command prints")
+        lines = "\n".join(textwrap.fill(one, _NOTE_WIDTH) for one in shown)
+        text = figure.supxlabel(lines, fontsize=9, x=0.02, ha="left")
+        text.set_parse_math(False)
     return figure
 
 

@@ -1,10 +1,10 @@
 """Figures of one identification for the pages of a report, each for the width of the paper."""
 
 import math
+import textwrap
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from valve_friction_ros.figures.case import Case
@@ -22,6 +22,7 @@ from valve_friction_ros.model import Recording
 __all__ = [
     "comparison_figure",
     "evidence_figure",
+    "noise_figures",
     "record_figure",
     "residual_figure",
     "signature_loop_figure",
@@ -29,6 +30,12 @@ __all__ = [
 
 _WIDTH = 7.1
 """Between the margins of an A4 page, inches."""
+
+_HALF = 3.45
+"""Width of one of two pictures beside each other, inches."""
+
+_TITLE = 42
+"""Characters of a line above a panel, on a narrow screen too."""
 
 _PALE = "#8CC5E8"
 """Pale, so that curves on it stay visible."""
@@ -51,11 +58,17 @@ def record_figure(recording: Recording) -> Figure:
     return figure
 
 
-def signature_loop_figure(result: Result) -> Figure:
-    """Draw stem position over the drive, with what the method adds."""
+def signature_loop_figure(result: Result, healthy: Recording | None = None) -> Figure:
+    """Draw stem position over the drive, with what the method adds, on that of the baseline."""
     figure = _paper_figure(3.4)
     axes = figure.subplots()
-    draw_signature(axes, [Case.of("recording", result)])
+    if healthy is not None:
+        drive = healthy.drive / healthy.driven_by.size
+        axes.plot(drive, healthy.position * 1e3, color="0.6", lw=1.6, label="baseline")
+    draw_signature(axes, [Case.of("recording" if healthy is None else "now", result)])
+    if healthy is not None:
+        axes.lines[1].set_label("now")
+        axes.legend(loc="upper left", frameon=False)
     dress((axes,))
     return figure
 
@@ -68,11 +81,7 @@ def evidence_figure(drawing: Drawing) -> Figure:
     panels = figure.subplots(count, 1, sharex=True, height_ratios=ratios, squeeze=False)[:, 0]
     draw_panels(panels.tolist(), [drawing.panels])
     for axes, panel in zip(panels, drawing.panels, strict=True):
-        axes.set_title(panel.title, fontsize="medium")
-        if panel.is_logarithmic:
-            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axes.yaxis.set_major_formatter("{x:g}")
-            axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_title(textwrap.fill(panel.title, _TITLE), fontsize="medium")
         if drawing.region is not None:
             axes.axvspan(*drawing.region, color="black", alpha=0.12, lw=0, zorder=0)
     dress(panels)
@@ -95,29 +104,37 @@ def comparison_figure(comparison: StemComparison) -> Figure:
 
 
 def residual_figure(comparison: StemComparison) -> Figure:
-    """Draw the residual over the time, its histogram, and its autocorrelation."""
-    figure = _paper_figure(4.0)
-    panels = figure.subplot_mosaic([["time", "time"], ["histogram", "correlation"]])
+    """Draw the residual over the time."""
+    figure = _paper_figure(2.2)
+    axes = figure.subplots()
     residual = comparison.residual * 1e6
     some = thinned(residual.size)
-    panels["time"].plot(comparison.time[some], residual[some], color=COLOURS[1], lw=0.8)
-    panels["time"].axhline(0, color="black", lw=0.8)
-    panels["time"].set_ylabel("residual [µm]")
-    panels["time"].set_xlabel("time [s]")
-    panels["histogram"].hist(residual, bins=_BINS, color=COLOURS[1])
-    panels["histogram"].set_xlabel("residual [µm]")
-    panels["histogram"].set_ylabel("samples")
+    axes.plot(comparison.time[some], residual[some], color=COLOURS[1], lw=0.8)
+    axes.axhline(0, color="black", lw=0.8)
+    axes.set_ylabel("residual [µm]")
+    axes.set_xlabel("time [s]")
+    dress((axes,))
+    return figure
+
+
+def noise_figures(comparison: StemComparison) -> tuple[Figure, Figure]:
+    """Draw the histogram of the residual, and its autocorrelation."""
+    residual = comparison.residual * 1e6
+    figures = [Figure(figsize=(_HALF, 2.3), layout="constrained") for _ in range(2)]
+    histogram, axes = (figure.subplots() for figure in figures)
+    histogram.hist(residual, bins=_BINS, color=COLOURS[1])
+    histogram.set_xlabel("residual [µm]")
+    histogram.set_ylabel("samples")
     correlation = comparison.autocorrelation(min(_LAGS, residual.size))
     lags = np.arange(correlation.size) * comparison.sample_period
     chance = _chance(residual)
-    axes = panels["correlation"]
     axes.plot(lags, correlation, color=COLOURS[1], lw=1.2)
     axes.axhspan(-chance, chance, color="black", alpha=0.15, lw=0)
     axes.set_ylim(-1.05, 1.05)
     axes.set_xlabel("lag [s]")
     axes.set_ylabel("autocorrelation [-]")
-    dress(panels.values())
-    return figure
+    dress((histogram, axes))
+    return figures[0], figures[1]
 
 
 def _chance(residual: NDArray[np.float64]) -> float:

@@ -19,6 +19,7 @@ from valve_friction_ros.identification import (
     parameter_mapping,
     plain,
 )
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams.record_buffer import Snapshot
 
 __all__ = [
@@ -35,6 +36,9 @@ __all__ = [
     "trended",
 ]
 
+
+_MOST_SAMPLES = 2000
+"""Samples of a kept record. Chosen: the loop of forty strokes is round, in 16 kB."""
 
 _ENDLESS = 1e300
 """Half width, N, from which an interval says nothing."""
@@ -100,11 +104,26 @@ class KeptBaseline:
         When it was set, ns since 1970 (UTC).
     since : int
         When its result was identified, ns: a new trend begins there.
+    record : Recording or None
+        Its record, thinned (`thin`), for pictures; None where it is unknown.
     """
 
     baseline: Baseline
     time: int
     since: int
+    record: Recording | None = field(default=None, repr=False, compare=False)
+
+    @staticmethod
+    def thin(record: Recording) -> Recording:
+        """Return at most `_MOST_SAMPLES` samples of a record, evenly spread over it."""
+        step = -(-len(record) // _MOST_SAMPLES)
+        return Recording(
+            record.sample_period * step,
+            record.drive[::step],
+            record.position[::step],
+            record.start_time,
+            driven_by=record.driven_by,
+        )
 
 
 @dataclass(frozen=True)

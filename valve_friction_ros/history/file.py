@@ -19,6 +19,7 @@ from valve_friction_ros.history.rows import (
     frictions_in,
     insert_baseline,
     insert_entry,
+    record_in,
     valve_id,
 )
 from valve_friction_ros.history.schema import HistoryError, reading, writing
@@ -80,10 +81,11 @@ class HistoryFile:
                 "ORDER BY baseline.id DESC",
                 (valve, until),
             ).fetchone()
-        baseline = None if row is None else baseline_in(row)
-        if baseline is None:
-            return None
-        return KeptBaseline(baseline, row["time_ns"], row["since_ns"])
+            baseline = None if row is None else baseline_in(row)
+            if baseline is None:
+                return None
+            record = record_in(connection, row["id"])
+        return KeptBaseline(baseline, row["time_ns"], row["since_ns"], record)
 
     def points(
         self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None

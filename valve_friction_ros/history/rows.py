@@ -8,6 +8,8 @@ from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
+import numpy as np
+
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Level, StatusSignal
@@ -24,6 +26,8 @@ from valve_friction_ros.identification import (
     Parameter,
     Verdict,
 )
+from valve_friction_ros.model.drive import Drive
+from valve_friction_ros.model.recording import Recording
 
 __all__ = [
     "baseline_in",
@@ -31,9 +35,11 @@ __all__ = [
     "frictions_in",
     "insert_baseline",
     "insert_entry",
+    "record_in",
     "valve_id",
 ]
 
+_SAMPLE = np.dtype("<f4")
 
 _OF_BASELINE = (
     "coulomb_friction",
@@ -128,7 +134,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
 
 def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseline) -> None:
     """Add a baseline to a valve."""
-    _insert(
+    row = _insert(
         connection,
         "baseline",
         valve_id=valve,
@@ -136,6 +142,36 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         since_ns=kept.since,
         **_baseline_columns(kept.baseline, _OF_BASELINE),
     )
+    if kept.record is not None:
+        _insert(
+            connection,
+            "baseline_record",
+            baseline_id=row,
+            sample_period=kept.record.sample_period,
+            driven_by=kept.record.driven_by.name,
+            drive=kept.record.drive.astype(_SAMPLE).tobytes(),
+            position=kept.record.position.astype(_SAMPLE).tobytes(),
+        )
+
+
+def record_in(connection: sqlite3.Connection, baseline: int) -> Recording | None:
+    """Return the record of the baseline of this row, if any."""
+    has_records = connection.execute(
+        "SELECT 1 FROM sqlite_master WHERE name = 'baseline_record'"
+    ).fetchone()
+    row = (
+        has_records
+        and connection.execute(
+            "SELECT sample_period, driven_by, drive, position FROM baseline_record "
+            "WHERE baseline_id = ?",
+            (baseline,),
+        ).fetchone()
+    )
+    if row is None:
+        return None
+    period, driven_by, *samples = row
+    drive, position = (np.frombuffer(one, dtype=_SAMPLE).astype(float) for one in samples)
+    return Recording(period, drive, position, driven_by=Drive[driven_by])
 
 
 def _baseline_columns(baseline: Baseline | None, names: Sequence[str]) -> dict[str, float | None]:

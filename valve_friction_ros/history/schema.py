@@ -9,11 +9,11 @@ from urllib.parse import quote
 
 __all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
-and no half widths without calibration."""
+and no half widths without calibration; version 3 has no records of baselines."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -118,6 +118,17 @@ CREATE VIEW friction AS
         ON sliding.identification_id = identification.id AND sliding.name = 'sliding_friction';
 """
 
+_RECORD = """
+CREATE TABLE baseline_record (
+    baseline_id INTEGER PRIMARY KEY REFERENCES baseline ON DELETE CASCADE,
+    sample_period REAL NOT NULL,
+    driven_by TEXT NOT NULL,
+    drive BLOB NOT NULL,
+    position BLOB NOT NULL
+)
+"""
+"""Samples of the record of a baseline, single precision, the least significant byte first."""
+
 _ADDED = {
     "ratio_of": "TEXT",
     "ratio_speed": "REAL",
@@ -141,6 +152,7 @@ _STEPS = {
         "SELECT id, valve_id, time_ns, since_ns, coulomb_friction, half_width FROM former_baseline",
         "DROP TABLE former_baseline",
     ),
+    3: (_RECORD,),
 }
 """What leads from a version to the next one."""
 
@@ -228,7 +240,7 @@ def _make_tables(connection: sqlite3.Connection) -> None:
     """Create the tables of a new file, and add to those of an older one what they lack."""
     version = _pragma(connection, "user_version")
     steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
-    statements = chain(*steps) if version else f"{_SCHEMA};{_BASELINE}".split(";")
+    statements = chain(*steps) if version else f"{_SCHEMA};{_BASELINE};{_RECORD}".split(";")
     for statement in filter(str.strip, statements):
         connection.execute(statement)
     connection.execute(f"PRAGMA application_id = {_APPLICATION}")

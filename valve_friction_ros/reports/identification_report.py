@@ -1,17 +1,23 @@
 """The report of one identification: a page from the diagnosis to the settings."""
 
 import math
+import time
 from collections.abc import Iterator
 
 from valve_friction_ros.figures.report_figures import (
     comparison_figure,
     evidence_figure,
+    noise_figures,
     record_figure,
     residual_figure,
     signature_loop_figure,
 )
+from valve_friction_ros.figures.trend_figure import drift_text, report_trend_figure
 from valve_friction_ros.health import percentage
+from valve_friction_ros.history import ValveHistory
+from valve_friction_ros.history.trend import DAY
 from valve_friction_ros.identification import StemComparison
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
 from valve_friction_ros.reports.identification_tables import (
     budget_table,
@@ -22,13 +28,15 @@ from valve_friction_ros.reports.identification_tables import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
+from valve_friction_ros.reports.published_words import published_words
+from valve_friction_ros.reports.valve_status import date_line, valve_status
 
 __all__ = ["identification_report"]
 
 _VERDICTS = (
     "Identified: half the interval is at most 5 % of the value, and no doubt is known. Weak: the "
     "interval is wider, or the reason stands beside the verdict. Not identifiable: the record does "
-    "not determine the parameter, and no number is shown. Fixed: the value was given."
+    "not determine the parameter, and no value is shown. Fixed: the value was given."
 )
 _FRICTION = "Friction against its baseline"
 _BUDGET = (
@@ -37,6 +45,9 @@ _BUDGET = (
     "calibration: the scales of diaphragm area and sensors. The 95 % interval is twice the root of "
     "the sum of their squares, or wider where other models are nearly as probable."
 )
+_ALL_NOISE = 0.05
+"""Share of a misfit, below which what is not noise is not told. Chosen: 0.1 % of its square."""
+
 _NO_STEM = (
     "The spring is zero or not identifiable, so the stem cannot be simulated: no force returns it. "
     "This report therefore holds neither a comparison nor a residual."
@@ -46,20 +57,29 @@ _NO_STEM = (
 def identification_report(record: IdentifiedRecord) -> Page:
     """Return the page on an identified record: its parameters and the evidence for them.
 
-    The diagnosis in one sentence, then parameters, uncertainty budget, friction against its
-    baseline, the record, the valve signature, the evidence of the method, the measured against the
-    simulated position, the residual, notes, settings and versions. Parts that a method does not
-    have are left out.
+    The status, the diagnosis in one sentence and the date, then parameters, uncertainty budget,
+    friction against its baseline, trend, the record, the valve signature, the evidence of the
+    method, the measured against the simulated position, the residual, notes, settings and versions.
+    Parts that a method does not have are left out.
     """
-    return Page(f"Friction of {record.name}", diagnosis_sentence(record), tuple(_sections(record)))
+    return Page(
+        f"Friction of {record.name}",
+        diagnosis_sentence(record),
+        tuple(_sections(record)),
+        valve_status(record),
+        date_line(record),
+    )
 
 
 def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     result = record.result
-    yield Section("Parameters", (parameter_table(record), Paragraph(_VERDICTS)))
+    words = filter(None, (_VERDICTS, published_words(result)))
+    yield Section("Parameters", (parameter_table(record), *map(Paragraph, words)))
     if budget := budget_table(record):
         yield Section("Uncertainty budget", (budget, Paragraph(_BUDGET)))
     yield _friction(record)
+    if record.history is not None:
+        yield _trend(record.history)
     yield _record(record)
     yield _signature(record)
     drawing = result.drawing
@@ -82,11 +102,29 @@ def _friction(record: IdentifiedRecord) -> Section:
     table = friction_table(record)
     if record.baseline is None:
         none = Paragraph(
-            "Excess friction is unknown, because this valve has no baseline. The baseline is the "
-            "Coulomb friction of the healthy valve."
+            "Excess friction is unknown, because this valve has no baseline: nothing on this page "
+            "says that the valve is healthy. The baseline is the friction of the healthy valve."
         )
         return Section(_FRICTION, (none, table))
     return Section(_FRICTION, (table,))
+
+
+def _trend(history: ValveHistory) -> Section:
+    trend, days = history.trend, len({entry.time // DAY for entry in history.entries})
+    count = f"{len(history.entries)} identifications on {days} days"
+    told = f"{count}. No drift is told: that needs the frictions of four days, by one method."
+    if trend is not None:
+        told = f"{count}. Drift of the {trend.what}: {drift_text(trend)}."
+        if not trend.is_significant:
+            told += " Its interval holds zero: no drift is proved."
+    now = time.time_ns()
+    picture = Picture(
+        report_trend_figure(history, now),
+        "Friction with its 95 % intervals, baseline and limits. Hollow: weak.",
+        "Friction of the valve over the time, with baseline and limits.",
+        report_trend_figure(history, now, is_narrow=True),
+    )
+    return Section("Trend", (Paragraph(told), picture))
 
 
 def _record(record: IdentifiedRecord) -> Section:
@@ -102,9 +140,11 @@ def _record(record: IdentifiedRecord) -> Section:
 def _signature(record: IdentifiedRecord) -> Section:
     result, drive = record.result, record.recording.driven_by.words
     caption = f"Stem position over {drive}: the wider the loop, the more friction."
+    if record.healthy is not None:
+        caption += " Grey: the record of the baseline."
     caption += result.drawing.loop_caption
     picture = Picture(
-        signature_loop_figure(result),
+        signature_loop_figure(result, record.healthy),
         caption,
         f"A loop of stem position over {drive}.",
     )
@@ -127,19 +167,32 @@ def _comparison(record: IdentifiedRecord, comparison: StemComparison) -> Section
 
 def _residual(record: IdentifiedRecord, comparison: StemComparison) -> Section:
     misfit = record.result.misfit
-    caption = (
-        "The residual, simulated minus measured position, over the time, its histogram, and its "
-        "autocorrelation. For noise alone the autocorrelation stays within the grey band beyond "
-        "lag 0."
-    )
-    if misfit is not None:
-        caption += (
-            f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are not noise, "
-            f"which {'does not put' if misfit.describes else 'puts'} the model in doubt."
-        )
     picture = Picture(
         residual_figure(comparison),
-        caption,
-        "Residual over the time; below it its histogram and its autocorrelation.",
+        f"The residual, simulated minus measured position, over the time.{_noise_words(misfit)}",
+        "Residual over the time.",
     )
-    return Section("Residual", (picture,))
+    histogram, correlation = noise_figures(comparison)
+    return Section(
+        "Residual",
+        (
+            picture,
+            Picture(histogram, "Its histogram.", "Histogram of the residual."),
+            Picture(
+                correlation,
+                "Its autocorrelation. For noise alone it stays within the grey band beyond lag 0.",
+                "Autocorrelation of the residual over the lag.",
+            ),
+        ),
+    )
+
+
+def _noise_words(misfit: Misfit | None) -> str:
+    if misfit is None:
+        return ""
+    if misfit.systematic < _ALL_NOISE * misfit.rms:
+        return f" Its {misfit.rms * 1e6:.3g} µm rms are not larger than the noise of the sensors."
+    return (
+        f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are more than noise, "
+        f"which {'does not put' if misfit.describes else 'puts'} the model in doubt."
+    )

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 import valve_friction_ros
-from valve_friction_ros.health import compared, dead_band, percentage
+from valve_friction_ros.health import Level, compared, dead_band, percentage
 from valve_friction_ros.identification import (
     CALIBRATION,
     TIMING_UNCERTAINTY,
@@ -21,6 +21,8 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Column, Table
+from valve_friction_ros.reports.typography import Verbatim
+from valve_friction_ros.reports.valve_status import began
 
 __all__ = [
     "budget_table",
@@ -28,6 +30,7 @@ __all__ = [
     "parameter_table",
     "record_table",
     "settings_table",
+    "words_of",
 ]
 
 _WORDS = {
@@ -46,9 +49,6 @@ _NOTHING = "–"
 _WHOLE = 1e4
 """Size from which numbers are written without decimals: five digits then remain."""
 
-_DATED = (1e9, 1e11)
-"""Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
-
 
 def _number(value: float | None) -> str:
     """Write five digits or more, without an exponent if possible."""
@@ -57,8 +57,13 @@ def _number(value: float | None) -> str:
     return f"{value:.0f}" if abs(value) >= _WHOLE else f"{value:.5g}"
 
 
+def words_of(name: str) -> str:
+    """Return the name of a parameter in words, with its symbol."""
+    return _WORDS.get(name, name.replace("_", " "))
+
+
 def _heading(name: str, one: Mapping[str, Any]) -> str:
-    return f"{_WORDS.get(name, name.replace('_', ' '))} [{one['unit']}]"
+    return f"{words_of(name)} [{one['unit']}]"
 
 
 def _is_estimated(one: Mapping[str, Any]) -> bool:
@@ -83,7 +88,7 @@ def parameter_table(record: IdentifiedRecord) -> Table:
         Column("value", is_number=True),
         Column("95 % interval", is_number=True),
         Column("verdict"),
-        Column("published method", is_number=True),
+        Column("published", is_number=True),
     )
     rows = [_cells(name, one) for name, one in shown.items()]
     marked = ([*shown].index("coulomb_friction"),)
@@ -148,22 +153,25 @@ def friction_table(record: IdentifiedRecord) -> Table:
     share = dead_band(record.result, record.valve)
     if math.isfinite(share):
         rows.append(("dead band (F_c + F_s)/k", f"{percentage(share)} of the travel"))
-    signal = diagnosis.status_signal.value
-    rows += [
-        ("level", diagnosis.level.name + (f", NE 107 status signal {signal}" if signal else "")),
-        ("diagnosis", diagnosis.message),
-    ]
+    rows += [("level", _level(record)), ("diagnosis", diagnosis.message)]
     return _pairs(rows, "friction", "finding")
+
+
+def _level(record: IdentifiedRecord) -> str:
+    diagnosis = record.diagnosis
+    if diagnosis.level is Level.OK and diagnosis.ratio is None:
+        return "unknown: nothing was compared, so no alarm is raised (OK) and none is excluded"
+    signal = diagnosis.status_signal.value
+    return diagnosis.level.name + (f", NE 107 status signal {signal}" if signal else "")
 
 
 def record_table(record: IdentifiedRecord) -> Table:
     """Return the source of the record, and its extent."""
     recording, drive = record.recording, record.recording.driven_by
     shown, position = recording.drive / drive.size, recording.position * 1e3
-    rows = [("source", record.source)]
-    if _DATED[0] < recording.start_time < _DATED[1]:
-        began = datetime.fromtimestamp(recording.start_time, timezone.utc)
-        rows.append(("began", f"{began:%Y-%m-%d %H:%M:%S} UTC"))
+    rows: list[tuple[str, str]] = [("source", Verbatim(record.source))]
+    if begin := began(recording):
+        rows.append(("began", f"{begin:%Y-%m-%d %H:%M:%S} UTC"))
     rows += [
         ("duration", f"{recording.duration:.4g} s"),
         ("samples", f"{len(recording)}, sampled every {recording.sample_period * 1e3:.4g} ms"),
@@ -209,6 +217,7 @@ def settings_table(record: IdentifiedRecord) -> Table:
             f"{valve.travel * 1e3:g} mm" if math.isfinite(valve.travel) else "without stops",
         ),
         ("software", _versions()),
+        ("report written", f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC"),
     ]
     return _pairs(rows, "setting", "value")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from valve_friction_ros.health import Baseline, Diagnosis, FrictionLimits, diagnose
+from valve_friction_ros.history import ValveHistory
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
 
@@ -27,6 +28,12 @@ class IdentifiedRecord:
         Bounds of the friction.
     notes : tuple of str
         Limitations of the record, one sentence each.
+    dated : str
+        Further date, such as that of the file or of the identification, in words.
+    healthy : Recording or None
+        Record of the baseline, to be drawn beside this one.
+    history : ValveHistory or None
+        What was identified of this valve before.
     """
 
     name: str
@@ -35,6 +42,9 @@ class IdentifiedRecord:
     baseline: Baseline | None = None
     limits: FrictionLimits = field(default_factory=FrictionLimits)
     notes: tuple[str, ...] = ()
+    dated: str = ""
+    healthy: Recording | None = field(default=None, repr=False)
+    history: ValveHistory | None = field(default=None, repr=False)
 
     @property
     def recording(self) -> Recording:

@@ -3,16 +3,36 @@
 import base64
 import io
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-__all__ = ["Block", "Column", "Page", "Paragraph", "Picture", "Section", "Table", "render"]
+from valve_friction_ros.reports.typography import typeset
 
-_DOTS_PER_INCH = 130
+__all__ = [
+    "Block",
+    "Colour",
+    "Column",
+    "Page",
+    "Paragraph",
+    "Picture",
+    "Section",
+    "Status",
+    "Table",
+    "render",
+]
+
+_DOTS_PER_INCH = 150
 """Resolution of the pictures. Chosen: sharp on paper, and about 100 kB each."""
+
+_NARROW, _NARROW_DOTS = 3.7, 200
+"""Width, inches, and resolution of a picture on a narrow screen: its text is 13 px high there."""
+
+_WIDEST = 7.5
+"""Width, inches, up to which a figure is laid out for a narrow screen."""
 
 
 @dataclass(frozen=True)
@@ -59,25 +79,62 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure, its caption, and its description for readers who cannot see it."""
+    """A figure, its caption, and its description for readers who cannot see it.
+
+    A figure that is wider than a narrow screen is laid out a second time for that, unless `narrow`
+    takes its place there, or it is so wide that it has many panels.
+    """
 
     kind: ClassVar[str] = "picture"
 
     figure: Figure = field(repr=False)
     caption: str
     alt: str
+    narrow: Figure | None = field(default=None, repr=False)
 
     @cached_property
     def png(self) -> bytes:
         """The picture itself, drawn once."""
-        stream = io.BytesIO()
-        self.figure.savefig(stream, format="png", dpi=_DOTS_PER_INCH)
-        return stream.getvalue()
+        return _drawn(self.figure, _DOTS_PER_INCH)
+
+    @cached_property
+    def narrow_png(self) -> bytes | None:
+        """The picture for a narrow screen, with text of the same size, if there is one."""
+        if self.narrow is not None:
+            return _drawn(self.narrow, _NARROW_DOTS)
+        width, height = self.figure.get_size_inches()
+        if not _NARROW < width <= _WIDEST:
+            return None
+        self.figure.set_size_inches(_NARROW, height)
+        try:
+            return _drawn(self.figure, _NARROW_DOTS)
+        finally:
+            self.figure.set_size_inches(width, height)
+
+    @property
+    def is_half(self) -> bool:
+        """Whether two such pictures stand beside each other on a wide page."""
+        return self.figure.get_figwidth() <= _NARROW
 
     @property
     def source(self) -> str:
         """The picture as a data address (PNG, base64)."""
-        return f"data:image/png;base64,{base64.b64encode(self.png).decode('ascii')}"
+        return _address(self.png)
+
+    @property
+    def narrow_source(self) -> str:
+        """The picture for a narrow screen as a data address; empty without one."""
+        return "" if self.narrow_png is None else _address(self.narrow_png)
+
+
+def _drawn(figure: Figure, resolution: int) -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=resolution)
+    return stream.getvalue()
+
+
+def _address(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
 
 
 Block = Paragraph | Table | Picture
@@ -92,13 +149,32 @@ class Section:
     blocks: tuple[Block, ...]
 
 
+class Colour(Enum):
+    """Colours of a status, each with the sign that tells it without colour."""
+
+    GREEN = "✓"
+    GREY = "?"
+    AMBER = "!"
+    RED = "✗"
+
+
+class Status(NamedTuple):
+    """The conclusion in a few words, and what it is called elsewhere."""
+
+    colour: Colour
+    words: str
+    addition: str = ""
+
+
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, one or two sentences with the conclusion, and the sections."""
+    """A page: title, status, one or two sentences with the conclusion, date, and the sections."""
 
     title: str
     lead: str
     sections: tuple[Section, ...]
+    status: Status | None = None
+    date: str = ""
 
 
 def render(page: Page) -> str:
@@ -114,4 +190,5 @@ def render(page: Page) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    environment.filters["typeset"] = typeset
     return environment.get_template("page.html").render(page=page)

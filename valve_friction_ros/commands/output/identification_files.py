@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple
 
@@ -87,8 +88,17 @@ class IdentificationFiles(NamedTuple):
                 result=result,
                 baseline=baseline,
                 notes=recorded.notes,
+                dated=_dated(recorded.path),
             )
             reports.write_report(reports.identification_report(record), self.report)
+
+
+def _dated(path: Path) -> str:
+    """Return when a file was last changed, in words; empty where it has no such time."""
+    if not path.exists():
+        return ""
+    changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
+    return f"its file was last changed {changed:%Y-%m-%d %H:%M} UTC"
 
 
 def identification_files(options: argparse.Namespace) -> IdentificationFiles:

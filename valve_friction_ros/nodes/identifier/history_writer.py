@@ -16,8 +16,10 @@ from valve_friction_ros.history import (
     KeptBaseline,
     KeptValve,
     Trend,
+    ValveHistory,
     current_trend,
     entry_of,
+    valve_histories,
 )
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
@@ -29,6 +31,7 @@ _MOST_WAITING = 1000
 """Changes that wait for a file that cannot be written; then the oldest are given up."""
 _LONGEST = 60.0
 """Time, s, after which a writing that has not ended is a problem; a busy file ends it sooner."""
+_END_OF_TIME = 2**63 - 1
 
 _T = TypeVar("_T")
 
@@ -54,6 +57,7 @@ class HistoryWriter:
         self._waiting: deque[Callable[[HistoryFile], None]] = deque(maxlen=_MOST_WAITING)
         self._problem: str | None = None
         self._trend: Trend | None = None
+        self._baseline: KeptBaseline | None = None
 
     @property
     def valve(self) -> KeptValve:
@@ -78,6 +82,21 @@ class HistoryWriter:
         return "".join(f", but it is lost with this node: {one}" for one in self.problems)
 
     @property
+    def baseline(self) -> KeptBaseline | None:
+        """The baseline that was kept last, with its record; another one may be in force."""
+        return self._baseline
+
+    def read(self) -> ValveHistory | None:
+        """Read the history of the valve, in any thread; None without a file or entries.
+
+        Raises HistoryError if the file cannot be read.
+        """
+        if self._file is None:
+            return None
+        histories = valve_histories(self._file, (self._valve,), 0, _END_OF_TIME)
+        return histories[0] if histories else None
+
+    @property
     def trend(self) -> Trend | None:
         """Drift of the Coulomb friction, as of the latest identification."""
         return self._trend
@@ -85,7 +104,8 @@ class HistoryWriter:
     def prepare(self) -> KeptBaseline | None:
         """Make the file if it is not there, and return the valve's baseline in it, if any."""
         self._tried(HistoryFile.prepare)
-        return self._tried(lambda file: file.baseline(self._valve.name))
+        self._baseline = self._tried(lambda file: file.baseline(self._valve.name))
+        return self._baseline
 
     def read_trend(self) -> None:
         """Compute the trend with the baseline and settings of now."""
@@ -114,7 +134,9 @@ class HistoryWriter:
         """Keep the baseline that was taken from the latest estimate."""
         now = self._node.get_clock().now().nanoseconds
         since = now if self._monitor.stamp is None else self._monitor.stamp
-        kept = KeptBaseline(baseline, now, since)
+        result = self._monitor.result
+        record = None if result is None else KeptBaseline.thin(result.recording)
+        self._baseline = kept = KeptBaseline(baseline, now, since, record)
         with self._failures_remembered():
             await self._written(lambda file: file.set_baseline(self._valve, kept))
 

@@ -199,8 +199,8 @@ class Identifier(PolledNode):
         return str(await saved_bag(self, self._monitor, self._inputs.names, self._workers.files))
 
     async def _report(self) -> str:
-        tag = self._history.valve.tag
-        return str(await written_report(self, self._monitor, tag, self._workers.files))
+        files = self._workers.files
+        return str(await written_report(self, self._monitor, self._history, files))
 
     async def _set_baseline(self) -> str:
         baseline = self._monitor.result_as_baseline()

@@ -8,7 +8,9 @@ from pathlib import Path
 from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor
+from valve_friction_ros.history import HistoryError, ValveHistory
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
@@ -17,7 +19,7 @@ __all__ = ["written_report"]
 
 
 async def written_report(
-    node: Node, monitor: FrictionMonitor, tag: str, worker: ThreadPoolExecutor
+    node: Node, monitor: FrictionMonitor, history: HistoryWriter, worker: ThreadPoolExecutor
 ) -> Path:
     """Write a page on the last result, in a thread of `worker`; return its path.
 
@@ -28,8 +30,10 @@ async def written_report(
         raise RefusalError("the valve has no result to report: identify it first")
     time = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
     given, name = node.get_parameter(REPORT_FOLDER.name).value, file_name(node, stamp)
-    title, node_name = tag or node.get_name(), node.get_fully_qualified_name()
-    baseline, limits = monitor.baseline, monitor.settings.limits
+    title, node_name = history.valve.tag or node.get_name(), node.get_fully_qualified_name()
+    baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
+    healthy = None if kept is None or kept.baseline != baseline else kept.record
+    notes = () if refusal is None else (f"a later record was refused: {refusal}",)
 
     def write() -> Path:
         # Costs memory and time at the start, and most nodes never report.
@@ -38,18 +42,30 @@ async def written_report(
         with output_folder(given, "reports", "a report") as folder:
             folder.mkdir(parents=True, exist_ok=True)
             path = _free_name(folder, name)
+            before, unread = _read(history)
             record = reports.IdentifiedRecord(
                 name=title,
                 source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
+                dated=f"identified {time:%Y-%m-%d %H:%M} UTC",
                 result=result,
                 baseline=baseline,
                 limits=limits,
-                notes=() if refusal is None else (f"a later record was refused: {refusal}",),
+                notes=(*notes, *unread),
+                healthy=healthy,
+                history=before,
             )
             reports.write_report(reports.identification_report(record), path)
             return path
 
     return await done_in(worker, write)
+
+
+def _read(history: HistoryWriter) -> tuple[ValveHistory | None, list[str]]:
+    """Return the history, or why it cannot be read."""
+    try:
+        return history.read(), []
+    except HistoryError as error:
+        return None, [f"no trend, as the history cannot be read: {error}"]
 
 
 def _free_name(folder: Path, name: str) -> Path:

@@ -1,0 +1,24 @@
+"""Text as a page shows it: symbols with subscripts, and the minus sign."""
+
+import re
+
+from markupsafe import Markup, escape
+
+__all__ = ["Verbatim", "typeset"]
+
+_SYMBOL = re.compile(r"(?<![\w.])([FPRSTakv]|σ|R²)_(ref|[a-z0-9])(?!\w|\.\w)")
+_MINUS = re.compile(r"(?<![\w.-])-(?=\d)")
+
+
+class Verbatim(str):
+    """Text from outside, such as the name of a file: it is shown as it is."""
+
+    __slots__ = ()
+
+
+def typeset(text: str) -> Markup:
+    """Escape a text, and set F_c with a subscript and -1 with a minus sign."""
+    escaped = str(escape(str(text)))
+    if isinstance(text, Verbatim):
+        return Markup(escaped)  # noqa: S704 - escaped
+    return Markup(_MINUS.sub("−", _SYMBOL.sub(r"\1<sub>\2</sub>", escaped)))  # noqa: S704 - escaped

@@ -1,0 +1,66 @@
+"""The status of a valve in a few words and a colour, and the date of its record."""
+
+import math
+from datetime import datetime, timezone
+
+from valve_friction_ros.health import StatusSignal
+from valve_friction_ros.identification import SLIDING
+from valve_friction_ros.model import Recording
+from valve_friction_ros.reports.identified_record import IdentifiedRecord
+from valve_friction_ros.reports.page import Colour, Status
+
+__all__ = ["began", "date_line", "valve_status"]
+
+_DATED = (1e9, 1e11)
+"""Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
+
+_ALARMS = {
+    StatusSignal.FAILURE: Status(Colour.RED, "Excess friction", "failure (NE 107: F)"),
+    StatusSignal.OUT_OF_SPECIFICATION: Status(
+        Colour.RED, "Friction has collapsed", "out of specification (NE 107: S)"
+    ),
+    StatusSignal.MAINTENANCE_REQUIRED: Status(
+        Colour.AMBER, "Friction has grown", "maintenance required (NE 107: M)"
+    ),
+    StatusSignal.CHECK_FUNCTION: Status(
+        Colour.AMBER, "Check sensors and model", "check function (NE 107: C)"
+    ),
+}
+
+
+def valve_status(record: IdentifiedRecord) -> Status:
+    """Return the status; green only where a comparison with a baseline found nothing."""
+    diagnosis, limits = record.diagnosis, record.limits
+    if diagnosis.status_signal in _ALARMS:
+        return _ALARMS[diagnosis.status_signal]
+    if diagnosis.ratio is None:
+        return Status(Colour.GREY, "Unknown", _why_unknown(record))
+    if diagnosis.ratio.value >= limits.warn_ratio:
+        return Status(Colour.GREY, "Uncertain", "the friction has perhaps grown")
+    if diagnosis.ratio.value <= limits.low_ratio:
+        return Status(Colour.GREY, "Uncertain", "the friction has perhaps collapsed")
+    return Status(Colour.GREEN, "Friction normal", "compared with the healthy valve")
+
+
+def _why_unknown(record: IdentifiedRecord) -> str:
+    values = record.result.values
+    frictions = [values.get(name, math.nan) for name in ("coulomb_friction", SLIDING)]
+    if all(map(math.isnan, frictions)):
+        return "this record does not determine the friction"
+    if record.baseline is None:
+        return "no baseline to compare the friction with"
+    return "not comparable with the baseline"
+
+
+def began(recording: Recording) -> datetime | None:
+    """Return when a record began; None where its time does not count from 1970."""
+    if not _DATED[0] < recording.start_time < _DATED[1]:
+        return None
+    return datetime.fromtimestamp(recording.start_time, timezone.utc)
+
+
+def date_line(record: IdentifiedRecord) -> str:
+    """Return the date of the record in one sentence."""
+    begin = began(record.recording)
+    known = "The record has no date" if begin is None else f"Recorded {begin:%Y-%m-%d %H:%M} UTC"
+    return "; ".join(filter(None, (known, record.dated))) + "."
