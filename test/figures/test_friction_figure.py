@@ -154,7 +154,7 @@ class TestVerdict:
         """2·152.7 N over 2.05e5 N/m and 28.575 mm is 5.2 %."""
         known = dataclasses.replace(known, warnings=())
         assert title_of(identification_figure(known)) == (
-            "F_c 152.7 N (identified); F_v 4865 N·s/m (weak); k 2.05e+05 N/m (fixed); "
+            "$F_c$ 152.7 N (identified); $F_v$ 4865 N·s/m (weak); $k$ 205000 N/m (fixed); "
             f"dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
         )
 
@@ -162,7 +162,7 @@ class TestVerdict:
         """What is withheld leaves no number in the title, and no line, band or note of it."""
         figure = identification_figure(nothing_known)
         told = title_of(figure).split("; ")[:3]
-        assert told == [f"{name} not identifiable" for name in ("F_c", "F_v", "k")]
+        assert told == [f"${name}$ not identifiable" for name in ("F_c", "F_v", "k")]
         assert "dead band" not in title_of(figure)
         axes = panels(figure)["coulomb"]
         (note,) = axes.texts
@@ -173,18 +173,52 @@ class TestVerdict:
         assert "nan" not in everything
 
     def test_warnings_are_told(self, known):
+        """Below the panels, and as they are, not as maths: they may hold text from outside."""
         doubt = "the Karnopp model does not describe this valve: 98 µm are not noise"
-        doubted = dataclasses.replace(known, warnings=(doubt, "check the clocks"))
-        title = title_of(identification_figure(doubted))
-        assert title.endswith(f"; {doubt}; check the clocks")
+        doubted = dataclasses.replace(known, warnings=(doubt, r"check $\foo{$ and $x^2$"))
+        figure = identification_figure(doubted)
+        assert figure._supxlabel.get_text() == f"note: {doubt}\nnote: check $\\foo{{$ and $x^2$"
+        assert doubt not in title_of(figure)
+        figure.draw_without_rendering()
 
-    def test_a_long_verdict_is_wrapped_within_the_page(self, known):
-        doubted = dataclasses.replace(known, warnings=("many words " * 20,))
+    def test_many_and_long_warnings_stay_within_the_page(self, known):
+        doubted = dataclasses.replace(known, warnings=("many words " * 20, *"abcd"))
         figure = identification_figure(doubted)
         figure.draw_without_rendering()
-        box = figure._suptitle.get_window_extent()
-        assert box.x1 < figure.bbox.x1
-        assert len(figure._suptitle.get_text().splitlines()) > 2
+        for text in (figure._suptitle, figure._supxlabel):
+            box = text.get_window_extent()
+            assert figure.bbox.x0 < box.x0 < box.x1 < figure.bbox.x1
+        told = figure._supxlabel.get_text().splitlines()
+        assert len(told) == 5
+        assert told[-1] == "and 2 more notes, which the command prints"
+
+    def test_the_friction_stands_clear_of_the_sweep(self, known):
+        """No point of the curve lies below the words that name F_c."""
+        figure = identification_figure(known)
+        figure.draw_without_rendering()
+        axes = panels(figure)["coulomb"]
+        (note,) = axes.texts
+        box = note.get_window_extent()
+        curve = axes.transData.transform(points(axes.lines[0]).T)
+        covered = [box.contains(x, y) for x, y in curve]
+        assert len(covered) > 100
+        assert not any(covered)
+
+    def test_the_scale_of_sigma_can_be_read(self, known):
+        figure = identification_figure(known)
+        figure.draw_without_rendering()
+        axes = panels(figure)["sigma"]
+        low, high = axes.get_ylim()
+        ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
+        assert len(ticks) >= 3
+        assert all(label.get_text() for label in axes.get_yticklabels())
+
+    def test_the_model_is_seen_on_the_measured_stem(self, known):
+        """Also in black and white: a thin dark line on a wide pale one."""
+        measured, model = panels(identification_figure(known))["stem"].lines
+        assert measured.get_linewidth() > 2 * model.get_linewidth()
+        assert measured.get_alpha() < 0.5
+        assert model.get_color() == "k"
 
     def test_beyond_the_travel(self, with_parameters):
         tight = with_parameters(

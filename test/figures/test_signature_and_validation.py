@@ -62,7 +62,7 @@ class TestSignature:
 
     def test_words(self, figure, found):
         title = figure._suptitle.get_text().replace("\n", " ")
-        assert f"F_c {found.values['coulomb_friction']:.4g} N (weak)" in title
+        assert f"$F_c$ {found.values['coulomb_friction']:.4g} N (weak)" in title
         assert f"fit {100 * found.fit:.2f} %" in title
         assert "dead zone 29.6" in panels(figure)["signature"].get_title()
         assert panels(figure)["signature"].get_xlabel() == "pressure [kPa]"

@@ -1,6 +1,8 @@
 """The figure of a history: what is drawn where."""
 
+import dataclasses
 import warnings
+from itertools import pairwise
 
 import matplotlib.dates
 import numpy as np
@@ -9,6 +11,7 @@ from histories import DAY, OTHER, START, VALVE, refused, success
 from matplotlib.container import ErrorbarContainer
 
 from valve_friction_ros.figures import trend_figure
+from valve_friction_ros.figures.trend_figure import report_trend_figure
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import (
     MONTH,
@@ -126,6 +129,69 @@ def test_a_bare_history():
         axes.figure.draw_without_rendering()
     begin, end = axes.get_xlim()
     assert (end - begin, (begin + end) / 2) == pytest.approx((2 / 24, START / DAY), rel=1e-9)
+
+
+def test_a_tag_is_text_whatever_it_holds_and_stays_within_the_page(history):
+    tag = r"cost $\foo{$ and $x^2$ of the long name of a valve; " * 6
+    named = dataclasses.replace(history, valve=VALVE._replace(tag=tag))
+    (axes,) = (figure := trend_figure([named])).axes
+    figure.draw_without_rendering()
+    title = axes.get_title(loc="left")
+    assert title.startswith(r"cost $\foo{$ and $x^2$ of the long name")
+    assert title.splitlines()[1].endswith(" …")
+    left, right = axes._left_title, axes._right_title
+    assert left.get_window_extent().x1 <= figure.bbox.x1
+    assert right.get_text()
+    assert title.splitlines()[2:] == []
+    drift, lines = right.get_window_extent(), left.get_window_extent()
+    assert drift.y1 <= lines.y0 + 0.4 * lines.height
+
+
+def test_a_day_of_many_identifications_is_no_blob():
+    """All are dots; one of each stretch of the axis has its interval, that of the middle value."""
+    first = [success(START + minute * DAY // 1440, 150.0 + minute, 2.0) for minute in range(61)]
+    last = success(START + 100 * DAY, 160.0, 2.0)
+    dense = ValveHistory(VALVE, (*first, last), None, None)
+    (axes,) = trend_figure([dense]).axes
+    points, _, _ = labelled(axes, "identified, 95 % interval")
+    assert points.get_ydata().tolist() == [180.0, 160.0]
+    (dots,) = (line for line in axes.lines if line.get_marker() == ".")
+    assert dots.get_ydata().size == 62
+    assert dots.get_alpha() < 0.5
+
+
+@pytest.mark.parametrize(("days_after", "is_marked"), [(10, True), (200, True), (1e5, False)])
+def test_today_is_marked_where_it_is_near(history, days_after, is_marked):
+    now = history.entries[-1].time + round(days_after * DAY)
+    (axes,) = trend_figure([history], now).axes
+    _, labels = axes.get_legend_handles_labels()
+    assert ("today" in labels) == is_marked
+    if is_marked:
+        assert days(labelled(axes, "today")) == pytest.approx([(now - START) / DAY] * 2)
+        low, high = axes.get_xlim()
+        assert low < now / DAY < high
+
+
+def test_all_valves_have_one_time_axis(history):
+    later = success(START + 300 * DAY, valve=OTHER)
+    panels = trend_figure([history, ValveHistory(OTHER, (later,), None, None)]).axes
+    assert len({axes.get_xlim() for axes in panels}) == 1
+    assert [bool(axes.get_xlabel()) for axes in panels] == [False, True]
+    assert panels[1].get_xlabel().endswith("identified from 2026-09-21 to 2027-07-18")
+
+
+@pytest.mark.parametrize("is_narrow", [False, True])
+def test_a_report_has_the_same_panel_without_title(history, is_narrow):
+    (axes,) = (figure := report_trend_figure(history, is_narrow=is_narrow)).axes
+    figure.draw_without_rendering()
+    assert axes.get_title(loc="left") == ""
+    box, legend = figure.bbox, axes.get_legend().get_window_extent()
+    assert box.x0 <= legend.x0 < legend.x1 <= box.x1 + 1
+    assert box.y0 <= legend.y0 < legend.y1 <= box.y1 + 1
+    labels = [label.get_window_extent() for label in axes.get_xticklabels()]
+    shown = [one for one in labels if box.x0 <= one.x0 and one.x1 <= box.x1]
+    assert len(shown) >= 2
+    assert all(one.x1 < other.x0 for one, other in pairwise(shown))
 
 
 def test_one_panel_a_valve_and_one_legend(history):

@@ -46,7 +46,9 @@ def test_without_a_baseline_nothing_is_said_of_excess(with_friction):
     record = with_friction(150.0, 3.0)
     assert "excess friction" not in rows(record, FRICTION)
     words = section(identification_report(record), FRICTION).blocks[0].text
-    assert words.startswith("Excess friction is unknown, because this valve has no baseline.")
+    assert words.startswith("Excess friction is unknown, because this valve has no baseline")
+    assert "nothing on this page says that the valve is healthy" in words
+    assert rows(record, FRICTION)["level"][0].startswith("unknown: nothing was compared")
 
 
 def test_what_is_not_identifiable_has_no_ratio(with_friction):
@@ -172,14 +174,15 @@ class TestUncertaintyBudget:
 @pytest.mark.parametrize(
     ("systematic", "words"),
     [
-        (3e-6, "3 µm are not noise, which does not put the model in doubt."),
-        (5e-6, "5 µm are not noise, which puts the model in doubt."),
+        (0.0, "Its 9 µm rms are not larger than the noise of the sensors."),
+        (3e-6, "Of 9 µm rms, 3 µm are more than noise, which does not put the model in doubt."),
+        (5e-6, "Of 9 µm rms, 5 µm are more than noise, which puts the model in doubt."),
     ],
 )
 def test_what_a_misfit_means(with_friction, systematic, words):
     record = with_friction(150.0, misfit=Misfit(0.99, 9e-6, systematic, 4e-6))
-    (picture,) = section(identification_report(record), "Residual").blocks
-    assert picture.caption.endswith(f" Of 9 µm rms, {words}")
+    picture, *_ = section(identification_report(record), "Residual").blocks
+    assert picture.caption.endswith(f". {words}")
 
 
 def test_notes_of_the_record_come_before_those_of_the_estimate(identified):

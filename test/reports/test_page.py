@@ -2,53 +2,27 @@
 
 import base64
 import struct
-from html.parser import HTMLParser
 
 import pytest
 from matplotlib.figure import Figure
+from pages import PageReader
 
 from valve_friction_ros.reports import (
+    Colour,
     Column,
     Page,
     Paragraph,
     Picture,
     Section,
+    Status,
     Table,
     render,
 )
-
-VOID = {"meta", "img"}
-
-
-class Reader(HTMLParser):
-    """Checks that what opens also closes, and gathers tags with their attributes and text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.tags, self.texts = [], [], []
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.texts.append((self.open[-1] if self.open else "", data))
-
-    def of(self, name):
-        return [attributes for tag, attributes in self.tags if tag == name]
-
-    def said(self, name):
-        return [text for tag, text in self.texts if tag == name and text.strip()]
+from valve_friction_ros.reports.typography import Verbatim, typeset
 
 
-def picture():
-    figure = Figure(figsize=(2, 1))
+def picture(width=2):
+    figure = Figure(figsize=(width, 1))
     figure.subplots().plot([0, 1])
     return Picture(figure, "Fig. <1>", 'a "line"')
 
@@ -71,9 +45,7 @@ PAGE = Page(
 
 @pytest.fixture(scope="module")
 def reader():
-    reader = Reader(render(PAGE))
-    assert reader.open == []
-    return reader
+    return PageReader(render(PAGE))
 
 
 def test_everything_is_there_and_escaped(reader):
@@ -100,7 +72,62 @@ def test_the_picture_is_in_the_page(reader):
     assert kind == "data:image/png;base64"
     content = base64.b64decode(data, validate=True)
     assert content.startswith(b"\x89PNG")
-    assert struct.unpack(">II", content[16:24]) == (260, 130)
+    assert size(content) == (300, 150)
+
+
+def size(png):
+    return struct.unpack(">II", png[16:24])
+
+
+@pytest.mark.parametrize(
+    ("width", "narrow", "kind"),
+    [(3.5, None, "half"), (7.0, (740, 200), None), (9.5, None, None)],
+)
+def test_a_wide_picture_is_laid_out_again_for_a_narrow_screen(width, narrow, kind):
+    """Unless two stand beside each other anyway, or it holds many panels."""
+    shown = picture(width)
+    reader = PageReader(render(Page("t", "l", (Section("s", (shown,)),))))
+    assert [one.get("class") for one in reader.of("figure")] == [kind]
+    found = [base64.b64decode(one["srcset"].partition(",")[2]) for one in reader.of("source")]
+    assert [size(png) for png in found] == ([] if narrow is None else [narrow])
+    assert all("max-width" in one["media"] for one in reader.of("source"))
+    assert size(shown.png) == (round(150 * width), 150)
+
+
+def test_a_table_tells_each_cell_what_it_is():
+    """A narrow screen shows the cells of a row below each other, each with its heading."""
+    columns = tuple(map(Column, ("a", "b", "F_c")))
+    wide, pairs = Table(columns, (("1", "2", "3"),)), Table(columns[:2], (("1", "2"),))
+    reader = PageReader(render(Page("t", "l", (Section("s", (wide, pairs)),))))
+    assert [one.get("class") for one in reader.of("table")] == ["cards", None]
+    assert [one["data-title"] for one in reader.of("td")] == ["a", "b", "F_c", "a", "b"]
+    assert "content: attr(data-title)" in reader.text
+
+
+@pytest.mark.parametrize("colour", Colour)
+def test_the_status_comes_first_with_a_sign_beside_its_colour(colour):
+    page = Page("t", "lead", (), Status(colour, "Words <1>", "NE 107"), "2026-11-22")
+    reader = PageReader(render(page))
+    assert reader.status == (colour.name.lower(), colour.value, "Words <1>", "NE 107")
+    assert reader.lead == "lead"
+    assert reader.said("p") == ["lead", "2026-11-22"]
+    assert len({one.value for one in Colour}) == len(Colour)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("F_c and (F_c + F_s)/k", "F<sub>c</sub> and (F<sub>c</sub> + F<sub>s</sub>)/k"),
+        ("P_ref, σ_s, R²_s", "P<sub>ref</sub>, σ<sub>s</sub>, R²<sub>s</sub>"),
+        ("F_0 is -20.5 N, -3 to 4", "F<sub>0</sub> is −20.5 N, −3 to 4"),
+        ("2026-11-22, FV-101, 1e-05", "2026-11-22, FV-101, 1e-05"),
+        ("F_c.csv, sliding_friction, warn_ratio", "F_c.csv, sliding_friction, warn_ratio"),
+        ("a < b", "a &lt; b"),
+        (Verbatim("F_c <-1>"), "F_c &lt;-1&gt;"),
+    ],
+)
+def test_symbols_and_signs_are_those_of_print(text, shown):
+    assert str(typeset(text)) == shown
 
 
 def test_nothing_is_fetched(reader):
@@ -116,7 +143,7 @@ def test_nothing_is_fetched(reader):
 @pytest.mark.parametrize(("count", "links"), [(3, 0), (4, 4)])
 def test_long_pages_have_contents_that_lead_somewhere(count, links):
     sections = tuple(Section(f"part {i}", ()) for i in range(count))
-    reader = Reader(render(Page("t", "l", sections)))
+    reader = PageReader(render(Page("t", "l", sections)))
     places = {f"#{attributes['id']}" for attributes in reader.of("section")}
     assert len(reader.of("a")) == links
     assert {attributes["href"] for attributes in reader.of("a")} <= places

@@ -3,51 +3,73 @@
 import base64
 from html.parser import HTMLParser
 
-_VOID = {"meta", "img"}
+_VOID = {"meta", "img", "source"}
+_INLINE = {"sub", "span"}
+_STATUS = ("div", "strong", "small")
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
 class PageReader(HTMLParser):
-    """Reads one page; what opens must close."""
+    """Reads one page; what opens must close. A subscript is read as F_c, a minus sign as it is."""
 
     def __init__(self, text):
         super().__init__()
         self._open = []
+        self._goes_on = False
         self.text = text
+        self.tags = []
+        """Each tag with its attributes."""
         self.order = []
         """Tag and text of each piece of text, in the order of the page."""
-        self.images = []
-        self.addresses = []
         self.tables = []
         """Rows of each table, each a tuple of cells."""
         self.feed(text)
         self.close()
         assert self._open == []
+        self.order = [(tag, told.strip()) for tag, told in self.order if told.strip()]
+        self.images = self.of("img")
+        self.addresses = [
+            attributes[name]
+            for _, attributes in self.tags
+            for name in ("src", "href", "srcset")
+            if name in attributes
+        ]
 
     def handle_starttag(self, tag, attributes):
-        attributes = dict(attributes)
+        self.tags.append((tag, dict(attributes)))
         if tag not in _VOID:
             self._open.append(tag)
+        self._goes_on = tag in _INLINE
+        if tag == "sub":
+            self.handle_data("_")
+            self._goes_on = True
         if tag == "table":
             self.tables.append([])
         elif tag == "tr":
             self.tables[-1].append(())
         elif tag in {"td", "th"}:
             self.tables[-1][-1] += ("",)
-        elif tag == "img":
-            self.images.append(attributes)
-        self.addresses += [attributes[name] for name in ("src", "href") if name in attributes]
 
     def handle_endtag(self, tag):
         assert self._open.pop() == tag
+        self._goes_on = tag in _INLINE
 
     def handle_data(self, data):
-        tag = self._open[-1] if self._open else ""
+        tag = next((one for one in reversed(self._open) if one not in _INLINE), "")
         if tag in {"td", "th"}:
             row = self.tables[-1][-1]
             self.tables[-1][-1] = (*row[:-1], row[-1] + data)
-        if data.strip() and tag != "style":
-            self.order.append((tag, data.strip()))
+        if tag == "style":
+            return
+        if self._goes_on and self.order and self.order[-1][0] == tag:
+            self.order[-1] = (tag, self.order[-1][1] + data)
+        else:
+            self.order.append((tag, data))
+        self._goes_on = False
+
+    def of(self, name):
+        """The attributes of every tag of this name."""
+        return [attributes for tag, attributes in self.tags if tag == name]
 
     def said(self, tag):
         """All texts that stand in such a tag."""
@@ -55,11 +77,22 @@ class PageReader(HTMLParser):
 
     @property
     def lead(self):
-        """What the page says first, below its title."""
-        told = [piece for piece in self.order if piece[0] != "title"]
+        """What the page says first, below its title and its status."""
+        told = [piece for piece in self.order if piece[0] not in {"title", *_STATUS}]
         assert told[0][0] == "h1"
         assert told[1][0] == "p"
         return told[1][1]
+
+    @property
+    def status(self):
+        """Colour, sign, words and addition of the status, which stands right below the title."""
+        (colour,) = (
+            one["class"].split()[1] for one in self.of("div") if one["class"].startswith("status")
+        )
+        first = [tag for tag, _ in self.order].index("h1") + 1
+        told = self.order[first : first + 3]
+        assert [tag for tag, _ in told] == [*_STATUS]
+        return (colour, *(text for _, text in told))
 
     def table(self, heading):
         """The rows below the headings of the table whose first heading this is, by first cell."""

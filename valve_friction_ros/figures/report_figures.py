@@ -95,7 +95,7 @@ def comparison_figure(comparison: StemComparison) -> Figure:
     some = thinned(comparison.measured.size)
     time = comparison.time[some]
     axes.plot(time, comparison.measured[some] * 1e3, color=_PALE, lw=3.0, label="measured")
-    axes.plot(time, comparison.simulated[some] * 1e3, "k:", lw=1.2, label="simulated")
+    axes.plot(time, comparison.simulated[some] * 1e3, "k:", lw=1.4, label="simulated")
     axes.set_ylabel("stem [mm]")
     axes.set_xlabel("time [s]")
     legend_above(figure, labelled_in([axes]), columns=2, place="right")

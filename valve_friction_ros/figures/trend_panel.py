@@ -57,11 +57,10 @@ def span_of_time(histories: Sequence[ValveHistory], now: int | None) -> tuple[in
     """
     begin = min(history.entries[0].time for history in histories)
     end = max(map(_end, histories))
-    lack = max(_SHORTEST - (end - begin), 0)
-    begin, end = begin - lack // 2, end + lack - lack // 2
-    if now is not None and end < now <= end + 2 * (end - begin):
+    if now is not None and end < now <= end + 2 * max(end - begin, _SHORTEST):
         end = now
-    return begin, end
+    room = max((end - begin) // 50, (_SHORTEST - (end - begin)) // 2)
+    return begin - room, end + room
 
 
 def draw_history(
@@ -104,8 +103,7 @@ def set_dates(
     axes: Axes, span: tuple[int, int], histories: Sequence[ValveHistory], most_ticks: int = 9
 ) -> None:
     """Label the time axis of some histories, with their first and last day."""
-    room = 0.02 * (span[1] - span[0])
-    axes.set_xlim(*_dates([span[0] - room, span[1] + room]))
+    axes.set_xlim(*_dates(span))
     locator = AutoDateLocator(maxticks=most_ticks)  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(

@@ -5,11 +5,13 @@ from valve_friction_ros.reports.identification_report import identification_repo
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import (
     Block,
+    Colour,
     Column,
     Page,
     Paragraph,
     Picture,
     Section,
+    Status,
     Table,
     render,
 )
@@ -17,12 +19,14 @@ from valve_friction_ros.reports.report_file import require_report_file, write_re
 
 __all__ = [
     "Block",
+    "Colour",
     "Column",
     "IdentifiedRecord",
     "Page",
     "Paragraph",
     "Picture",
     "Section",
+    "Status",
     "Table",
     "diagnosis_sentence",
     "identification_report",

@@ -31,6 +31,7 @@ __all__ = [
     "record_table",
     "settings_table",
     "words_of",
+    "written",
 ]
 
 _WORDS = {
@@ -50,7 +51,7 @@ _WHOLE = 1e4
 """Size from which numbers are written without decimals: five digits then remain."""
 
 
-def _number(value: float | None) -> str:
+def written(value: float | None) -> str:
     """Write five digits or more, without an exponent if possible."""
     if value is None:
         return _NOTHING
@@ -73,10 +74,10 @@ def _is_estimated(one: Mapping[str, Any]) -> bool:
 def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         _heading(name, one),
-        _number(one["value"]),
-        " to ".join(map(_number, one["interval"])) if _is_estimated(one) else _NOTHING,
+        written(one["value"]),
+        " to ".join(map(written, one["interval"])) if _is_estimated(one) else _NOTHING,
         ": ".join(filter(None, (one["verdict"], one["reason"]))),
-        _number(one["published"]),
+        written(one["published"]),
     )
 
 

@@ -3,7 +3,7 @@
 import math
 
 from valve_friction_ros.identification import Parameter, Result
-from valve_friction_ros.reports.identification_tables import words_of
+from valve_friction_ros.reports.identification_tables import words_of, written
 
 __all__ = ["published_words"]
 
@@ -34,7 +34,7 @@ def published_words(result: Result) -> str:
     if not outside:
         return f"{words} Here every published value lies within its interval."
     told = "; ".join(
-        f"{words_of(one.name)}: {one.published:.4g} against {one.value:.4g} {one.unit}"
+        f"{words_of(one.name)}: {written(one.published)} against {written(one.value)} {one.unit}"
         for one in outside
     )
     return f"{words} Published values beyond the interval here: {told}."

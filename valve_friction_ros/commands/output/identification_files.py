@@ -95,7 +95,7 @@ class IdentificationFiles(NamedTuple):
 
 def _dated(path: Path) -> str:
     """Return when a file was last changed, in words; empty where it has no such time."""
-    if not path.exists():
+    if not path.is_file():
         return ""
     changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
     return f"its file was last changed {changed:%Y-%m-%d %H:%M} UTC"
