@@ -2,12 +2,14 @@
 
 import json
 import math
+import os
 import re
 import shutil
 import struct
 import subprocess
 from functools import partial
 
+import numpy as np
 import pytest
 from pages import PNG, PageReader
 
@@ -75,7 +77,7 @@ def shown(value):
     """A number as the page shows it."""
     if value is None:
         return "–"
-    return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.5g}"
+    return (f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.5g}").replace("-", "−")
 
 
 def require_parameters(page, answer):
@@ -100,8 +102,9 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     assert page.said("h2") == [each for each in SECTIONS if each != "Notes" or answer["warnings"]]
     require_parameters(page, answer)
     assert {entry["verdict"] for entry in answer["parameters"].values()} > {"not identifiable"}
-    assert len(page.images) == 5
-    notes = [f"{warning}." for warning in answer["warnings"]]
+    assert len(page.images) == 7
+    assert len(page.of("source")) == 5
+    notes = [f"{re.sub(r'(?<= )-(?=[0-9])', '−', told)}." for told in answer["warnings"]]
     assert [text for text in page.said("p") if text in notes] == notes
     assert page.table("setting")["method"] == ("refined",)
     software = page.table("setting")["software"][0].split(", ")
@@ -148,6 +151,7 @@ def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
     page, answer = reported(quick_csv, *BASELINE)
     diagnosis = answer["diagnosis"]
     assert (diagnosis["level"], diagnosis["ne_107"]) == ("WARN", "M")
+    assert page.status == ("amber", "!", "Friction has grown", "maintenance required (NE 107: M)")
     friction = answer["parameters"]["coulomb_friction"]
     width = friction["interval"][1] - friction["value"]
     share = math.hypot(width / friction["value"], 0.02)
@@ -172,6 +176,66 @@ def test_without_a_baseline(reported, quick_csv):
     assert "diagnosis" not in answer
     assert "set a baseline, the friction of the healthy valve" in page.lead
     assert "excess friction" not in page.table("friction")
+    assert page.status == ("grey", "?", "Unknown", "no baseline to compare the friction with")
+    assert "OK" not in page.table("friction")["level"][0].split(":")[0]
+
+
+@pytest.mark.parametrize(
+    ("healthy", "status"),
+    [("150", ("green", "✓", "Friction normal")), ("30", ("red", "✗", "Excess friction"))],
+)
+def test_the_colour_of_the_status_is_that_of_the_diagnosis(reported, quick_csv, healthy, status):
+    page, _ = reported(quick_csv, "--method", "refined", "--baseline-coulomb-friction", healthy)
+    assert page.status[:3] == status
+
+
+def test_a_record_has_its_date_or_that_of_its_file(reported, write_csv, columns_of, quick_record):
+    columns = columns_of(quick_record)
+    path = write_csv(columns)
+    os.utime(path, (1.7e9, 1.7e9))
+    page, _ = reported(path, "--method", "refined")
+    changed = "its file was last changed 2023-11-14 22:13 UTC."
+    assert f"The record has no date; {changed}" in page.said("p")
+    dated = write_csv({**columns, "time_s": 1.76e9 + np.asarray(columns["time_s"])})
+    os.utime(dated, (1.7e9, 1.7e9))
+    page, _ = reported(dated, "--method", "refined")
+    assert f"Recorded 2025-10-09 08:53 UTC; {changed}" in page.said("p")
+    assert page.table("setting")["report written"][0].endswith(" UTC")
+
+
+def test_why_published_values_differ_is_told_beside_them(reported, quick_csv):
+    page, answer = reported(quick_csv, "--method", "refined")
+    (told,) = (text for text in page.said("p") if text.startswith("Published method: "))
+    assert f"faster than δv = {answer['evidence']['threshold']:.3g} m/s" in told
+    assert "Where the two differ, use the value." in told
+    for name, one in answer["parameters"].items():
+        if one["published"] is not None and one["half_width"]:
+            is_beyond = abs(one["published"] - one["value"]) > one["half_width"]
+            pair = f"{WORDS[name].partition(' [')[0]}: {shown(one['published'])} against"
+            assert (pair in told) == is_beyond, name
+    page, _ = reported(quick_csv, "--method", "published")
+    assert not [text for text in page.said("p") if text.startswith("Published method: ")]
+
+
+def test_the_baseline_of_a_recording_with_its_signature(
+    reported, call, write_csv, columns_of, quick_record, quick_csv, bench_yaml
+):
+    """The same record, as healthy valve: the ratio is 1, and both loops are one."""
+    page, answer = reported(quick_csv, "--baseline-recording", quick_csv, "--method", "refined")
+    assert answer["diagnosis"]["ratio"] == pytest.approx(1.0)
+    assert page.status[0] == "green"
+    captions = [text for text in page.said("figcaption") if "Grey: the record of the" in text]
+    assert len(captions) == 1
+    code, out, err = call(quick_csv, "--valve", bench_yaml, *BASELINE, "--baseline-recording", "a")
+    assert (code, out) == (2, "")
+    assert err == (
+        "valve_friction identify: --baseline-recording: its friction is the baseline: "
+        "give no other one\n"
+    )
+    rest = write_csv(columns_of(Recording(0.01, quick_record.pressure, 0 * quick_record.position)))
+    code, out, err = call(rest, "--valve", bench_yaml, "--baseline-recording", rest)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"valve_friction identify: {rest}: ")
 
 
 def test_the_table_ends_with_the_diagnosis(call, quick_csv, bench_yaml):
@@ -187,7 +251,7 @@ def test_a_valve_signature(reported, write_csv, columns_of):
     page.require_self_contained()
     require_parameters(page, answer)
     assert "Sweep of the velocity threshold δv" not in page.said("h2")
-    assert len(page.images) == 4
+    assert len(page.images) == 6
     assert page.table("setting")["method"] == ("signature",)
 
 

@@ -6,6 +6,7 @@ import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, success
 from hypothesis import given
@@ -15,6 +16,7 @@ from valve_friction_ros.health import Baseline, SlidingFriction
 from valve_friction_ros.history import FrictionPoint, HistoryFile, KeptBaseline, KeptValve, schema
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.trust.calibration import calibrated
+from valve_friction_ros.model import Drive, Recording
 
 
 @pytest.fixture
@@ -100,6 +102,44 @@ def test_a_file_of_version_1_is_read_and_extended(history):
     history.add(new)
     assert all(map(same, history.entries(), (*old, new)))
     assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+
+
+@pytest.mark.parametrize("driven_by", Drive)
+def test_the_record_of_a_baseline_is_kept_thinned(history, driven_by):
+    drive = 1e5 + 100.0 * np.arange(4500)
+    record = Recording(0.01, drive, drive / 1e8, driven_by=driven_by)
+    kept = KeptBaseline(Baseline(150.0), START, START, KeptBaseline.thin(record))
+    history.set_baseline(VALVE, kept)
+    found = history.baseline(VALVE.name)
+    assert found == kept
+    assert (len(found.record), found.record.driven_by) == (1500, driven_by)
+    assert found.record.sample_period == 0.03
+    np.testing.assert_allclose(found.record.drive, drive[::3], rtol=1e-6)
+    np.testing.assert_allclose(found.record.position, drive[::3] / 1e8, rtol=1e-6)
+
+
+def test_records_go_with_their_baselines(history):
+    """A baseline that is forgotten leaves no record behind; one without a record has none."""
+    record = Recording(0.01, np.arange(100.0), np.arange(100.0))
+    history.set_baseline(VALVE, KeptBaseline(Baseline(150.0), START, START, record))
+    history.set_baseline(VALVE, KeptBaseline(Baseline(150.0), START + DAY, START + DAY))
+    assert history.baseline(VALVE.name).record is None
+    history.add(success(START + 30 * DAY), days=1.0)
+    assert select(history, "SELECT count(*) FROM baseline_record") == [(0,)]
+
+
+def test_a_file_of_version_3_is_read_and_extended(history):
+    """Version 3 had no records of baselines."""
+    kept = KeptBaseline(Baseline(150.0), START, START)
+    history.set_baseline(VALVE, kept)
+    connection = sqlite3.connect(history.path)
+    connection.executescript("DROP TABLE baseline_record; PRAGMA user_version = 3")
+    connection.close()
+    assert history.baseline(VALVE.name) == kept
+    record = Recording(0.01, np.arange(100.0), np.arange(100.0))
+    history.set_baseline(VALVE, replace(kept, time=START + 1, record=record))
+    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert len(history.baseline(VALVE.name).record) == 100
 
 
 class TestVersion2:

@@ -3,13 +3,17 @@
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from histories import DAY, success
 from live_nodes import NAMESPACE, PROJECT
 from pages import PageReader
 from records import quick_record
 
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.history import HistoryFile, KeptBaseline, KeptValve
 from valve_friction_ros.model import HIGH_FRICTION
 
 IDENTIFIER = f"{NAMESPACE}/identifier"
@@ -73,9 +77,41 @@ def test_friction_is_judged_against_the_baseline_in_force(bench):
     assert client.trigger("set_baseline").success
     message = client.identified(quick_record(HIGH_FRICTION))
     _, page = report(client)
+    assert page.status[:3] == ("red", "✗", "Excess friction")
     assert page.lead.startswith("The friction is excessive, ")
+    assert [one for one in page.said("figcaption") if "Grey: the record of the baseline" in one]
     assert page.table("friction")["level"] == ("ERROR, NE 107 status signal F",)
     assert page.table("friction")["diagnosis"] == (message,)
+
+
+def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(shared, tmp_path):
+    """Also after a restart: identifications of five days before, and the record of a baseline."""
+    kept = HistoryFile(tmp_path / "history.sqlite")
+    valve = KeptValve(IDENTIFIER, "FV-101")
+    healthy, now = Baseline(150.0, 2.0), time.time_ns()
+    record = KeptBaseline.thin(quick_record())
+    kept.set_baseline(valve, KeptBaseline(healthy, now - 40 * DAY, now - 40 * DAY, record))
+    for days in range(35, 5, -5):
+        friction = 150.0 + 2.0 * (35 - days)
+        kept.add(success(now - days * DAY, friction, 2.0, valve=valve, method="robust"))
+    shared.start_identifier({"report_folder": str(tmp_path), "history_file": str(kept.path)})
+    client = shared.client
+    client.identified(quick_record(HIGH_FRICTION))
+    _, page = report(client)
+    assert page.said("h2")[2:4] == ["Friction against its baseline", "Trend"]
+    (told,) = (text for text in page.said("p") if text.startswith("7 identifications on 7 days."))
+    assert "Drift of the coulomb friction: +" in told
+    assert [one for one in page.said("figcaption") if "Grey: the record of the baseline" in one]
+    assert any("; identified 20" in text for text in page.said("p"))
+
+    # Another baseline than that of the history has no record, and a lost history no trend.
+    (done,) = client.set_parameters(IDENTIFIER, {"baseline_coulomb_friction": 140.0})
+    assert done.successful
+    kept.path.write_bytes(b"no database" * 100)
+    _, page = report(client)
+    assert "Trend" not in page.said("h2")
+    assert not [one for one in page.said("figcaption") if "Grey" in one]
+    assert [text for text in page.said("p") if text.startswith("no trend, as the history cannot")]
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,9 @@
 """The command: what it writes, what it says last, and what it refuses."""
 
 import re
-from html.parser import HTMLParser
 
 import pytest
+from pages import PageReader
 
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.reproduction.checks.checks import all_checks
@@ -29,23 +29,9 @@ PICTURES = {
 }
 
 
-class Reader(HTMLParser):
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.text, self.images = [], {}, 0
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.open.append(tag)
-        self.images += tag == "img" and dict(attrs)["src"].startswith("data:image/png;base64,")
-
-    def handle_data(self, data):
-        self.text.setdefault(self.open[-1] if self.open else "", []).append(data.strip())
-
-
 @pytest.fixture(scope="module")
 def page(reproduced):
-    return Reader((reproduced.output / "reproduction.html").read_text(encoding="utf-8"))
+    return PageReader((reproduced.output / "reproduction.html").read_text(encoding="utf-8"))
 
 
 def test_the_report_and_every_figure_are_written(reproduced):
@@ -65,16 +51,33 @@ def test_the_last_line_counts_and_names(reproduced):
 
 
 def test_every_item_has_its_section_and_its_checks(reproduced, page):
-    titles = [title for title in page.text["h2"] if title]
-    assert [title.partition(".")[0] for title in titles] == [str(n) for n in range(1, 11)]
+    titles = page.said("h2")
+    assert titles[0] == "Not matched"
+    assert [title.partition(".")[0] for title in titles[1:]] == [str(n) for n in range(1, 11)]
     checks = all_checks(reproduced.programme)
     assert {check.item for check in checks} == set(range(1, 11))
-    cells = page.text["td"]
-    assert cells.count("✓") == sum(check.matched for check in checks)
-    assert cells.count("✗") == sum(not check.matched for check in checks)
+    missed = [check for check in checks if not check.matched]
+    cells = page.said("td")
+    assert cells.count("✓") == len(checks) - len(missed)
+    assert cells.count("✗") == 2 * len(missed)
     for check in checks:
-        assert check.name in cells
-    assert page.images == len(PICTURES)
+        assert cells.count(typeset(check.name)) == 1 + (not check.matched)
+    assert len(page.images) == len(PICTURES)
+
+
+def test_the_lead_counts_and_the_first_table_lists(reproduced, page):
+    """Twelve items do not belong into a sentence."""
+    checks = all_checks(reproduced.programme)
+    missed = [check.name for check in checks if not check.matched]
+    assert len(missed) > 1
+    assert page.lead.endswith(f" {len(checks) - len(missed)} of {len(checks)} matched.")
+    assert not any(name in page.lead for name in missed)
+    assert [row[1] for row in page.tables[0][1:]] == [typeset(name) for name in missed]
+
+
+def typeset(text):
+    """As the page writes it."""
+    return re.sub(r"(?<![\w.-])-(?=\d)", "−", text)
 
 
 def test_the_page_needs_no_other_file(reproduced):
@@ -83,7 +86,7 @@ def test_the_page_needs_no_other_file(reproduced):
 
 
 def test_the_noise_of_the_run_is_stated(page):
-    assert any("1 µm and 5 Pa (standard deviations), seed 3" in text for text in page.text["p"])
+    assert any("1 µm and 5 Pa (standard deviations), seed 3" in text for text in page.said("p"))
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from valve_friction_ros.commands.arguments.identification import (
@@ -11,6 +12,7 @@ from valve_friction_ros.commands.arguments.identification import (
 )
 from valve_friction_ros.commands.arguments.recording import (
     add_recording_arguments,
+    read_one,
     reading_options,
     require_one,
     valve_of,
@@ -33,6 +35,7 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
+from valve_friction_ros.records.stretch import Stretch
 
 __all__ = ["REFUSALS", "declare", "run"]
 
@@ -121,10 +124,17 @@ def run(options: argparse.Namespace) -> int:
     valve = description.valve
     settings = identification_settings(options, description.known)
     baseline, files = baseline_from(options), identification_files(options)
+    if options.baseline_recording is not None:
+        whole = replace(reading, stretch=Stretch())
+        healthy = read_one(options.baseline_recording, valve, whole)
+        baseline, files = files.compared_with(
+            healthy, _identified(healthy, valve, METHODS[options.method], settings)
+        )
     recorded = read_recordings(options.file, valve, reading)
     files.require_one_valve(recorded)
     if baseline is not None:
-        require_one(recorded, "--baseline-coulomb-friction is of")
+        name = "coulomb-friction" if options.baseline_recording is None else "recording"
+        require_one(recorded, f"--baseline-{name} is of")
     results = []
     for each in recorded:
         outcome = _identified(each, valve, METHODS[options.method], settings)

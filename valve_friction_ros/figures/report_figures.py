@@ -63,8 +63,9 @@ def signature_loop_figure(result: Result, healthy: Recording | None = None) -> F
     figure = _paper_figure(3.4)
     axes = figure.subplots()
     if healthy is not None:
-        drive = healthy.drive / healthy.driven_by.size
-        axes.plot(drive, healthy.position * 1e3, color="0.6", lw=1.6, label="baseline")
+        some, unit = thinned(len(healthy)), healthy.driven_by.size
+        drive, position = healthy.drive[some] / unit, healthy.position[some] * 1e3
+        axes.plot(drive, position, color="0.6", lw=1.6, label="baseline")
     draw_signature(axes, [Case.of("recording" if healthy is None else "now", result)])
     if healthy is not None:
         axes.lines[1].set_label("now")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from valve_friction_ros.reports import Block, Page, Paragraph, Section
 from valve_friction_ros.reproduction import paper
-from valve_friction_ros.reproduction.checks.check import Check, summary, written
+from valve_friction_ros.reproduction.checks.check import Check, count, written
 from valve_friction_ros.reproduction.checks.validation_checks import FIGURES
 from valve_friction_ros.reproduction.figures.figures import Pictures
 from valve_friction_ros.reproduction.programme import Programme
@@ -21,9 +21,14 @@ from valve_friction_ros.reproduction.tables import (
 
 __all__ = ["report_page"]
 
+_MISSED = "Each stands in its section too, beside what matches."
+
 
 def report_page(programme: Programme, checks: Sequence[Check], pictures: Pictures) -> Page:
     """Return the report."""
+    missed = [one for one in checks if not one.matched]
+    title = "Not matched"
+    first = [Section(title, (check_table(missed), Paragraph(_MISSED)))] if missed else []
     sections = [
         Section(f"{number}. {title}", (check_table([c for c in checks if c.item == number]), *rest))
         for number, (title, rest) in enumerate(_sections(programme, pictures), start=1)
@@ -31,8 +36,8 @@ def report_page(programme: Programme, checks: Sequence[Check], pictures: Picture
     return Page(
         "Karnopp friction model identification for a real control valve: reproduced",
         "The paper's programme on a simulated bench, which is model 1 of Table 1, so that the "
-        f"truth of every number is known. {summary(checks)}",
-        tuple(sections),
+        f"truth of every number is known. {count(checks)}.",
+        (*first, *sections),
     )
 
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from valve_friction_ros.commands.arguments.recording import require_one
 from valve_friction_ros.health import Baseline
-from valve_friction_ros.identification import Result
+from valve_friction_ros.identification import RefusalError, Result
+from valve_friction_ros.model import Recording
 from valve_friction_ros.records.recorded_valve import RecordedValve
 
 __all__ = ["IdentificationFiles", "add_file_arguments", "baseline_from", "identification_files"]
@@ -35,6 +36,13 @@ def add_file_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="half the width of the 95 %% interval of the baseline (0: it is exact)",
     )
+    parser.add_argument(
+        "--baseline-recording",
+        type=Path,
+        metavar="FILE",
+        help="recording of this valve when it was healthy, read and identified as FILE is; its "
+        "friction is the baseline, and --report draws its signature",
+    )
 
 
 def baseline_from(options: argparse.Namespace) -> Baseline | None:
@@ -43,6 +51,8 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
     Raises ValueError if it is impossible, or its interval is given without it.
     """
     friction, width = options.baseline_coulomb_friction, options.baseline_half_width
+    if options.baseline_recording is not None and (friction, width) != (None, None):
+        raise ValueError("--baseline-recording: its friction is the baseline: give no other one")
     if friction is None:
         if width is not None:
             raise ValueError(
@@ -57,6 +67,21 @@ class IdentificationFiles(NamedTuple):
 
     plot: Path | None
     report: Path | None
+    healthy: Recording | None = None
+
+    def compared_with(
+        self, recorded: RecordedValve, outcome: Result | RefusalError
+    ) -> tuple[Baseline, "IdentificationFiles"]:
+        """Return the frictions of the healthy valve, and the files with its record in them.
+
+        Raises RefusalError, which names its file, where it cannot be a baseline.
+        """
+        if isinstance(outcome, RefusalError):
+            raise outcome
+        try:
+            return Baseline.of(outcome), self._replace(healthy=outcome.recording)
+        except RefusalError as refusal:
+            raise recorded.refused(refusal) from None
 
     def require_one_valve(self, recorded: Sequence[RecordedValve]) -> None:
         """Refuse several valves; raises ValueError, which names them."""
@@ -72,7 +97,7 @@ class IdentificationFiles(NamedTuple):
         baseline: Baseline | None,
     ) -> None:
         """Write them; raises OSError, which names the file, where that fails."""
-        if self == (None, None):
+        if self.plot is None and self.report is None:
             return
 
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
@@ -89,6 +114,7 @@ class IdentificationFiles(NamedTuple):
                 baseline=baseline,
                 notes=recorded.notes,
                 dated=_dated(recorded.path),
+                healthy=self.healthy,
             )
             reports.write_report(reports.identification_report(record), self.report)
 

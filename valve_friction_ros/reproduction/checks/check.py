@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["Check", "compared", "summary", "within", "written"]
+__all__ = ["Check", "compared", "count", "summary", "within", "written"]
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,13 @@ def within(
     )
 
 
+def count(checks: Sequence[Check]) -> str:
+    """Return the number of matches."""
+    return f"{sum(check.matched for check in checks)} of {len(checks)} matched"
+
+
 def summary(checks: Sequence[Check]) -> str:
     """Return one line: the number of matches, and the names of the mismatches."""
     missed = [check.name for check in checks if not check.matched]
-    count = f"{len(checks) - len(missed)} of {len(checks)} matched"
-    return f"{count}; not matched: {'; '.join(missed)}." if missed else f"{count}."
+    told = count(checks)
+    return f"{told}; not matched: {'; '.join(missed)}." if missed else f"{told}."
