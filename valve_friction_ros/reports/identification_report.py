@@ -111,7 +111,8 @@ def _friction(record: IdentifiedRecord) -> Section:
 
 def _trend(history: ValveHistory) -> Section:
     trend, days = history.trend, len({entry.time // DAY for entry in history.entries})
-    count = f"{len(history.entries)} identifications on {days} days"
+    size = len(history.entries)
+    count = f"{size} identification{'s' * (size > 1)} on {days} day{'s' * (days > 1)}"
     told = f"{count}. No drift is told: that needs the frictions of four days, by one method."
     if trend is not None:
         told = f"{count}. Drift of the {trend.what}: {drift_text(trend)}."

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from valve_friction_ros.reports.typography import typeset
@@ -129,7 +130,8 @@ class Picture:
 
 def _drawn(figure: Figure, resolution: int) -> bytes:
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=resolution)
+    figure.set_dpi(resolution)
+    FigureCanvasAgg(figure).print_png(stream)  # lays out once; savefig does it twice
     return stream.getvalue()
 
 
