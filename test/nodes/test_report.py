@@ -106,7 +106,7 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(bench, tmp_path, na
     assert client.trigger("identify").success
 
 
-def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(shared, tmp_path):
+def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(live, tmp_path):
     """Also after a restart: identifications of five days before, and the record of a baseline."""
     kept = HistoryFile(tmp_path / "history.sqlite")
     valve = KeptValve(IDENTIFIER, "FV-101")
@@ -117,8 +117,8 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(sh
         friction = 150.0 + 2.0 * (35 - days)
         kept.add(success(now - days * DAY, friction, 2.0, valve=valve, method="robust"))
     places = {"report_folder": str(tmp_path), "history_file": str(kept.path)}
-    shared.start_identifier({**places, "input_timeout": 600.0})
-    client = shared.client
+    live.start_identifier({**places, "input_timeout": 600.0})
+    client = live.client
     client.identified(quick_record(HIGH_FRICTION))
     _, page = report(client)
     assert page.said("h2")[2:4] == ["Friction against its baseline", "Trend"]

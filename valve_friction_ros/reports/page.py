@@ -131,7 +131,8 @@ class Picture:
 def _drawn(figure: Figure, resolution: int) -> bytes:
     stream = io.BytesIO()
     figure.set_dpi(resolution)
-    FigureCanvasAgg(figure).print_png(stream)  # lays out once; savefig does it twice
+    # It lays out once; savefig does it twice.
+    FigureCanvasAgg(figure).print_png(stream)  # type: ignore[no-untyped-call]
     return stream.getvalue()
 
 
