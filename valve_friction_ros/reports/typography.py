@@ -1,8 +1,9 @@
 """Text as a page shows it: symbols with subscripts, and the minus sign."""
 
+import html
 import re
 
-from markupsafe import Markup, escape
+from jinja2.filters import do_mark_safe
 
 __all__ = ["Verbatim", "typeset"]
 
@@ -16,9 +17,9 @@ class Verbatim(str):
     __slots__ = ()
 
 
-def typeset(text: str) -> Markup:
+def typeset(text: str) -> str:
     """Escape a text, and set F_c with a subscript and -1 with a minus sign."""
-    escaped = str(escape(str(text)))
-    if isinstance(text, Verbatim):
-        return Markup(escaped)  # noqa: S704 - escaped
-    return Markup(_MINUS.sub("−", _SYMBOL.sub(r"\1<sub>\2</sub>", escaped)))  # noqa: S704 - escaped
+    escaped = html.escape(text)
+    if not isinstance(text, Verbatim):
+        escaped = _MINUS.sub("−", _SYMBOL.sub(r"\1<sub>\2</sub>", escaped))
+    return do_mark_safe(escaped)
