@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from valve_friction_ros.figures.case import Case
-from valve_friction_ros.identification import Curve, Panel, Parameter
+from valve_friction_ros.identification import Curve, Panel, Parameter, two_digits
 
 __all__ = [
     "COLOURS",
@@ -123,7 +123,7 @@ def _told(parameter: Parameter) -> str:
     symbol = SYMBOLS.get(parameter.name, parameter.name)
     if math.isnan(parameter.value):
         return f"${symbol}$ {parameter.verdict.value}"
-    interval = f" ± {parameter.half_width:.2g}" if parameter.half_width > 0 else ""
+    interval = f" ± {two_digits(parameter.half_width)}" if parameter.half_width > 0 else ""
     value = f"{number(parameter.value)}{interval} {parameter.unit}"
     return f"${symbol}$ = {value}: {parameter.verdict.value}"
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.health import Baseline, friction_words
 from valve_friction_ros.history import FrictionPoint, Trend, ValveHistory, trended
-from valve_friction_ros.identification import SLIDING, Verdict
+from valve_friction_ros.identification import SLIDING, Verdict, two_digits
 
 __all__ = ["draw_history", "drift_text", "entitle", "set_dates", "span_of_time"]
 
@@ -233,7 +233,7 @@ def _draw_trend(axes: Axes, trend: Trend) -> None:
 
 def drift_text(trend: Trend) -> str:
     """Return the drift with its interval, and when a limit is expected to be crossed."""
-    text = f"{trend.drift:+.3g} ± {trend.half_width:.2g} N a month".replace("-", "−")
+    text = f"{trend.drift:+.3g} ± {two_digits(trend.half_width)} N a month".replace("-", "−")
     if trend.crossing is None:
         return text
     when = datetime.fromtimestamp(trend.crossing.time / 1e9, timezone.utc)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
+from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 
 __all__ = ["LARGEST_SHARE", "Baseline", "SlidingFriction"]
@@ -48,7 +49,7 @@ class SlidingFriction:
 
     def __str__(self) -> str:
         """Return value, half width and speed."""
-        width = f" ± {self.half_width:.2g}" if self.half_width > 0 else ""
+        width = f" ± {two_digits(self.half_width)}" if self.half_width > 0 else ""
         return f"{self.value:.6g}{width} N at {self.speed * 1e3:.3g} mm/s"
 
 
@@ -97,7 +98,7 @@ class Baseline:
         """Return its frictions on one line."""
         told = []
         if self.coulomb_friction is not None:
-            width = f" ± {self.half_width:.2g}" if self.half_width > 0 else ""
+            width = f" ± {two_digits(self.half_width)}" if self.half_width > 0 else ""
             told.append(f"coulomb friction {self.coulomb_friction:.6g}{width} N")
         if self.sliding is not None:
             told.append(f"sliding friction {self.sliding}")
@@ -147,7 +148,7 @@ def _why_not(friction: Parameter) -> str:
         return f"{name} has no interval"
     if width > LARGEST_SHARE * value:
         return (
-            f"{name} is known to ±{100 * width / value:.2g} %, and a baseline needs "
-            f"±{100 * LARGEST_SHARE:.2g} %"
+            f"{name} is known to ±{percentage(width / value)}, and a baseline needs "
+            f"±{percentage(LARGEST_SHARE)}"
         )
     return ""

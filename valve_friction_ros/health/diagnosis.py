@@ -8,7 +8,7 @@ from typing import Any
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
-from valve_friction_ros.identification.trust.misfit import percentage
+from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
 
 __all__ = [
@@ -147,7 +147,7 @@ def _consequence(result: Result, valve: Valve) -> str:
     share = dead_band(result, valve)
     if math.isnan(share):
         friction = next(one for one in _frictions(result) if not math.isnan(one.value))
-        return f"{_words(friction)} {friction.value:.4g} ± {friction.half_width:.2g} N"
+        return f"{_words(friction)} {friction.value:.4g} ± {two_digits(friction.half_width)} N"
     return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
 
 
@@ -195,8 +195,9 @@ def diagnose(
     limits = limits or FrictionLimits()
     for friction in _frictions(result):
         if friction.value < 0:
+            width = two_digits(friction.half_width)
             message = (
-                f"{_words(friction)} is {friction.value:.4g} ± {friction.half_width:.2g} N, and "
+                f"{_words(friction)} is {friction.value:.4g} ± {width} N, and "
                 "friction is above zero: check the direction of both signals"
             )
             return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)

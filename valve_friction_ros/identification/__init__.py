@@ -23,7 +23,6 @@ from valve_friction_ros.identification.rendering import (
     parameter_columns,
     parameter_mapping,
     plain,
-    two_digits,
 )
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.robust.method import TIMING_UNCERTAINTY, identify_robust
@@ -47,8 +46,9 @@ from valve_friction_ros.identification.steps.step_response import (
     step_test,
 )
 from valve_friction_ros.identification.steps.validation import Validation, validate
-from valve_friction_ros.identification.trust.misfit import Misfit, percentage
+from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.plausible_units import require_valve_units
+from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS

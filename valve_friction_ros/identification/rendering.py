@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from valve_friction_ros.identification.trust.rounding import two_digits
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.identification.units import column_suffix
 
@@ -83,11 +84,6 @@ def parameter_columns(name: str, shown: Mapping[str, Any] | None) -> dict[str, A
         f"{name}_half_width{unit}": cells.get("half_width"),
         f"{name}_verdict": cells.get("verdict"),
     }
-
-
-def two_digits(value: float) -> str:
-    """Write a size with two significant digits, from 100 on as a whole number; no exponent."""
-    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
 
 
 def parameter_cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:

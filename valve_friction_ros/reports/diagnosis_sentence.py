@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from valve_friction_ros.health import StatusSignal, dead_band, percentage
-from valve_friction_ros.identification import SLIDING, Parameter, Verdict
+from valve_friction_ros.identification import SLIDING, Parameter, Verdict, two_digits
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
 __all__ = ["diagnosis_sentence"]
@@ -83,7 +83,7 @@ def _found(record: IdentifiedRecord) -> _Finding:
     if diagnosis.ratio is None:
         size = f"{friction.value:.4g}"
         if friction.verdict is not Verdict.FIXED:
-            size += f" ± {friction.half_width:.2g}"
+            size += f" ± {two_digits(friction.half_width)}"
         advice = "set a baseline, the friction of the healthy valve"
         if record.baseline is not None:
             advice = "move the valve as its baseline was taken, and identify it again"

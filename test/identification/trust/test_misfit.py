@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from valve_friction_ros.identification.trust.misfit import Misfit, percentage, stem_distance
+from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model import Valve
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.signals.holds import without_repeats
 from valve_friction_ros.signals.noise import quantisation_step
@@ -44,9 +45,9 @@ def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
     lost = max(1.0 - 1.0 / float(np.mean(near)), 0.0)
     remarks = []
     if scatter > _JITTER:
-        remarks.append(f"the stamps of {name} jitter by {100 * scatter:.2g} % of their interval")
+        remarks.append(f"the stamps of {name} jitter by {percentage(scatter)} of their interval")
     if lost > _DROPS:
-        remarks.append(f"{100 * lost:.2g} % of the samples of {name} are missing")
+        remarks.append(f"{percentage(lost)} of the samples of {name} are missing")
     gaps = pauses[pauses > _GAP]
     if gaps.size:
         seconds = float(np.sum(gaps)) * signal.period

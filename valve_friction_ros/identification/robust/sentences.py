@@ -5,6 +5,7 @@ import math
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.intervals import Budget
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.trust.rounding import percentage
 
 __all__ = ["found_imperfections", "main_doubt", "slips"]
 
@@ -51,8 +52,8 @@ def _size(name: str, value: float) -> str:
         return f"F_s above F_c by {value:.3g} N"
     if name in ("along_travel", "in_record"):
         way = "rises" if value > 0 else "falls"
-        return f"friction {way} by {200 * abs(value):.2g} %"
-    return f"{100 * value:.2g} %"
+        return f"friction {way} by {percentage(2 * abs(value))}"
+    return percentage(value)
 
 
 def slips(fit: PosteriorFit) -> bool:
@@ -83,7 +84,7 @@ def main_doubt(budget: Budget, width: float) -> str:
         for name, source in sorted(budget.sources.items(), key=lambda item: -item[1])
         if source**2 > _SHARE * total
     ]
-    share = f"its interval is ±{100 * width:.2g} % of its value"
+    share = f"its interval is ±{percentage(width)} of its value"
     if not named:
         return f"{share}, by noise and by what the model leaves of the motion"
     return f"{share}: the record does not determine {' and '.join(named[:3])}"

@@ -32,8 +32,9 @@ from valve_friction_ros.identification.trust.excitation import (
 )
 from valve_friction_ros.identification.trust.jackknife import Jackknife, jackknife
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
-from valve_friction_ros.identification.trust.misfit import percentage, stem_distance
+from valve_friction_ros.identification.trust.misfit import stem_distance
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING, SLIDING
 from valve_friction_ros.identification.trust.uncertainty import half_width
 from valve_friction_ros.identification.trust.verdict import (

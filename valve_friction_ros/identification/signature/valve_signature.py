@@ -16,7 +16,7 @@ from valve_friction_ros.identification.signature.strokes import (
 )
 from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
-from valve_friction_ros.identification.trust.misfit import percentage
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import WEAK_SHARE, Parameter, Verdict
 from valve_friction_ros.model.drive import Drive
 
@@ -64,7 +65,7 @@ def calibrated(one: Parameter, share: float) -> Parameter:
     verdict, reason = one.verdict, one.reason
     if wide > WEAK_SHARE:
         verdict = Verdict.WEAK
-        told = f"with the calibration its interval is ±{100 * wide:.2g} % of its value"
+        told = f"with the calibration its interval is ±{percentage(wide)} of its value"
         reason = f"{reason}; {told}" if reason else told
     return replace(
         one,

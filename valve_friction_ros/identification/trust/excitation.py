@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.trust.plausible_units import position_question
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import measured
@@ -181,7 +182,7 @@ def require_travel(recording: Recording, valve: Valve) -> None:
     if highest - lowest < _LEAST_TRAVEL * travel:
         raise RefusalError(
             f"too little travel: the stem moved {(highest - lowest) * 1e3:.3g} mm, "
-            f"{100 * (highest - lowest) / travel:.2g} % of its travel; "
+            f"{percentage((highest - lowest) / travel)} of its travel; "
             "excite the valve over several percent of it"
         )
 

@@ -3,9 +3,10 @@
 import math
 from dataclasses import dataclass
 
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["Misfit", "percentage", "stem_distance"]
+__all__ = ["Misfit", "stem_distance"]
 
 _EXPECTED_SHARE = 0.75
 """Share of the tolerated misfit that chance explains.
@@ -78,9 +79,3 @@ def stem_distance(rms: float, valve: Valve) -> str:
     share = valve.share_of_travel(rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
     return f"{rms * 1e6:.3g} µm rms from the measured stem{of_travel}"
-
-
-def percentage(share: float) -> str:
-    """Write a share in percent: two significant digits, whole percents from 100 % on."""
-    percent = 100 * share
-    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"

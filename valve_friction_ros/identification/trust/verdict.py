@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.units import PARAMETER_UNITS
 
 __all__ = ["WEAK_SHARE", "Parameter", "Verdict", "fixed", "not_identifiable", "with_verdict"]
@@ -102,7 +103,7 @@ def with_verdict(
     if share <= WEAK_SHARE and not doubt:
         return Parameter(name, value, standard_error, half_width, Verdict.IDENTIFIED)
     if share < 1:
-        reason = doubt or f"its interval is ±{100 * share:.2g} % of its value"
+        reason = doubt or f"its interval is ±{percentage(share)} of its value"
         return Parameter(name, value, standard_error, half_width, Verdict.WEAK, reason)
     reason = doubt or "its interval is wider than its value"
     return replace(not_identifiable(name, reason), magnitude_bound=abs(value) + half_width)
