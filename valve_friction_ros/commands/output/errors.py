@@ -30,6 +30,8 @@ class ExitCode(IntEnum):
     """Some recordings were refused, or the demonstration was off its tolerances."""
     REFUSED = 2
     """An option, a file or all recordings were refused, or a file could not be written."""
+    ALARM = 3
+    """A diagnosis reached ``--fail-on``, or a fit is below ``--fail-below``."""
     INTERRUPTED = 128 + signal.SIGINT
     OUTPUT_CLOSED = 128 + signal.SIGPIPE
 
