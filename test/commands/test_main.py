@@ -131,9 +131,28 @@ class TestEnd:
     def test_refused(self, ending, line):
         assert extra(ending) == (2, "", f"valve_friction extra: {line}\n")
 
-    @pytest.mark.parametrize("ending", ["interrupted", "disguised", "ignored"])
+    @pytest.mark.parametrize("ending", ["interrupted", "disguised", "ignored", "swallowed"])
     def test_interrupted(self, ending):
         assert extra(ending) == (130, "", "valve_friction extra: interrupted\n")
+
+    def test_interrupted_while_it_is_imported(self):
+        """At once, whatever a library does with exceptions while it is imported."""
+        code = (
+            "import sys, time\n"
+            "from valve_friction_ros.commands import start\n"
+            "class Slow:\n"
+            "    def find_spec(self, name, *_):\n"
+            "        if name.endswith('commands.main'):\n"
+            "            print('importing', flush=True)\n"
+            "            try: time.sleep(30)\n"
+            "            except BaseException: time.sleep(30)\n"
+            "sys.meta_path.insert(0, Slow())\n"
+            "sys.exit(start.main())"
+        )
+        process = start("-c", code, "identify", program=[])
+        assert process.stdout.readline() == "importing\n"
+        process.send_signal(signal.SIGINT)
+        assert ended(process) == (130, "", "valve_friction identify: interrupted\n")
 
     def test_a_bug_shows_where_it_is(self):
         code, out, err = extra("bug")

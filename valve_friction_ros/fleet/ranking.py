@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from valve_friction_ros.fleet.row import Cell
-from valve_friction_ros.health import Level, StatusSignal
+from valve_friction_ros.health import FrictionLimits, Level, StatusSignal
 
 __all__ = ["Status", "ranked", "reaches", "status_of"]
 
@@ -17,6 +17,7 @@ class Status(NamedTuple):
     colour: str
 
 
+_LIMITS = FrictionLimits()
 _BY_SIGNAL = {
     StatusSignal.FAILURE.value: "excessive",
     StatusSignal.OUT_OF_SPECIFICATION.value: "collapsed",
@@ -29,19 +30,25 @@ def _level(row: Mapping[str, Cell]) -> Level | None:
     return Level[str(row["level"])] if row.get("level") else None
 
 
-def status_of(row: Mapping[str, Cell]) -> Status:
-    """Say how a valve is: a word, and ``error``, ``warn``, ``ok`` or ``none``."""
-    level = _level(row)
-    if level is None:
-        return Status("refused", "none")
-    if level is Level.OK:
-        return Status("normal", "ok") if row["ratio"] is not None else Status("no comparison", "none")
-    return Status(_BY_SIGNAL[str(row["ne_107"])], level.name.lower())
-
-
 def _number(row: Mapping[str, Cell], name: str) -> float:
     value = row.get(name)
     return float(value) if isinstance(value, (int, float)) else -math.inf
+
+
+def status_of(row: Mapping[str, Cell]) -> Status:
+    """Say how a valve is: a word, and ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
+    level, ratio = _level(row), _number(row, "ratio")
+    if level is None:
+        return Status("refused", "none")
+    if level is Level.OK:
+        if row["ratio"] is None:
+            return Status("no comparison", "none")
+        if ratio >= _LIMITS.warn_ratio:
+            return Status("perhaps grown", "maybe")
+        if ratio <= _LIMITS.low_ratio:
+            return Status("perhaps collapsed", "maybe")
+        return Status("normal", "ok")
+    return Status(_BY_SIGNAL[str(row["ne_107"])], level.name.lower())
 
 
 def _need(row: Mapping[str, Cell]) -> tuple[float, float, float, str, str]:
