@@ -1,5 +1,6 @@
 """Entry point of the command `valve_friction`, light enough to be interrupted at once."""
 
+import importlib
 import os
 import signal
 import sys
@@ -24,6 +25,5 @@ def main() -> int:
     # An exception in the midst of an import may be lost there.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)
-    from valve_friction_ros.commands.main import main as run  # noqa: PLC0415 - see above
-
-    return run()
+    code: int = importlib.import_module("valve_friction_ros.commands.main").main()
+    return code
