@@ -175,10 +175,7 @@ class TestEnd:
         os.close(reading)
         code, _, err = extra(ending, stdout=writing)
         os.close(writing)
-        assert code == 141
-        assert err == (
-            "valve_friction extra: the output was closed before everything was printed\n"
-        )
+        assert (code, err) == (141, "")
 
     @pytest.mark.parametrize("ending", ["short", "long"])
     @pytest.mark.parametrize("unbuffered", ["", "1"])
@@ -192,11 +189,15 @@ class TestEnd:
             )
             assert extra(ending, stdout=full, stderr=full, env=environment)[0] == 2
 
-    def test_full_output_of_the_help(self):
+    @pytest.mark.parametrize("name", [[], ["identify"]])
+    @pytest.mark.parametrize("unbuffered", ["", "1"])
+    def test_full_output_of_the_help(self, name, unbuffered):
+        """Short or longer than a buffer."""
         with Path("/dev/full").open("w") as full:
-            environment = os.environ | {"PYTHONUNBUFFERED": ""}
-            code, _, err = ended(start("--help", stdout=full, env=environment))
-        assert (code, err) == (2, "valve_friction: standard output: No space left on device\n")
+            environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+            code, _, err = ended(start(*name, "--help", stdout=full, env=environment))
+        speaker = " ".join(["valve_friction", *name])
+        assert (code, err) == (2, f"{speaker}: standard output: No space left on device\n")
 
     @pytest.mark.parametrize("closed", [1, 2])
     def test_a_stream_that_was_closed_before(self, closed):
@@ -257,6 +258,5 @@ class TestRealSubCommands:
         process = start("identify", quick_csv, *bench_options, "--plot", picture, stdout=writing)
         os.close(writing)
         code, _, err = ended(process)
-        assert code == 141
-        assert err.count("\n") == 1
+        assert (code, err) == (141, "")
         assert picture.stat().st_size > 20_000

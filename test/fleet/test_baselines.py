@@ -57,11 +57,11 @@ def test_written_by_hand(tmp_path):
 )
 def test_refused(tmp_path, text, message):
     path = written(tmp_path, text)
-    with pytest.raises(ValueError, match="healthy.csv: ") as refusal:
+    with pytest.raises(ValueError, match=r"healthy\.csv: ") as refusal:
         read_baselines(path)
     assert message in str(refusal.value)
 
 
 def test_a_missing_file(tmp_path):
-    with pytest.raises(ValueError, match="none.csv: cannot be read: No such file"):
+    with pytest.raises(ValueError, match=r"none\.csv: cannot be read: No such file"):
         read_baselines(tmp_path / "none.csv")

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from valve_friction_ros.fleet import COLUMNS, ResultsFile, database_of, error_cells, key_cells
 from valve_friction_ros.fleet.cells import as_read
 
-TEXTS = st.text(st.characters(categories=("L", "N", "P", "S", "Zs")), max_size=20) | st.sampled_from(
-    ["=1+1", "+1", "-1", "@a", "'=1", "''=1", "'"]
-)
+TEXTS = st.text(
+    st.characters(categories=("L", "N", "P", "S", "Zs")), max_size=20
+) | st.sampled_from(["=1+1", "+1", "-1", "@a", "'=1", "''=1", "'"])
 FLEETS = st.lists(st.tuples(st.integers(1, 3), TEXTS), min_size=1, max_size=5)
 ENDINGS = st.sampled_from([".csv", ".jsonl"])
 A_FEW = settings(max_examples=25, deadline=None)  # each of them flushes a disk several times
@@ -135,7 +135,7 @@ def test_the_file_of_another_program_is_left_alone(tmp_path, name, content):
     path = tmp_path / name
     path.write_text(content)
     before = path.stat()
-    with pytest.raises(ValueError, match="it is there, but not data.sqlite"):
+    with pytest.raises(ValueError, match=r"it is there, but not data\.sqlite"):
         ResultsFile(path)
     assert path.read_text() == content
     assert path.stat().st_mtime_ns == before.st_mtime_ns

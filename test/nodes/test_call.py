@@ -109,7 +109,9 @@ def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
         "valve_friction call: /fv_101/identifier/identify has not answered within 3 s: it goes "
         "on; give it longer by --timeout\n",
     )
-    assert busy.client.trigger("identify").message.startswith("an identification is already running")
+    assert busy.client.trigger("identify").message.startswith(
+        "an identification is already running"
+    )
 
 
 def test_interrupted_while_it_waits(busy):

@@ -24,7 +24,7 @@ _SERVICES = {
 }
 _TIMEOUT = 300.0
 _DISCOVERY = 5.0
-"""Time for which an identifier is looked for, s. Chosen: nodes on a quiet network meet in 1 to 3 s."""
+"""Time for which an identifier is looked for, s. Chosen: nodes of a network meet in 1 to 3 s."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:

@@ -28,7 +28,8 @@ def _repeat() -> None:
 
 def _repeat_if_importing() -> None:
     """Repeat a Ctrl-C that a library has caught while it was imported: it is imported still."""
-    frame = sys._current_frames().get(threading.main_thread().ident or 0)
+    frames = sys._current_frames()  # noqa: SLF001 - documented, for debuggers
+    frame = frames.get(threading.main_thread().ident or 0)
     while frame is not None:
         if frame.f_globals.get("__name__") == "importlib._bootstrap":
             _repeat()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from valve_friction_ros import __version__
+from valve_friction_ros.commands.ctrl_c import has_been_interrupted, interrupt_raises
 from valve_friction_ros.commands.output.errors import (
     PROGRAM,
     ExitCode,
@@ -18,7 +19,6 @@ from valve_friction_ros.commands.output.errors import (
     complain,
     flush_output,
 )
-from valve_friction_ros.commands.ctrl_c import has_been_interrupted, interrupt_raises
 from valve_friction_ros.commands.start import end_at_once
 
 __all__ = ["SUB_COMMANDS", "SubCommand", "main", "run"]
@@ -33,6 +33,7 @@ SUB_COMMANDS = {
     "demo": "tighten the packing of a simulated valve that is monitored",
 }
 """The line in ``--help`` by sub-command; ``identify-folder`` is the module `identify_folder`."""
+
 
 class SubCommand(Protocol):
     """The module of a sub-command; it is imported only when it was chosen."""
@@ -103,10 +104,11 @@ def run(arguments: Sequence[str]) -> int:
             return _run(name, others)
         finally:
             flush_output()
+    except BrokenPipeError:  # whoever read the output has what they wanted, as `head` does
+        return ExitCode.OUTPUT_CLOSED
     except OSError as error:
         complain(name, error)
-        is_closed = isinstance(error, BrokenPipeError)
-        return ExitCode.OUTPUT_CLOSED if is_closed else ExitCode.REFUSED
+        return ExitCode.REFUSED
 
 
 def main() -> int:

@@ -76,7 +76,8 @@ def read_baselines(path: Path) -> Baselines:
         with path.open(encoding="utf-8-sig", newline="") as stream:
             reader = csv.DictReader(stream)
             columns = set(reader.fieldnames or ())
-            if not {"recording", "valve"} & columns or not {f"{_COULOMB}_n", f"{_SLIDING}_n"} & columns:
+            frictions = {f"{name}_n" for name in (_COULOMB, _SLIDING)}
+            if not {"recording", "valve"} & columns or not frictions & columns:
                 raise ValueError(
                     f"{path}: give a CSV file of identify-folder, or one with the columns "
                     f"recording, valve and {_COULOMB}_n"

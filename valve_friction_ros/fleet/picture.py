@@ -18,7 +18,7 @@ _MOST = 500
 
 def _scaled(values: NDArray[np.float64], length: int) -> NDArray[np.float64]:
     span = float(np.ptp(values)) or 1.0
-    return 1.0 + (values - values.min()) / span * (length - 2)
+    return np.asarray(1.0 + (values - values.min()) / span * (length - 2), dtype=np.float64)
 
 
 def signature_points(recording: Recording) -> str:

@@ -80,7 +80,9 @@ class Caller:
             ]
 
         if not self._wait(found, patience) and self._is_wanted():
-            known = ", ".join(name.removesuffix("/identifier") or "/" for name in self.identifiers())
+            known = ", ".join(
+                name.removesuffix("/identifier") or "/" for name in self.identifiers()
+            )
             domain = os.environ.get("ROS_DOMAIN_ID", "0")
             there = f"there are {known}" if known else "there is none at all: start one"
             raise RefusalError(

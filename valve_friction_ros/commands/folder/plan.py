@@ -16,7 +16,6 @@ from valve_friction_ros.fleet import (
     Options,
     ResultsFile,
 )
-from valve_friction_ros.records.recordings import ReadingOptions
 
 __all__ = ["Plan", "forget_stale", "make_plan"]
 
@@ -95,8 +94,9 @@ def forget_stale(
     """Drop the rows that do not hold any more; return what is left, and how many were dropped.
 
     With ``redo`` good rows of other options may go; with ``retry_failed`` refused recordings are
-    tried again, and so are those whose reports are missing. Raises ValueError if good rows were made with other
-    options and may not go.
+    tried again, and so are those whose reports are missing.
+
+    Raises ValueError if good rows were made with other options and may not go.
     """
     done, others = set(), 0
     for entry in results.entries():

@@ -8,7 +8,10 @@ import signal
 import sys
 from enum import IntEnum
 from pathlib import Path
-from typing import NoReturn, TextIO
+from typing import TYPE_CHECKING, NoReturn, TextIO
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 __all__ = [
     "PROGRAM",
@@ -43,6 +46,13 @@ class OneLineParser(argparse.ArgumentParser):
         """Print the error and end with exit code 2."""
         self.exit(ExitCode.REFUSED, f"{self.prog}: {message}; see --help\n")
 
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print the help or an error; argparse would ignore that the help cannot be written."""
+        if file is None or file is sys.stderr:
+            super()._print_message(message, file)
+        else:
+            file.write(message)
+
 
 def silence(stream: TextIO) -> None:
     """Discard what `stream` still holds, which Python would try to write again at its end."""
@@ -65,8 +75,6 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def _text(error: Exception | str) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
-    if error.errno == errno.EPIPE:
-        return "the output was closed before everything was printed"
     # Functions that write files name them; those that print do not.
     place = error.filename or ("standard output" if error.errno in _FULL else "")
     return f"{place}: {error.strerror}" if place else error.strerror
