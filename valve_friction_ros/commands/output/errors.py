@@ -8,10 +8,7 @@ import signal
 import sys
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, TextIO
-
-if TYPE_CHECKING:
-    from _typeshed import SupportsWrite
+from typing import Any, NoReturn, TextIO
 
 __all__ = [
     "PROGRAM",
@@ -46,7 +43,7 @@ class OneLineParser(argparse.ArgumentParser):
         """Print the error and end with exit code 2."""
         self.exit(ExitCode.REFUSED, f"{self.prog}: {message}; see --help\n")
 
-    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+    def _print_message(self, message: str, file: Any = None) -> None:
         """Print the help or an error; argparse would ignore that the help cannot be written."""
         if file is None or file is sys.stderr:
             super()._print_message(message, file)
