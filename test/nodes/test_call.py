@@ -114,15 +114,18 @@ def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
     )
 
 
+def waiting(bench):
+    """Start the command, which waits for an identification that does not end."""
+    process = start(bench.domain, NAMESPACE, "identify")
+    service = f"{NAMESPACE}/identifier/identify"
+    client = bench.client
+    client.wait_until(lambda: client.node.count_clients(service), "the caller")
+    time.sleep(2.0)  # its call follows a moment later
+    return process
+
+
 def test_interrupted_while_it_waits(busy):
-    process = start(busy.domain, NAMESPACE, "identify")
-
-    def is_identifying():
-        return "already running" in busy.client.trigger("identify").message
-
-    # The command's call may come second: the node then refuses it at once, so it is made first.
-    time.sleep(5.0)
-    busy.client.wait_until(is_identifying, "an identification")
+    process = waiting(busy)
     process.send_signal(signal.SIGINT)
     assert ended(process) == (
         130,
@@ -132,8 +135,7 @@ def test_interrupted_while_it_waits(busy):
 
 
 def test_the_node_ends_meanwhile(busy):
-    process = start(busy.domain, NAMESPACE, "identify")
-    time.sleep(5.0)
+    process = waiting(busy)
     busy.nodes[0].stop()
     assert ended(process) == (
         2,
