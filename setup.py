@@ -52,7 +52,7 @@ setup(
             "identifiers = valve_friction_ros.nodes.start:identifiers",
             "simulator = valve_friction_ros.nodes.start:simulator",
             "pressure_source = valve_friction_ros.nodes.start:pressure_source",
-            "valve_friction = valve_friction_ros.commands.main:main",
+            "valve_friction = valve_friction_ros.commands.start:main",
         ],
     },
 )

@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "history": _VALVES,
     "figures": _PAGES,
     "reports": {*_PAGES, "figures"},
-    "fleet": _FILES,
+    "fleet": {*_PAGES, "figures", "reports"},
     "reproduction": {*_PAGES, "figures", "reports"},
     "nodes": {*_FILES, *_PAGES, "reports"},
 }

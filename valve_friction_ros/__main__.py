@@ -2,7 +2,7 @@
 
 import sys
 
-from valve_friction_ros.commands.main import main
+from valve_friction_ros.commands.start import main
 
 if __name__ == "__main__":
     sys.exit(main())

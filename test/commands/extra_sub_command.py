@@ -41,6 +41,8 @@ def run(options):
     if options.ending == "ignored":
         Interrupting()
         time.sleep(30)
+    if options.ending == "swallowed":
+        import swallowing_module  # noqa: F401
     if options.ending == "own refusal":
         raise RefusedError("not this\none")
     if options.ending == "refusal":

@@ -5,13 +5,14 @@ import csv
 import json
 import math
 import sqlite3
+from dataclasses import replace
 
 import matplotlib.image
 import pytest
 from histories import DAY, OTHER, START, VALVE, refused, success
 
 from valve_friction_ros.commands import history as subcommand
-from valve_friction_ros.health import Baseline, FrictionLimits
+from valve_friction_ros.health import Baseline, FrictionLimits, Level
 from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline
 from valve_friction_ros.identification import Verdict
 
@@ -259,3 +260,16 @@ def test_the_default_file():
     parser = argparse.ArgumentParser()
     subcommand.declare(parser)
     assert parser.parse_args([]).file.parts[-2:] == ("valve_friction_ros", "history.sqlite")
+
+
+def test_the_latest_diagnosis_may_fail_the_command(tmp_path, command):
+    """Of each valve the last counts: an alarm that has gone is none."""
+    history = HistoryFile(tmp_path / "history.sqlite")
+    grown = success(START, 300.0, baseline=BASELINE)
+    history.add(replace(grown, diagnosis=replace(grown.diagnosis, level=Level.ERROR)))
+    assert command("history", history.path, "--fail-on", "error")[0] == 3
+    assert command("history", history.path)[0] == 0
+    history.add(success(START + DAY, baseline=BASELINE))
+    code, out, err = command("history", history.path, "--fail-on", "warn")
+    assert (code, err) == (0, "")
+    assert "ERROR" in out

@@ -5,6 +5,7 @@ import csv
 import gzip
 import json
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -129,11 +130,11 @@ def kept(output):
     copy = output.parent / "copy"
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
-    for file in output.parent.glob(f"{output.name}.sqlite*"):
+    for file in output.parent.glob(f"{output.stem}.sqlite*"):
         with contextlib.suppress(FileNotFoundError):  # a journal is there for a moment only
             shutil.copy(file, copy)
     try:
-        with contextlib.closing(sqlite3.connect(copy / f"{output.name}.sqlite")) as database:
+        with contextlib.closing(sqlite3.connect(copy / f"{output.stem}.sqlite")) as database:
             return database.execute("SELECT count(*) FROM result").fetchone()[0]
     except sqlite3.Error:
         return 0
@@ -239,6 +240,49 @@ def test_killed_and_resumed(fleet, output, arguments):
     assert ["identified", "6"] in [line.split() for line in out.splitlines()]
 
 
+def test_a_page_against_baselines(folder, texts, tmp_path, output, arguments, capsys):
+    """The valve whose friction has doubled stands first; each has its picture and its report."""
+    strange = "<b>='x'&.csv"
+    for name, text in zip(["a.csv", "=b.csv", strange], texts, strict=False):
+        (folder / name).write_text(text)
+    (folder / "refused.csv").write_text("time_s,position_m,pressure_pa\n0,<i>,1\n")
+    healthy = tmp_path / "healthy.csv"
+    healthy.write_text(f"recording,coulomb_friction_n\na.csv,606\n'=b.csv,250\n{strange},450\n")
+    page = output.with_suffix(".html")
+    arguments += ["--output", str(page), "--baselines", str(healthy), "--fail-on", "warn"]
+    assert run_here(arguments) == 3
+    out, err = capsys.readouterr()
+    assert "baselines: 3 of 4 recordings have one" in err
+    alarms = [line.split(": ")[0] for line in out.splitlines() if "times its baseline" in line]
+    assert alarms == [" ERROR =b.csv", f"  WARN {strange}"]
+
+    rows = {row["recording"]: row for row in rows_of(output)}
+    assert "'=b.csv" in rows
+    assert float(rows["'=b.csv"]["ratio"]) == pytest.approx(606 / 250, rel=0.02)
+    assert rows["a.csv"]["level"] == "OK"
+    text = page.read_text(encoding="utf-8")
+    names = ["=b.csv", "&lt;b&gt;=&#39;x&#39;&amp;.csv", "a.csv", "refused.csv"]
+    places = [text.index(f'data-key="{name}"') for name in names]
+    assert places == sorted(places)
+    assert text.count("<polyline") == 3
+    links = re.findall('<a href="([^"]+)"', text)
+    assert len(links) == 3
+    for link in links:
+        report = (page.parent / link).read_text(encoding="utf-8")
+        assert "times its baseline" in report
+        assert "<b>" not in report
+    assert "column &#39;position_m&#39;: &#39;&lt;i&gt;&#39; is not a number" in text
+
+    # A report that is gone is written again, and nothing else is done.
+    (page.parent / links[0]).unlink()
+    assert run_here(arguments) == 3
+    assert "3 done before, 1 to do, 1 of them again" in capsys.readouterr().err
+    assert (page.parent / links[0]).is_file()
+    healthy.write_text("recording,coulomb_friction_n\nelsewhere.csv,606\n")
+    assert run_here(arguments) == 2
+    assert "no recording of" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted(fleet, output, arguments, number, code):
     """Ctrl-C goes to all processes of the group; so may a SIGTERM."""
@@ -332,7 +376,7 @@ def test_valve_files_beside_recordings(folder, texts, noisy, tmp_path, bench_yam
     [
         (["--jobs", "0"], "--jobs must be at least 1"),
         (["--fix", "mass=heavy"], "'heavy' is not a number"),
-        (["--output", "friction.xlsx"], "must end in .csv or .jsonl"),
+        (["--output", "friction.xlsx"], "must end in .csv, .jsonl, .html"),
         (["--output", "nowhere/friction.csv"], "there is no folder nowhere"),
         (["--order", "1"], "order must be at least 2"),
         (["--valve", "nowhere.yaml"], "nowhere.yaml: cannot be read"),

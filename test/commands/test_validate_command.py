@@ -158,6 +158,36 @@ class TestAnswer:
             "note: static_friction is not identified: 606 N, the coulomb_friction",
         ]
 
+    @pytest.mark.parametrize(
+        ("friction", "options", "code", "least"),
+        [
+            (606.0, ["--fail-below", "90"], 0, None),
+            (3000.0, [], 0, 90),
+            (3000.0, ["--fail-below", "-1000"], 0, 90),
+            (3000.0, ["--fail-below", "95 %"], 3, 95),
+        ],
+    )
+    def test_a_poor_fit(
+        self, call, estimate, other_csv, valve_options, friction, options, code, least
+    ):
+        """It is said in words, and by the exit code if that is asked for."""
+        path = estimate(coulomb_friction=friction)
+        options = [*valve_options, "--estimate", path, *options]
+        found, out, err = call(other_csv, *options)
+        assert (found, err) == (code, "")
+        said = [line for line in out.splitlines() if line.startswith("poor: ")]
+        assert len(said) == (least is not None)
+        assert all(f"less than {least} % of this movement" in line for line in said)
+        found, out, _ = call(other_csv, *options, "--json")
+        assert found == code
+        assert json.loads(out)["poor"] == (said[0] if said else None)
+
+    @pytest.mark.parametrize("given", ["ninety", "101", "nan"])
+    def test_no_percentage(self, call, estimate, other_csv, capsys, given):
+        with pytest.raises(SystemExit):
+            call(other_csv, "--estimate", estimate(), "--fail-below", given)
+        assert f"{given!r} is no percentage, such as 90; see --help" in capsys.readouterr().err
+
     def test_a_picture(self, call, estimate, other_csv, valve_options, tmp_path):
         path = tmp_path / "validation.png"
         code, *_ = call(other_csv, *valve_options, "--estimate", estimate(), "--plot", path)

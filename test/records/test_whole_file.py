@@ -1,5 +1,6 @@
 """Files that are written whole or not at all."""
 
+import errno
 import os
 import threading
 from pathlib import Path
@@ -84,3 +85,16 @@ def test_a_device_stays():
     with pytest.raises(OSError, match="No space left"):
         write_whole(Path("/dev/full"), b"content")
     assert Path("/dev/full").is_char_device()
+
+
+def test_a_read_only_folder_names_the_file(tmp_path, monkeypatch):
+    """Neither the draft nor its removal is what the user asked for."""
+
+    def refuse(self, *_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(OSError, match="Read-only") as error:
+        write_whole(tmp_path / "x.png", b"")
+    assert error.value.filename == str(tmp_path / "x.png")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
+from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
 from valve_friction_ros.history import (
@@ -52,7 +53,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.description = "List what the identifiers have kept: identifications, refusals and trend."
     parser.epilog = (
         "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
-        "picture could not be written."
+        "picture could not be written; 3: the latest diagnosis of a valve reached --fail-on."
     )
     parser.add_argument(
         "file",
@@ -81,6 +82,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
+    add_fail_on(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -144,4 +146,5 @@ def run(options: argparse.Namespace) -> int:
             write_csv(options.csv, histories)
         if figure is not None:
             figures.save_picture(figure, options.plot)
-    return ExitCode.DONE
+    levels = (history.entries[-1].diagnosis.level for history in histories)
+    return ExitCode.ALARM if has_failed(options, levels) else ExitCode.DONE

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
 from valve_friction_ros.commands.arguments.identification import (
     add_identification_arguments,
     identification_settings,
@@ -43,7 +44,7 @@ REFUSALS = (RefusalError,)
 
 
 class _Answer(NamedTuple):
-    """A valve of the file, its result or refusal, and its diagnosis where it has a baseline."""
+    """A valve of the file, its result or refusal, and its diagnosis if asked for."""
 
     recorded: RecordedValve
     outcome: Result | RefusalError
@@ -55,11 +56,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
     parser.epilog = (
         "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
-        "were refused, or a file could not be written; 1: some valves were refused."
+        "were refused, or a file could not be written; 1: some valves were refused; 3: a diagnosis "
+        "reached --fail-on."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
     add_file_arguments(parser)
+    add_fail_on(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -139,12 +142,14 @@ def run(options: argparse.Namespace) -> int:
     for each in recorded:
         outcome = _identified(each, valve, METHODS[options.method], settings)
         diagnosis = None
-        if isinstance(outcome, Result) and baseline is not None:
+        if isinstance(outcome, Result) and (baseline is not None or options.fail_on is not None):
             diagnosis = diagnose(outcome, valve, baseline)
         results.append(_Answer(each, outcome, diagnosis))
     try:
-        return _print(results, options.command, options.json)
+        code = _print(results, options.command, options.json)
     finally:  # a closed output costs no picture, and a full disk no numbers
         for each, outcome, _ in results:
             if isinstance(outcome, Result):
                 files.write(each, outcome, baseline)
+    levels = (each.diagnosis.level for each in results if each.diagnosis is not None)
+    return ExitCode.ALARM if has_failed(options, levels) else code

@@ -2,12 +2,13 @@
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
 from valve_friction_ros.commands.arguments.identification import (
     add_identification_arguments,
     identification_settings,
@@ -19,6 +20,7 @@ from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.fleet import (
     REFUSED,
+    Baselines,
     DeadWorker,
     Job,
     ResultsFile,
@@ -28,12 +30,18 @@ from valve_friction_ros.fleet import (
     find_recordings,
     identify_job,
     in_processes,
+    is_page,
     key_cells,
+    ranked,
+    reaches,
+    read_baselines,
+    reports_of,
     tally,
     usable_cores,
     writer_of,
 )
 from valve_friction_ros.fleet.row import Cell
+from valve_friction_ros.health import Level
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.records.valve_file import read_valve_file
 
@@ -42,6 +50,7 @@ __all__ = ["REFUSALS", "declare", "run"]
 REFUSALS = ()
 _SHOWN_SKIPPED = 10
 _SHOWN_REASONS = 10
+_SHOWN_ALARMS = 10
 
 _Rows = list[Mapping[str, Cell]]
 
@@ -50,22 +59,39 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
         "Identify all recordings in a folder and in the folders below it, on all cores. The "
-        "results are one file with a row for each valve. After an interruption the same command "
-        "goes on."
+        "results are a table with a row for each valve, and a page that ranks the valves. After an "
+        "interruption the same command goes on."
     )
     parser.epilog = (
         "Exit code 0: all were identified; 1: some were refused; 2: all recordings or an option "
-        "were refused; 130, 143: interrupted."
+        "were refused; 3: a diagnosis reached --fail-on; 130, 143: interrupted."
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="where the recordings are")
     parser.add_argument(
         "--output",
         type=Path,
+        action="append",
         required=True,
         metavar="FILE",
-        help="FILE.csv or FILE.jsonl (JSON lines), written at the end and when interrupted; until "
-        "then the rows, in the order in which they finished, are in FILE.csv.sqlite",
+        help="FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page for people, valves ranked), "
+        "written at the end and when interrupted; may be repeated; until then the rows, in the "
+        "order in which they finished, are in FILE.sqlite",
     )
+    parser.add_argument(
+        "--no-reports",
+        action="store_true",
+        help="with FILE.html: no page for each valve in the folder FILE_reports, which takes a "
+        "second and half a megabyte each",
+    )
+    parser.add_argument(
+        "--baselines",
+        type=Path,
+        metavar="FILE.csv",
+        help="friction of the healthy valves: an earlier output of this command for a folder with "
+        "the same names, or a table with the columns recording (empty: any), valve and "
+        "coulomb_friction_n; the diagnosis compares with it",
+    )
+    add_fail_on(parser)
     parser.add_argument(
         "--valve",
         type=Path,
@@ -94,17 +120,36 @@ def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once what would be refused of every recording."""
     if options.jobs < 1:
         raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
-    writer_of(options.output)
-    if not options.output.parent.is_dir():
-        raise ValueError(f"{options.output}: there is no folder {options.output.parent}")
+    for output in options.output:
+        writer_of(output)
+        if not output.parent.is_dir():
+            raise ValueError(f"{output}: there is no folder {output.parent}")
+        if output.resolve().parent != options.output[0].resolve().parent:
+            raise ValueError(f"{output}: all outputs must lie in the folder of the first")
     reading_options(options)
     identification_settings(options, dict.fromkeys(FIXABLE, 1.0))
     if options.valve is not None:
         read_valve_file(options.valve)
 
 
+def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
+    """Read the baselines, and say how many of the recordings have one."""
+    if options.baselines is None:
+        return Baselines({})
+    baselines = read_baselines(options.baselines)
+    count = baselines.count(names)
+    if count == 0:
+        raise ValueError(
+            f"{options.baselines}: no recording of {options.folder} has a baseline in it: its "
+            f"column recording must hold names such as {names[0]}"
+        )
+    print(f"baselines: {count} of {len(names)} recordings have one", file=sys.stderr)
+    return baselines
+
+
 def _planned(options: argparse.Namespace) -> dict[str, Plan]:
-    findings = find_recordings(options.folder, options.output, database_of(options.output))
+    database, reports = database_of(options.output[0]), reports_of(options.output[0])
+    findings = find_recordings(options.folder, *options.output, database, reports)
     if findings.skipped:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
         more = len(findings.skipped) - _SHOWN_SKIPPED
@@ -112,7 +157,10 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
         print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
         raise ValueError(f"{options.folder}: there are no CSV files and no bags in it")
-    return {plan.name: plan for plan in make_plan(findings, options)}
+    baselines = _baselines(options, [found.name for found in findings.recordings])
+    wanted = any(map(is_page, options.output)) and not options.no_reports
+    plans = make_plan(findings, options, baselines, reports if wanted else None)
+    return {plan.name: plan for plan in plans}
 
 
 def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[tuple[Plan, _Rows]]:
@@ -172,29 +220,46 @@ def _print_tally(counted: Tally) -> None:
         console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
 
 
+def _print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
+    """Print the valves that need attention, the first of them first."""
+    console = OutputConsole(highlight=False, markup=False)
+    alarms = [row for row in ranked(rows) if reaches(row, Level.WARN)]
+    for row in alarms[:_SHOWN_ALARMS]:
+        name = " ".join(filter(None, (str(row["recording"]), str(row["valve"]))))
+        console.print(f"{row['level']:>6} {name}: {row['message']}", soft_wrap=True)
+    if len(alarms) > _SHOWN_ALARMS:
+        console.print(f"       and {len(alarms) - _SHOWN_ALARMS} more")
+
+
 def run(options: argparse.Namespace) -> int:
     """Identify what is left to do, and print a tally."""
     _require_sense(options)
     plans = _planned(options)
-    with StopSignals() as stop, ResultsFile(options.output) as results:
+    with StopSignals() as stop, ResultsFile(*options.output) as results:
         left, dropped = forget_stale(results, plans, options)
         print(
             f"{len(plans)} recordings: {len(plans) - len(left)} done before, {len(left)} to do"
             + (f", {dropped} of them again" if dropped else ""),
             file=sys.stderr,
         )
+        for plan in left[:1]:
+            if isinstance(plan.job, Job) and plan.job.reports is not None:
+                plan.job.reports.mkdir(exist_ok=True)
         _identify(left, results, options.jobs, stop)
-        mine = (entry for entry in results.entries() if entry.recording in plans)
+        mine = [entry for entry in results.entries() if entry.recording in plans]
         if stop.wanted():
             complain(
                 options.command,
-                f"interrupted with {sum(1 for _ in mine)} of {len(plans)} recordings in "
-                f"{options.output}: the same command goes on from there",
+                f"interrupted with {len(mine)} of {len(plans)} recordings in "
+                f"{options.output[0]}: the same command goes on from there",
             )
             return stop.exit_code
-        counted = tally(mine)
+    counted, rows = tally(mine), [row for entry in mine for row in entry.rows]
     _print_tally(counted)
+    _print_alarms(rows)
     refused = counted.outcomes[REFUSED]
-    if refused == 0:
-        return ExitCode.DONE
-    return ExitCode.REFUSED if refused == counted.outcomes.total() else ExitCode.PARTLY
+    if refused == counted.outcomes.total():
+        return ExitCode.REFUSED
+    if has_failed(options, (Level[str(row["level"])] for row in rows if row["level"])):
+        return ExitCode.ALARM
+    return ExitCode.PARTLY if refused else ExitCode.DONE

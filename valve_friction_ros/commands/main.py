@@ -6,13 +6,12 @@ import importlib
 import os
 import signal
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Protocol, cast
 
 from valve_friction_ros import __version__
+from valve_friction_ros.commands.ctrl_c import has_been_interrupted, interrupt_raises
 from valve_friction_ros.commands.output.errors import (
     PROGRAM,
     ExitCode,
@@ -20,6 +19,7 @@ from valve_friction_ros.commands.output.errors import (
     complain,
     flush_output,
 )
+from valve_friction_ros.commands.start import end_at_once
 
 __all__ = ["SUB_COMMANDS", "SubCommand", "main", "run"]
 
@@ -27,14 +27,12 @@ SUB_COMMANDS = {
     "identify": "identify the friction of a valve from a CSV file or a bag",
     "identify-folder": "identify all recordings of a folder, on all cores",
     "validate": "simulate a recording with an identified model",
+    "call": "have a running identifier identify, set its baseline, save, report or clear",
     "history": "list, export and draw what the nodes have identified",
     "reproduce-paper": "run the paper's programme and write a report",
     "demo": "tighten the packing of a simulated valve that is monitored",
 }
 """The line in ``--help`` by sub-command; ``identify-folder`` is the module `identify_folder`."""
-
-_REPEAT = 0.02
-"""Time until an ignored Ctrl-C is repeated, s: callbacks are shorter."""
 
 
 class SubCommand(Protocol):
@@ -87,7 +85,8 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
     refusals: tuple[type[Exception], ...] = (ValueError, *module.REFUSALS)
     try:
-        return module.run(options)
+        with interrupt_raises():
+            return module.run(options)
     except refusals as error:
         complain(name, error)
         return ExitCode.REFUSED
@@ -105,42 +104,27 @@ def run(arguments: Sequence[str]) -> int:
             return _run(name, others)
         finally:
             flush_output()
+    except BrokenPipeError:  # whoever read the output has what they wanted, as `head` does
+        return ExitCode.OUTPUT_CLOSED
     except OSError as error:
         complain(name, error)
-        is_closed = isinstance(error, BrokenPipeError)
-        return ExitCode.OUTPUT_CLOSED if is_closed else ExitCode.REFUSED
-
-
-def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
-    """Repeat a Ctrl-C that Python ignores, since it came within a callback of an import."""
-    if issubclass(unraisable.exc_type, KeyboardInterrupt):
-        threading.Timer(_REPEAT, os.kill, (os.getpid(), signal.SIGINT)).start()
-    else:
-        sys.__unraisablehook__(unraisable)
+        return ExitCode.REFUSED
 
 
 def main() -> int:
     """Run as a process, which Ctrl-C ends with one line, too."""
-    is_interrupted = False
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        nonlocal is_interrupted
-        is_interrupted = True
-        signal.default_int_handler(number, frame)
-
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started the process
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, interrupt)
-        sys.unraisablehook = _interrupt_again
+        signal.signal(signal.SIGINT, end_at_once)
     try:
-        code = run(sys.argv[1:])
+        return run(sys.argv[1:])
     except BaseException:  # numpy makes an ImportError of a KeyboardInterrupt while it is imported
-        if not is_interrupted:
+        if not has_been_interrupted():
             raise
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         complain(" ".join(sys.argv[1:2]), "interrupted")
-        code = ExitCode.INTERRUPTED
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # nothing is left but the end of the process
-    return code
+        return ExitCode.INTERRUPTED
+    finally:  # nothing is left but the end of the process
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -23,6 +23,7 @@ from valve_friction_ros.identification import (
     plain,
     validate,
 )
+from valve_friction_ros.identification.trust.misfit import LEAST_FIT
 from valve_friction_ros.model import Valve
 
 __all__ = ["REFUSALS", "declare", "run"]
@@ -39,6 +40,17 @@ class _Result(NamedTuple):
     notes: tuple[str, ...]
 
 
+def _percent(text: str) -> float:
+    """Read a percentage of at most 100; return the share."""
+    try:
+        share = float(text.rstrip(" %")) / 100
+    except ValueError:
+        share = math.nan
+    if not share <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no percentage, such as 90")
+    return share
+
+
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
@@ -47,7 +59,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         "All values are in SI units. Exit code 2: a file or the record was refused, or the picture "
-        "could not be written."
+        "could not be written; 3: the fit is below --fail-below."
     )
     add_recording_arguments(parser)
     parser.add_argument(
@@ -56,6 +68,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="ESTIMATE.json",
         help="the model, as `valve_friction identify --json` prints it",
+    )
+    parser.add_argument(
+        "--fail-below",
+        type=_percent,
+        metavar="PERCENT",
+        help="exit code 3 if the fit is below this; below "
+        f"{100 * LEAST_FIT:g} it is called poor in any case",
     )
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both stems")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -84,10 +103,22 @@ def _validated(options: argparse.Namespace) -> _Result:
     return _Result(validation, model, valve, (*recorded.notes, *model.notes))
 
 
-def _as_json(result: _Result) -> dict[str, Any]:
+def _poor(validation: Validation, least: float) -> str:
+    """Return that the fit is poor, and the remedy; empty if it is not."""
+    if validation.fit >= least:
+        return ""
+    return (
+        f"poor: the model reproduces less than {100 * least:g} % of this movement: the valve has "
+        "changed, or the estimate is of another valve or of a poor record; identify this recording "
+        "too, and compare both results"
+    )
+
+
+def _as_json(result: _Result, poor: str) -> dict[str, Any]:
     validation, model, valve, notes = result
     return {
         "fit": validation.fit,
+        "poor": poor or None,
         "rms": validation.rms,
         "rms_share_of_travel": plain(valve.share_of_travel(validation.rms)),
         "maximum_error": validation.maximum_error,
@@ -98,11 +129,13 @@ def _as_json(result: _Result) -> dict[str, Any]:
     }
 
 
-def _print(result: _Result) -> None:
+def _print(result: _Result, poor: str) -> None:
     validation, _, valve, notes = result
     share = valve.share_of_travel(validation.rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""
     print(f"fit {100 * validation.fit:.2f} %  (1 − ‖y − ŷ‖ / ‖y − ȳ‖)")
+    if poor:
+        print(poor)
     print(f"rms error {validation.rms * 1e6:.3g} µm{of_travel}")
     print(f"largest error {validation.maximum_error * 1e6:.3g} µm")
     for note in notes:
@@ -118,12 +151,14 @@ def _draw(result: _Result, path: Path) -> None:
 def run(options: argparse.Namespace) -> int:
     """Validate the model, print how well it describes the recording, and draw it."""
     result = _validated(options)
+    least = options.fail_below
+    poor = _poor(result.validation, max(LEAST_FIT, least or 0.0))
     try:
         if options.json:
-            print(json.dumps(_as_json(result), ensure_ascii=False, allow_nan=False))
+            print(json.dumps(_as_json(result, poor), ensure_ascii=False, allow_nan=False))
         else:
-            _print(result)
+            _print(result, poor)
     finally:  # a closed output costs no picture, and a full disk no numbers
         if options.plot is not None:
             _draw(result, options.plot)
-    return ExitCode.DONE
+    return ExitCode.ALARM if least is not None and result.validation.fit < least else ExitCode.DONE

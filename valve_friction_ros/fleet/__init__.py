@@ -1,8 +1,11 @@
 """Many recordings identified by many processes into one file; no ROS."""
 
+from valve_friction_ros.fleet.baselines import Baselines, read_baselines
 from valve_friction_ros.fleet.discovery import Findings, FoundRecording, find_recordings
 from valve_friction_ros.fleet.job import Job, Options, identify_job
-from valve_friction_ros.fleet.results_file import Entry, ResultsFile, database_of, writer_of
+from valve_friction_ros.fleet.outputs import is_page, writer_of
+from valve_friction_ros.fleet.ranking import ranked, reaches
+from valve_friction_ros.fleet.results_file import Entry, ResultsFile, database_of, reports_of
 from valve_friction_ros.fleet.row import COLUMNS, error_cells, key_cells
 from valve_friction_ros.fleet.tally import REFUSED, Reason, Tally, tally
 from valve_friction_ros.fleet.workers import DeadWorker, in_processes, usable_cores
@@ -10,6 +13,7 @@ from valve_friction_ros.fleet.workers import DeadWorker, in_processes, usable_co
 __all__ = [
     "COLUMNS",
     "REFUSED",
+    "Baselines",
     "DeadWorker",
     "Entry",
     "Findings",
@@ -24,7 +28,12 @@ __all__ = [
     "find_recordings",
     "identify_job",
     "in_processes",
+    "is_page",
     "key_cells",
+    "ranked",
+    "reaches",
+    "read_baselines",
+    "reports_of",
     "tally",
     "usable_cores",
     "writer_of",

@@ -106,8 +106,8 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
     A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
     each CSV or TSV file, gzipped or not, and each storage file of a bag is one, found by its
     ending. Hidden files and folders and links to folders are skipped; so is a name that cannot
-    be written on a line. The files of `left_out`, such as the output, are neither recordings nor
-    skipped.
+    be written on a line. Files and folders of `left_out`, such as the output, are neither
+    recordings nor skipped.
 
     Raises ValueError if the folder is none, or cannot be read.
     """
@@ -123,6 +123,7 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
             recordings.append(here)
             folders.clear()
             continue
+        folders[:] = [name for name in folders if (here / name).resolve() not in own]
         closed = {name for name in folders if name.startswith(".") or (here / name).is_symlink()}
         skipped += [f"{(below / name).as_posix()}/" for name in closed]
         folders[:] = sorted(set(folders) - closed)

@@ -1,28 +1,40 @@
 """One recording to identify, and the rows of its results."""
 
 import hashlib
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.row import Cell, error_cells, result_cells
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, method_named
+from valve_friction_ros.health import Baseline, diagnose
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    RefusalError,
+    Result,
+    method_named,
+)
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
 
 __all__ = ["Job", "Options", "identify_job"]
 
+_STRANGE = re.compile(r"[^A-Za-z0-9.-]+")
+_LONGEST = 100
+"""Characters of a report's name before its digest."""
+
 
 @dataclass(frozen=True)
 class Options:
-    """Valve, options of reading, method and settings with which a recording is identified."""
+    """With what a recording is identified, and compared: `baselines` by the names of its valves."""
 
     valve: Valve
     reading: ReadingOptions
     method: str
     settings: IdentificationSettings
+    baselines: Mapping[str, Baseline] = field(default_factory=dict)
 
     def fingerprint(self) -> str:
         """Return a digest of all options and of the version of the package."""
@@ -38,16 +50,54 @@ class Options:
             self.method,
             settings,
             sorted(self.settings.fixed.items()),
+            sorted(self.baselines.items(), key=lambda one: one[0]),
         )
         return hashlib.blake2b(repr(everything).encode(), digest_size=8).hexdigest()
 
 
 @dataclass(frozen=True)
 class Job:
-    """A recording and how to identify it, to be handed to another process."""
+    """A recording and how to identify it, to be handed to another process.
+
+    `name` is that of the recording in its folder; `reports` is where its reports go, if they are
+    wanted.
+    """
 
     path: Path
+    name: str
     options: Options
+    reports: Path | None = None
+
+
+def _report_name(job: Job, valve: str) -> str:
+    """Return the name of a report: readable, and no other valve's."""
+    name = f"{job.name} {valve}".strip()
+    digest = hashlib.blake2b(name.encode(), digest_size=4).hexdigest()
+    return f"{_STRANGE.sub('_', name).strip('_')[:_LONGEST]}_{digest}.html"
+
+
+def _report(
+    job: Job, recorded: RecordedValve, result: Result, baseline: Baseline | None
+) -> Mapping[str, Cell]:
+    """Write the report of a valve; a failure is a warning, as the numbers are there."""
+    if job.reports is None:
+        return {}
+
+    from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
+
+    name = _report_name(job, recorded.name)
+    record = reports.IdentifiedRecord(
+        name=" ".join(filter(None, (job.name, recorded.name))),
+        source=recorded.label,
+        result=result,
+        baseline=baseline,
+        notes=recorded.notes,
+    )
+    try:
+        reports.write_report(reports.identification_report(record), job.reports / name)
+    except OSError as error:
+        return {"warnings": f"no report: {error.filename}: {error.strerror}"}
+    return {"report": f"{job.reports.name}/{name}"}
 
 
 def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
@@ -58,7 +108,10 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
         result = identify(recording, options.valve, options.settings)
     except RefusalError as refusal:
         return error_cells(recorded.name, str(refusal), job.path)
-    return result_cells(recorded.name, result, recording, recorded.notes)
+    baseline = options.baselines.get(recorded.name)
+    diagnosis = diagnose(result, options.valve, baseline)
+    cells = result_cells(recorded.name, result, diagnosis, recorded.notes)
+    return {**cells, **_report(job, recorded, result, baseline)}
 
 
 def identify_job(job: Job) -> list[Mapping[str, Cell]]:

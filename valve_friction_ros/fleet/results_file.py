@@ -1,21 +1,21 @@
-"""The results of many identifications: kept in SQLite, written out as CSV or JSON lines."""
+"""The results of many identifications: kept in SQLite, written out in the formats asked for."""
 
 import contextlib
-import csv
-import json
 import sqlite3
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
 
-from valve_friction_ros.fleet.row import COLUMNS, Cell
+from valve_friction_ros.fleet.outputs import writer_of
+from valve_friction_ros.fleet.row import COLUMNS, PICTURE, Cell
+from valve_friction_ros.records.whole_file import write_whole
 
-__all__ = ["Entry", "ResultsFile", "database_of", "writer_of"]
+__all__ = ["Entry", "ResultsFile", "database_of", "reports_of"]
 
 _Row = Mapping[str, Cell]
+_KEPT = (*COLUMNS, PICTURE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,59 +41,39 @@ class Entry:
         return all(row["error"] for row in self.rows)
 
 
-def _write_csv(stream: TextIO, rows: Iterable[_Row]) -> None:
-    writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-
-
-def _write_json_lines(stream: TextIO, rows: Iterable[_Row]) -> None:
-    for row in rows:
-        stream.write(json.dumps(row, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-_WRITERS = {".csv": _write_csv, ".jsonl": _write_json_lines}
-
-
-def writer_of(output: Path) -> Callable[[TextIO, Iterable[_Row]], None]:
-    """Return what writes rows in the format that the name of the output ends in.
-
-    Raises ValueError if it is not known; the message lists the known ones.
-    """
-    known = _WRITERS.get(output.suffix.lower())
-    if known is None:
-        raise ValueError(f"{output}: the output must end in {' or '.join(_WRITERS)}")
-    return known
-
-
 def database_of(output: Path) -> Path:
-    """Return the file in which the rows of an output are kept, beside it."""
-    place = output.resolve()
-    return place.with_name(f"{place.name}.sqlite")
+    """Return the file in which the rows of an output are kept, beside it: ``NAME.sqlite``."""
+    return output.resolve().with_suffix(".sqlite")
+
+
+def reports_of(output: Path) -> Path:
+    """Return the folder of the reports of an output, beside it: ``NAME_reports``."""
+    return output.resolve().with_name(f"{output.resolve().stem}_reports")
 
 
 class ResultsFile:
-    """Rows that are on the disk when `append` returns; leaving the context writes the output.
+    """Rows that are on the disk when `append` returns; leaving the context writes the outputs.
 
-    They are kept in the table ``result`` of `database_of` the output, in its columns and in the
-    order in which they were appended. Only one process at a time can open it. The ending of the
+    They are kept in the table ``result`` of `database_of` the first output, in its columns and in
+    the order in which they were appended. Only one process at a time can open it. The ending of an
     output's name is its format.
 
-    Raises ValueError if the output or its database is another program's, or the database cannot be
+    Raises ValueError if an output or the database is another program's, or the database cannot be
     opened.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *others: Path) -> None:
         self.path = path
-        self._write = writer_of(path)
-        database = database_of(path)
-        if path.exists() and not database.exists():
-            raise ValueError(
-                f"{path}: it is there, but not {database.name}, which it would have been written "
-                "from: give another output, or move the file away"
-            )
+        self._outputs = {output: writer_of(output) for output in (path, *others)}
+        self._database = database_of(path)
+        for output in self._outputs:
+            if output.is_file() and not self._database.exists():
+                raise ValueError(
+                    f"{output}: it is there, but not {self._database.name}, which it would have "
+                    "been written from: give another output, or move the file away"
+                )
         with self._explained():
-            self._connection = sqlite3.connect(database, timeout=0)
+            self._connection = sqlite3.connect(self._database, timeout=0)
             try:
                 self._open()
             except BaseException:
@@ -107,13 +87,13 @@ class ResultsFile:
         self._connection.execute("PRAGMA synchronous = FULL")
         self._connection.execute("BEGIN EXCLUSIVE")
         self._connection.execute(
-            f"CREATE TABLE IF NOT EXISTS result ({', '.join(COLUMNS)}, "
+            f"CREATE TABLE IF NOT EXISTS result ({', '.join(_KEPT)}, "
             "PRIMARY KEY (recording, valve))"
         )
         self._connection.commit()
         found = self._connection.execute("SELECT * FROM result LIMIT 0").description
-        if tuple(name for name, *_ in found) != COLUMNS:
-            raise ValueError(f"{self.path}: results of another version: give another output")
+        if tuple(name for name, *_ in found) != _KEPT:
+            raise ValueError(f"{self._database}: results of another version: give another output")
 
     def __enter__(self) -> "ResultsFile":
         return self
@@ -124,9 +104,9 @@ class ResultsFile:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Write the output and close the database."""
+        """Write the outputs and close the database."""
         try:
-            self._write_output()
+            self._write_outputs()
         finally:
             self._connection.close()
 
@@ -137,20 +117,17 @@ class ResultsFile:
         except sqlite3.Error as error:
             locked = "another run is writing it: wait for its end"
             cause = locked if "locked" in str(error) else str(error)
-            raise ValueError(f"{database_of(self.path)}: {cause}") from None
+            raise ValueError(f"{self._database}: {cause}") from None
 
     def _rows(self) -> Iterator[_Row]:
         with self._explained():
             for cells in self._connection.execute("SELECT * FROM result ORDER BY rowid"):
-                yield dict(zip(COLUMNS, cells, strict=True))
+                yield dict(zip(_KEPT, cells, strict=True))
 
-    def _write_output(self) -> None:
-        """Replace the output as a whole."""
-        place = self.path.resolve()
-        draft = place.with_name(f".{place.name}.draft")
-        with draft.open("w", encoding="utf-8", newline="") as stream:
-            self._write(stream, self._rows())
-        draft.replace(place)
+    def _write_outputs(self) -> None:
+        """Replace each output as a whole."""
+        for output, write in self._outputs.items():
+            write_whole(output, write(self._rows(), output).encode())
 
     def entries(self) -> Iterator[Entry]:
         """Go through the recordings."""
@@ -167,7 +144,7 @@ class ResultsFile:
 
     def append(self, rows: Sequence[_Row]) -> None:
         """Add the rows of a recording, all at once; they are on the disk on return."""
-        marks = ", ".join("?" * len(COLUMNS))
-        cells = [[row.get(column) for column in COLUMNS] for row in rows]
+        marks = ", ".join("?" * len(_KEPT))
+        cells = [[row.get(column) for column in _KEPT] for row in rows]
         with self._explained(), self._connection:
             self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa: S608

@@ -1,5 +1,6 @@
 """Files that are written whole or not at all."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -23,4 +24,5 @@ def write_whole(path: Path, content: bytes) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         if not is_special:
-            draft.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # a read-only folder holds no draft
+                draft.unlink(missing_ok=True)

@@ -7,8 +7,15 @@ from pathlib import Path
 
 from valve_friction_ros.commands.arguments.identification import identification_settings
 from valve_friction_ros.commands.arguments.recording import reading_options, valve_of
-from valve_friction_ros.fleet import Entry, Findings, FoundRecording, Job, Options, ResultsFile
-from valve_friction_ros.records.recordings import ReadingOptions
+from valve_friction_ros.fleet import (
+    Baselines,
+    Entry,
+    Findings,
+    FoundRecording,
+    Job,
+    Options,
+    ResultsFile,
+)
 
 __all__ = ["Plan", "forget_stale", "make_plan"]
 
@@ -37,33 +44,48 @@ def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
     return next((place for place in places if place.exists()), common)
 
 
-def _plan(found: FoundRecording, options: argparse.Namespace, reading: ReadingOptions) -> Plan:
-    content = ""
-    try:
-        content = found.content()
-        description = valve_of(found.path, _valve_file(found, options.valve), reading)
-        job = Job(
-            found.path,
-            Options(
+def make_plan(
+    findings: Findings,
+    options: argparse.Namespace,
+    baselines: Baselines,
+    reports: Path | None,
+) -> Iterator[Plan]:
+    """Plan each recording, in the order of their names; `reports` is the folder of the reports."""
+    reading = reading_options(options)
+
+    def plan(found: FoundRecording) -> Plan:
+        content = ""
+        try:
+            content = found.content()
+            description = valve_of(found.path, _valve_file(found, options.valve), reading)
+            wanted = Options(
                 description.valve,
                 reading,
                 options.method,
                 identification_settings(options, description.known),
-            ),
-        )
-    except (ValueError, OSError) as error:
-        return Plan(found.name, content, "", str(error))
-    return Plan(found.name, content, job.options.fingerprint(), job)
+                baselines.of(found.name),
+            )
+        except (ValueError, OSError) as error:
+            return Plan(found.name, content, "", str(error))
+        job = Job(found.path, found.name, wanted, reports)
+        return Plan(found.name, content, wanted.fingerprint(), job)
 
-
-def make_plan(findings: Findings, options: argparse.Namespace) -> Iterator[Plan]:
-    """Plan each recording, in the order of their names."""
-    reading = reading_options(options)
-    return (_plan(found, options, reading) for found in findings.recordings)
+    return map(plan, findings.recordings)
 
 
 def _is_current(entry: Entry, plan: Plan) -> bool:
     return (entry.content, entry.settings) == (plan.content, plan.settings)
+
+
+def _has_reports(entry: Entry, plan: Plan) -> bool:
+    """Return whether the reports of an entry are there, if they are wanted."""
+    if not isinstance(plan.job, Job) or plan.job.reports is None:
+        return True
+    beside = plan.job.reports.parent
+    return all(
+        row["error"] or (row["report"] and (beside / str(row["report"])).is_file())
+        for row in entry.rows
+    )
 
 
 def forget_stale(
@@ -72,22 +94,24 @@ def forget_stale(
     """Drop the rows that do not hold any more; return what is left, and how many were dropped.
 
     With ``redo`` good rows of other options may go; with ``retry_failed`` refused recordings are
-    tried again. Raises ValueError if good rows were made with other
-    options and may not go.
+    tried again, and so are those whose reports are missing.
+
+    Raises ValueError if good rows were made with other options and may not go.
     """
     done, others = set(), 0
     for entry in results.entries():
         plan = plans.get(entry.recording)
         if plan is None:
             continue
-        if _is_current(entry, plan) and not (options.retry_failed and entry.failed):
-            done.add(entry.recording)
+        if _is_current(entry, plan):
+            if _has_reports(entry, plan) and not (options.retry_failed and entry.failed):
+                done.add(entry.recording)
         elif entry.content == plan.content and entry.settings != plan.settings:
             others += not entry.refused
     if others and not options.redo:
         raise ValueError(
             f"{results.path}: {others} recordings in it were identified with other options, "
-            "another valve file or another version: give another --output, or --redo to replace "
+            "another valve file, baseline or version: give another --output, or --redo to replace "
             "them"
         )
     dropped = results.keep(lambda entry: entry.recording not in plans or entry.recording in done)

@@ -8,7 +8,7 @@ import signal
 import sys
 from enum import IntEnum
 from pathlib import Path
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 __all__ = [
     "PROGRAM",
@@ -30,6 +30,8 @@ class ExitCode(IntEnum):
     """Some recordings were refused, or the demonstration was off its tolerances."""
     REFUSED = 2
     """An option, a file or all recordings were refused, or a file could not be written."""
+    ALARM = 3
+    """A diagnosis reached ``--fail-on``, or a fit is below ``--fail-below``."""
     INTERRUPTED = 128 + signal.SIGINT
     OUTPUT_CLOSED = 128 + signal.SIGPIPE
 
@@ -40,6 +42,13 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the error and end with exit code 2."""
         self.exit(ExitCode.REFUSED, f"{self.prog}: {message}; see --help\n")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print the help or an error; argparse would ignore that the help cannot be written."""
+        if file is None or file is sys.stderr:
+            super()._print_message(message, file)
+        else:
+            file.write(message)
 
 
 def silence(stream: TextIO) -> None:
@@ -63,8 +72,6 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def _text(error: Exception | str) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
-    if error.errno == errno.EPIPE:
-        return "the output was closed before everything was printed"
     # Functions that write files name them; those that print do not.
     place = error.filename or ("standard output" if error.errno in _FULL else "")
     return f"{place}: {error.strerror}" if place else error.strerror

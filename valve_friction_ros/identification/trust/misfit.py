@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["Misfit", "stem_distance"]
+__all__ = ["LEAST_FIT", "Misfit", "stem_distance"]
 
 _EXPECTED_SHARE = 0.75
 """Share of the tolerated misfit that chance explains.
 
 Chosen: 68 of 71 simulated noisy records of Karnopp valves lie below it, 70 below the tolerance."""
 
-_GROSS = 0.9
+LEAST_FIT = 0.9
 """Share of the movement below which a model that does not describe the record is refused.
 
 Chosen below all simulated records, which have 0.96 and more, except in-service records of graphite
@@ -66,7 +66,7 @@ class Misfit:
     @property
     def is_gross(self) -> bool:
         """Whether the model reproduces too little of the movement for any parameter to be used."""
-        return self.fit < _GROSS and not self.describes
+        return self.fit < LEAST_FIT and not self.describes
 
     @property
     def describes(self) -> bool:

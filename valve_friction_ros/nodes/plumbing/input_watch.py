@@ -7,6 +7,10 @@ from rclpy.subscription import Subscription
 
 __all__ = ["InputWatch"]
 
+_LEASE = 20.0
+"""Time, s, after which the middleware (Fast DDS) forgets a node that has ended without farewell. A
+reliable publisher of long queues serves a new node only then."""
+
 
 class InputWatch:
     """Says what is wrong with one subscribed topic; silence is real time, also with sim time."""
@@ -50,4 +54,8 @@ class InputWatch:
             cause = f"it is published as {', '.join(others)}, not {self._type}"
         else:
             cause = "its publisher is silent"
+            if not self._has_arrived and silence < _LEASE:
+                cause += (
+                    f", or still waits for a node that was killed, for up to {_LEASE:g} s: wait"
+                )
         return f"no data on {self._topic} for {silence:.1f} s: {cause}"

@@ -1,0 +1,151 @@
+"""The sub-command `call`: services of a live node without the command `ros2`."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from live_nodes import NAMESPACE, PROJECT
+from records import quick_record
+
+from valve_friction_ros.model import HIGH_FRICTION
+
+SLOW = Path(__file__).with_name("slow_identifier.py")
+
+
+def start(domain, *arguments):
+    """Start the command in a domain."""
+    path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
+    return subprocess.Popen(
+        [sys.executable, "-m", "valve_friction_ros", "call", *arguments],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def ended(process):
+    """Exit code, stdout and stderr."""
+    out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
+@pytest.fixture(scope="module")
+def bench(shared):
+    """Function of arguments: exit code, stdout and stderr of the command beside an identifier."""
+    shared.start_identifier({"input_timeout": 600.0})
+    return shared.client, lambda *arguments: ended(start(shared.domain, *arguments))
+
+
+def test_all_services(bench):
+    client, call = bench
+    assert call("fv_101", "clear") == (
+        0,
+        "the buffer is empty; estimate and baseline are kept\n",
+        "",
+    )
+    code, out, err = call(NAMESPACE, "identify")
+    assert (code, out) == (2, "")
+    assert err.startswith("valve_friction call: /fv_101/identifier: ")
+    assert err.count("\n") == 1
+
+    message = client.identified(quick_record())
+    assert call(NAMESPACE, "identify", "--fail-on", "warn") == (0, f"OK: {message}\n", "")
+    code, out, err = call(f"{NAMESPACE}/identifier", "set_baseline")
+    assert (code, err) == (0, "")
+    assert out.startswith("baseline: coulomb friction ")
+    for service in ("save", "report"):
+        code, out, err = call(NAMESPACE, service)
+        assert (code, err) == (0, "")
+        assert Path(out.strip()).exists()
+
+    message = client.identified(quick_record(HIGH_FRICTION))
+    assert call(NAMESPACE, "identify") == (0, f"ERROR: {message}\n", "")
+    assert call(NAMESPACE, "identify", "--fail-on", "error") == (3, f"ERROR: {message}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["/fv_109", "identify", "--timeout", "2"], "no identifier of /fv_109 was met within 2 s"),
+        (["/fv_101", "clear", "--timeout", "-1"], "--timeout must be above zero, got -1"),
+        (["/fv_101", "save", "--fail-on", "warn"], "--fail-on: save makes no diagnosis"),
+    ],
+)
+def test_refused_in_one_line(bench, arguments, line):
+    code, out, err = bench[1](*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"valve_friction call: {line}")
+    assert err.count("\n") == 1
+    if "fv_109" in line:
+        assert "; there are /fv_101, or set its ROS_DOMAIN_ID" in err
+
+
+def test_an_unknown_service_lists_the_known(bench):
+    code, out, err = bench[1]("/fv_101", "reset")
+    assert (code, out) == (2, "")
+    assert "identify" in err
+    assert "clear" in err
+    assert err.count("\n") == 1
+
+
+@pytest.fixture
+def busy(live):
+    """A domain with an identifier whose identification does not end."""
+    live.start_identifier(script=SLOW)
+    live.client.send_record(quick_record())
+    live.client.wait_for_buffered(2 * len(quick_record()))
+    return live
+
+
+def test_the_timeout_ends_the_command_and_the_node_goes_on(busy):
+    assert ended(start(busy.domain, NAMESPACE, "identify", "--timeout", "3")) == (
+        2,
+        "",
+        "valve_friction call: /fv_101/identifier/identify has not answered within 3 s: it goes "
+        "on; give it longer by --timeout\n",
+    )
+    assert busy.client.trigger("identify").message.startswith(
+        "an identification is already running"
+    )
+
+
+def waiting(bench):
+    """Start the command, which waits for an identification that does not end."""
+    process = start(bench.domain, NAMESPACE, "identify")
+    service = f"{NAMESPACE}/identifier/identify"
+    client = bench.client
+    client.wait_until(lambda: client.node.count_clients(service), "the caller")
+    time.sleep(2.0)  # its call follows a moment later
+    return process
+
+
+def test_interrupted_while_it_waits(busy):
+    process = waiting(busy)
+    process.send_signal(signal.SIGINT)
+    assert ended(process) == (
+        130,
+        "",
+        "valve_friction call: interrupted: the identifier goes on with what it has begun\n",
+    )
+
+
+def test_the_node_ends_meanwhile(busy):
+    process = waiting(busy)
+    busy.nodes[0].stop()
+    assert ended(process) == (
+        2,
+        "",
+        "valve_friction call: /fv_101/identifier has ended before it answered\n",
+    )
+
+
+def test_nobody_is_there(live):
+    code, out, err = ended(start(live.domain, "/fv_101", "identify", "--timeout", "1"))
+    assert (code, out) == (2, "")
+    assert "there is none at all: start one, or set its ROS_DOMAIN_ID" in err
+    assert err.count("\n") == 1

@@ -1,0 +1,149 @@
+"""A call of an identifier's service, for people without the command `ros2`."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.health import Level
+from valve_friction_ros.identification import RefusalError
+
+__all__ = ["Answer", "Caller", "caller"]
+
+_TURN = 0.05
+_SETTLING = 0.3
+"""Time from the discovery of a service to its call, s: a node that has not met the caller yet would
+answer in vain."""
+_LAST_WORD = 1.5
+"""Time for the diagnosis that follows an answer, s: it is published each second."""
+
+
+class Answer(NamedTuple):
+    """What a service said; `level` is that of the diagnosis, where it was asked for and came."""
+
+    success: bool
+    message: str
+    level: Level | None
+
+
+class Caller:
+    """A client of identifiers, which waits as long as `is_wanted()` is true."""
+
+    def __init__(self, node: Node, is_wanted: Callable[[], bool]) -> None:
+        self._node = node
+        self._is_wanted = is_wanted
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._levels: dict[str, Level] = {}
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.shutdown()
+
+    def _wait(self, done: Callable[[], object], patience: float) -> bool:
+        """Spin until `done()` is true; return whether it is, in time."""
+        deadline = time.monotonic() + patience
+        while not (is_done := bool(done())):
+            if time.monotonic() > deadline or not self._is_wanted():
+                break
+            self._executor.spin_once(timeout_sec=_TURN)
+        return is_done
+
+    def identifiers(self) -> list[str]:
+        """Return the names of the identifiers that are known now."""
+        return sorted(
+            name.removesuffix("/identify")
+            for name, types in self._node.get_service_names_and_types()
+            if name.endswith("/identify") and "std_srvs/srv/Trigger" in types
+        )
+
+    def find(self, valve: str, patience: float) -> str:
+        """Return the name of the identifier of a valve, by its namespace or its own name.
+
+        Raises RefusalError, which lists the identifiers there are, if it is not there.
+        """
+        wanted = f"/{valve.strip('/')}"
+
+        def found() -> list[str]:
+            return [
+                name
+                for name in self.identifiers()
+                if wanted in (name, name.rpartition("/")[0] or "/")
+            ]
+
+        if not self._wait(found, patience) and self._is_wanted():
+            known = ", ".join(
+                name.removesuffix("/identifier") or "/" for name in self.identifiers()
+            )
+            domain = os.environ.get("ROS_DOMAIN_ID", "0")
+            there = f"there are {known}" if known else "there is none at all: start one"
+            raise RefusalError(
+                f"no identifier of {wanted} was met within {patience:g} s in the ROS domain "
+                f"{domain}; {there}, or set its ROS_DOMAIN_ID"
+            )
+        return next(iter(found()), wanted)
+
+    def _note_levels(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            level = status.level[0]
+            if level <= Level.ERROR:
+                self._levels[status.name] = Level(level)
+
+    def call(self, identifier: str, service: str, patience: float) -> Answer | None:
+        """Call a service and wait for its answer; None where it is not wanted any more.
+
+        Raises RefusalError if there is no answer in time, or the identifier has ended.
+        """
+        name = f"{identifier}/{service}"
+        client = self._node.create_client(Trigger, name)
+        wants_level = service == "identify"
+        if wants_level:
+            self._node.create_subscription(DiagnosticArray, "/diagnostics", self._note_levels, 100)
+        if not self._wait(client.service_is_ready, patience) and self._is_wanted():
+            raise RefusalError(f"no service {name} was met within {patience:g} s")
+        self._wait(lambda: False, _SETTLING)
+        self._levels.clear()
+        future = client.call_async(Trigger.Request())
+        self._wait(lambda: future.done() or not client.service_is_ready(), patience)
+        if not future.done():
+            if not self._is_wanted():
+                return None
+            if not client.service_is_ready():
+                raise RefusalError(f"{identifier} has ended before it answered")
+            raise RefusalError(
+                f"{name} has not answered within {patience:g} s: it goes on; give it longer by "
+                "--timeout"
+            )
+        status = f"{identifier}: friction"
+        if wants_level:
+            self._wait(lambda: status in self._levels, _LAST_WORD)
+        answer = future.result()
+        return Answer(answer.success, answer.message, self._levels.get(status))
+
+
+@contextmanager
+def caller(is_wanted: Callable[[], bool]) -> Iterator[Caller]:
+    """Provide a client, which gives up waiting once `is_wanted()` is false."""
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node(
+            f"valve_friction_call_{os.getpid()}",
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        one = Caller(node, is_wanted)
+        try:
+            yield one
+        finally:
+            one.close()
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
