@@ -42,6 +42,7 @@ INNER = {
     "identification.refined": {"trust", "published"},
     "identification.signature": {"trust", "published", "steps"},
     "records.bags": set(),
+    "records.tables": set(),
     "reproduction.checks": set(),
     "reproduction.figures": {"checks"},
     "nodes.plumbing": set(),

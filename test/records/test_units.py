@@ -25,6 +25,9 @@ DEFINITIONS = {
     "bar": Fraction(10**5),
     "psi": POUND_FORCE / INCH**2,
     "kgf/cm2": Fraction("9.80665") * 10**4,
+    "inH2O": Fraction("249.08891"),  # at 4 °C
+    "inHg": Fraction("3386.389"),  # at 0 °C
+    "mmHg": Fraction("133.322387415"),
     "m": Fraction(1),
     "cm": Fraction(1, 100),
     "mm": Fraction(1, 1000),

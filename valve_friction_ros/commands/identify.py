@@ -10,13 +10,13 @@ from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_faile
 from valve_friction_ros.commands.arguments.identification import (
     add_identification_arguments,
     identification_settings,
+    method_name,
 )
 from valve_friction_ros.commands.arguments.recording import (
     add_recording_arguments,
+    described,
     read_one,
-    reading_options,
     require_one,
-    valve_of,
 )
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.identification_files import (
@@ -122,16 +122,16 @@ def _print(results: Sequence[_Answer], command: str, in_json: bool) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Identify the valves of the file, print what was found, and write the files asked for."""
-    reading = reading_options(options)
-    description = valve_of(options.file, options.valve, reading)
+    description, reading = described(options.file, options.valve, options)
     valve = description.valve
-    settings = identification_settings(options, description.known)
+    settings = identification_settings(options, description.known, description.settings)
+    method = METHODS[method_name(options, description.settings)]
     baseline, files = baseline_from(options), identification_files(options)
     if options.baseline_recording is not None:
         whole = replace(reading, stretch=Stretch())
         healthy = read_one(options.baseline_recording, valve, whole)
         baseline, files = files.compared_with(
-            healthy, _identified(healthy, valve, METHODS[options.method], settings)
+            healthy, _identified(healthy, valve, method, settings)
         )
     recorded = read_recordings(options.file, valve, reading)
     files.require_one_valve(recorded)
@@ -140,7 +140,7 @@ def run(options: argparse.Namespace) -> int:
         require_one(recorded, f"--baseline-{name} is of")
     results = []
     for each in recorded:
-        outcome = _identified(each, valve, METHODS[options.method], settings)
+        outcome = _identified(each, valve, method, settings)
         diagnosis = None
         if isinstance(outcome, Result) and (baseline is not None or options.fail_on is not None):
             diagnosis = diagnose(outcome, valve, baseline)

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 from valve_friction_ros.commands.arguments.estimate_file import read_estimate
 from valve_friction_ros.commands.arguments.recording import (
     add_recording_arguments,
+    described,
     read_one,
-    reading_options,
-    valve_of,
 )
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.health import percentage
@@ -82,8 +81,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def _validated(options: argparse.Namespace) -> _Result:
     """Read the files and simulate."""
-    reading = reading_options(options)
-    description = valve_of(options.file, options.valve, reading)
+    description, reading = described(options.file, options.valve, options)
     valve = description.valve
     estimate = read_estimate(options.estimate)
     try:

@@ -27,7 +27,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.running import run_node
-from valve_friction_ros.records.csv_table import read_columns
+from valve_friction_ros.records.tables.table import read_columns
 
 __all__ = ["PARAMETERS", "PressureSource", "main"]
 

@@ -49,13 +49,16 @@ class Stretch:
         """Return whether a time after the first sample, ns, lies between begin and end."""
         return _nanoseconds(self.begin) <= since_first <= _nanoseconds(self.end)
 
-    def select(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Choose from times in ns, shape (n,); return an array of bool, true within the stretch.
+    def select(
+        self, times: NDArray[np.float64] | NDArray[np.int64], first: float
+    ) -> NDArray[np.bool_]:
+        """Choose from times, ns, shape (n,); return an array of bool, true within the stretch.
 
-        A time that is not a number stays, to be refused.
+        `first` is the time of the file's first sample, ns. A time that is not a number stays, to be
+        refused.
         """
         with np.errstate(invalid="ignore"):
-            since = np.rint(times - times[0])
+            since = np.rint(times - first)
         outside = (since < _nanoseconds(self.begin)) | (since > _nanoseconds(self.end))
         inside: NDArray[np.bool_] = ~outside | ~np.isfinite(times)
         if inside.any():

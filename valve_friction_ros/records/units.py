@@ -13,6 +13,7 @@ __all__ = [
     "POSITION_UNITS",
     "PRESSURE_UNITS",
     "Unit",
+    "unit_named",
 ]
 
 
@@ -49,6 +50,9 @@ PRESSURE_UNITS = MappingProxyType(
         "bar": Unit(1e5),
         "psi": Unit(_POUND_FORCE, 6.4516e-4),
         "kgf/cm2": Unit(_KILOGRAM_FORCE, 1e-4),
+        "inH2O": Unit(249.08891),
+        "inHg": Unit(3386.389),
+        "mmHg": Unit(133.322387415),
     }
 )
 
@@ -78,3 +82,28 @@ NANOSECONDS = MappingProxyType(
     {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000, "min": 60_000_000_000}
 )
 """Units of time in nanoseconds, the unit of all stamps."""
+
+_OTHER_NAMES = MappingProxyType(
+    {
+        "%": PERCENT,
+        "µm": "um",
+        "μm": "um",
+        "µs": "us",
+        "μs": "us",
+        "sec": "s",
+        '"': "in",
+        "inch": "in",
+        "psig": "psi",
+        "psia": "psi",
+        "barg": "bar",
+        "bara": "bar",
+        "kg/cm2": "kgf/cm2",
+        "kg/cm²": "kgf/cm2",
+        "kgf/cm²": "kgf/cm2",
+    }
+)
+
+
+def unit_named(name: str) -> str:
+    """Return the name that this module has for a unit; an unknown one as it is."""
+    return _OTHER_NAMES.get(name, name)

@@ -1,25 +1,40 @@
-"""The YAML file that describes a valve."""
+"""The YAML file that describes a valve: plain, or as a node's parameters."""
 
-import difflib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import yaml
-
-from valve_friction_ros.identification import FIXABLE, require_valve_units
+from valve_friction_ros.identification import (
+    FIXABLE,
+    METHODS,
+    IdentificationSettings,
+    require_valve_units,
+)
 from valve_friction_ros.model import KarnoppParameters, Valve
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.valve_keys import (
+    COLUMNS,
+    GEOMETRY,
+    NODE_NAMES,
+    SETTINGS,
+    VALVE_KEYS,
+)
+from valve_friction_ros.records.yaml_file import read_yaml
 
 __all__ = ["ValveFile", "read_valve_file"]
 
-_GEOMETRY = tuple(field.name for field in fields(Valve))
+_BLOCK = "ros__parameters"
+_OUR_NODE = "identifier"
+_WHOLE = ("derivative_window", "polynomial_order")
 
 
 @dataclass(frozen=True)
 class ValveFile:
-    """A valve, and the nominal parameters in its file.
+    """A valve, and what else its file says.
 
     Attributes
     ----------
@@ -28,37 +43,17 @@ class ValveFile:
     known : mapping of str to float
         Nominal parameters by name: the mass is assumed where a record does not determine it, and
         each can be fixed by its name alone.
+    columns : Columns
+        How the tables of this valve are written.
+    settings : mapping of str to object
+        Settings of the identification by the names of the node's parameters, as
+        ``timing_uncertainty`` or ``fixed.mass``; without those that are not given.
     """
 
     valve: Valve
     known: MappingProxyType[str, float]
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """Refuses a repeated key; YAML would silently take the last value."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Build a mapping; refuse a repeated key."""
-        seen = set()
-        keys = (key for key, _ in node.value if isinstance(key, yaml.ScalarNode))
-        for key in keys:
-            if key.value in seen:
-                raise yaml.MarkedYAMLError(
-                    problem=f"{key.value} is given twice", problem_mark=key.start_mark
-                )
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-def read_yaml(path: Path) -> Any:
-    """Read a YAML file; raises ValueError, with the file and the cause, if that fails."""
-    try:
-        return yaml.load(path.read_text(encoding="utf-8"), _StrictLoader)  # noqa: S506 - is safe
-    except (OSError, UnicodeDecodeError) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
-        raise ValueError(f"{path}: cannot be read: {cause}") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+    columns: Columns = field(default_factory=Columns)
+    settings: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
 def _number(key: str, value: object) -> float:
@@ -68,7 +63,7 @@ def _number(key: str, value: object) -> float:
             return float(value)  # type: ignore[arg-type]
         except (TypeError, ValueError, OverflowError):
             pass
-    raise ValueError(f"{key} must be a number, got {value!r}")
+    raise ValueError(f"{key} must be a number, got {value!r:.80}")
 
 
 def _require_possible(known: Mapping[str, float]) -> None:
@@ -83,8 +78,110 @@ def _require_possible(known: Mapping[str, float]) -> None:
     KarnoppParameters(**{**harmless, **known})
 
 
-def read_valve_file(path: Path) -> ValveFile:
+def _blocks(content: Mapping[Any, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield each node's place and its parameters; places may be nested."""
+    for key, value in content.items():
+        if key == _BLOCK:
+            yield place, value
+        elif isinstance(value, Mapping):
+            yield from _blocks(value, f"{place}/{key}".replace("//", "/"))
+
+
+def _of_node(content: Mapping[Any, Any], valve: str | None) -> Mapping[Any, Any]:
+    """Return the parameters that the identifier of a valve takes from a parameter file."""
+    merged: dict[Any, Any] = {}
+    own: dict[str, dict[Any, Any]] = {}
+    for place, parameters in _blocks(content):
+        namespace, _, node = place.rpartition("/")
+        if node not in (_OUR_NODE, "*", "**") or not isinstance(parameters, Mapping):
+            continue
+        if namespace.strip("/*"):
+            own.setdefault(namespace.strip("/"), {}).update(parameters)
+        else:
+            merged.update(parameters)
+    if valve is not None:
+        chosen = own.get(valve.strip("/"), {})
+    elif len(own) > 1:
+        raise ValueError(
+            f"parameters of several valves ({', '.join(sorted(own))[:200]}): choose one by "
+            "--valve-name"
+        )
+    else:
+        chosen = next(iter(own.values()), {})
+    return {**merged, **chosen}
+
+
+def _is_of_nodes(content: Mapping[Any, Any]) -> bool:
+    return any(True for _ in _blocks(content))
+
+
+def _flat(content: Mapping[Any, Any], known: frozenset[str] | tuple[str, ...]) -> dict[str, Any]:
+    """Return all keys with dots between their levels; refuse unknown ones."""
+    values: dict[str, Any] = {}
+    for key, value in content.items():
+        nested = (
+            {f"{key}.{inner}": each for inner, each in value.items()}
+            if isinstance(value, Mapping) and key != COLUMNS
+            else {key: value}
+        )
+        for name, each in nested.items():
+            if name not in known and name != COLUMNS:
+                raise ValueError(
+                    f"unknown key {name!r:.80}; {nearest(name, (*VALVE_KEYS, COLUMNS))}"
+                )
+            values[name] = each
+    return values
+
+
+def _settings(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that are given: nan and a window of 0 stand for none."""
+    settings: dict[str, Any] = {}
+    for name in SETTINGS:
+        if name not in values:
+            continue
+        if name == "method":
+            if values[name] not in METHODS:
+                raise ValueError(f"method {values[name]!r:.60} is unknown: {', '.join(METHODS)}")
+            settings[name] = values[name]
+            continue
+        number = _number(name, values[name])
+        if name in _WHOLE and not number.is_integer():
+            raise ValueError(f"{name} must be a whole number, got {values[name]!r:.60}")
+        if not math.isnan(number) and (name != "derivative_window" or number):
+            settings[name] = int(number) if name in _WHOLE else number
+    return settings
+
+
+def _described(values: Mapping[str, Any]) -> ValveFile:
+    columns = Columns.section(values[COLUMNS]) if COLUMNS in values else Columns()
+    settings = _settings(values)
+    known = {name: _number(name, values[name]) for name in FIXABLE if name in values}
+    if "assumed_mass" in settings:
+        known.setdefault("mass", settings["assumed_mass"])
+    known.update(
+        (name, settings[f"fixed.{name}"]) for name in FIXABLE if f"fixed.{name}" in settings
+    )
+    _require_possible(known)
+    IdentificationSettings(
+        fixed={name: known[name] for name in FIXABLE if f"fixed.{name}" in settings}
+    )
+    valve = Valve(**{name: _number(name, values[name]) for name in GEOMETRY if name in values})
+    require_valve_units(valve, known)
+    return ValveFile(valve, MappingProxyType(known), columns, MappingProxyType(settings))
+
+
+def read_valve_file(path: Path, valve: str | None = None) -> ValveFile:
     r"""Read a valve from YAML: ``diaphragm_area`` and further known values, in SI units.
+
+    A file of parameters of ROS 2 nodes describes a valve too: what it gives to every node, or to
+    ``identifier``.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    valve : str, optional
+        Namespace of the valve in a file of several.
 
     Raises
     ------
@@ -94,7 +191,7 @@ def read_valve_file(path: Path) -> ValveFile:
     Returns
     -------
     ValveFile
-        The valve, and the nominal parameters that the file names.
+        The valve, and what else the file names.
 
     Examples
     --------
@@ -110,22 +207,15 @@ def read_valve_file(path: Path) -> ValveFile:
     content = read_yaml(path)
     if not isinstance(content, dict):
         raise ValueError(f"{path}: expected lines such as 'diaphragm_area: 0.0445'")
-    names = (*_GEOMETRY, *FIXABLE)
-    for key in content:
-        if key not in names:
-            close = difflib.get_close_matches(str(key), names, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else f"; known are {', '.join(names)}"
-            raise ValueError(f"{path}: unknown key {key!r}{hint}")
-    if "diaphragm_area" not in content:
-        raise ValueError(
-            f"{path}: diaphragm_area is missing: add a line such as 'diaphragm_area: 0.0445'"
-        )
     try:
-        numbers = {name: _number(name, value) for name, value in content.items()}
-        known = {name: value for name, value in numbers.items() if name in FIXABLE}
-        _require_possible(known)
-        valve = Valve(**{name: value for name, value in numbers.items() if name in _GEOMETRY})
-        require_valve_units(valve, known)
-    except ValueError as error:
+        if _is_of_nodes(content):
+            values = _flat(_of_node(content, valve), NODE_NAMES)
+        else:
+            values = _flat(content, VALVE_KEYS)
+        if "diaphragm_area" not in values:
+            raise ValueError(
+                "diaphragm_area is missing: add a line such as 'diaphragm_area: 0.0445'"
+            )
+        return _described(values)
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{path}: {error}") from None
-    return ValveFile(valve, MappingProxyType(known))

@@ -7,7 +7,7 @@ from typing import Any
 
 from valve_friction_ros.model import KarnoppParameters, SensorNoise, SquareWave, Valve
 from valve_friction_ros.model.checks import require_finite, require_positive
-from valve_friction_ros.records.valve_file import read_yaml
+from valve_friction_ros.records.yaml_file import read_yaml
 
 __all__ = ["BENCH_NAMES", "Bench", "find_bench_folder", "read_bench"]
 

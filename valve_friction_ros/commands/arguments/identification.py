@@ -2,6 +2,8 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
 
 from valve_friction_ros.identification import (
     CALIBRATION,
@@ -12,7 +14,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
 )
 
-__all__ = ["add_identification_arguments", "identification_settings"]
+__all__ = ["add_identification_arguments", "identification_settings", "method_name"]
 
 
 def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,10 +23,9 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--method",
         choices=[*METHODS],
-        default=DEFAULT_METHOD,
         help="best: robust wherever it applies; robust: imperfections of a plant in the fit; "
         "refined: the Karnopp model alone; published: the paper's model 1; signature: model 2, two "
-        "periods or more of a slow triangle (%(default)s)",
+        f"periods or more of a slow triangle ({DEFAULT_METHOD})",
     )
     parser.add_argument(
         "--fix",
@@ -58,17 +59,15 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{name.replace('_', '-')}",
             type=float,
-            default=getattr(defaults, name),
             metavar="SHARE",
             help=f"relative standard uncertainty of {what}, 0.02 for 2 %%: widens every interval "
-            "(%(default)g)",
+            f"({getattr(defaults, name):g})",
         )
     parser.add_argument(
         "--order",
         type=int,
-        default=defaults.order,
         metavar="N",
-        help="polynomial order n (%(default)s)",
+        help=f"polynomial order n ({defaults.order})",
     )
 
 
@@ -93,20 +92,39 @@ def _fixed(entries: Sequence[str], known: Mapping[str, float]) -> dict[str, floa
     return fixed
 
 
+def method_name(options: argparse.Namespace, described: Mapping[str, Any]) -> str:
+    """Return the method that was asked for, or else the valve file's."""
+    return str(options.method or described.get("method", DEFAULT_METHOD))
+
+
 def identification_settings(
-    options: argparse.Namespace, known: Mapping[str, float]
+    options: argparse.Namespace,
+    known: Mapping[str, float],
+    described: Mapping[str, Any] = MappingProxyType({}),
 ) -> IdentificationSettings:
     """Build the settings from the parsed arguments, and from what the valve file names.
 
-    Raises ValueError if they do not go together.
+    `described` are the valve file's settings; an option goes before them. Raises ValueError if they
+    do not go together.
     """
     defaults = IdentificationSettings()
+
+    def given(name: str, option: Any) -> Any:
+        if option is not None:
+            return option
+        return described.get(name, getattr(defaults, name, None))
+
+    fixed = {
+        name.removeprefix("fixed."): value
+        for name, value in described.items()
+        if name.startswith("fixed.")
+    }
     return IdentificationSettings(
-        derivative_window=options.derivative_window,
-        order=options.order,
-        fixed=_fixed(options.fix, known),
-        position_bias=options.position_bias,
-        timing_uncertainty=options.timing_uncertainty,
-        **{name: getattr(options, name) for name in CALIBRATION},
+        derivative_window=given("derivative_window", options.derivative_window),
+        order=given("polynomial_order", options.order) or defaults.order,
+        fixed={**fixed, **_fixed(options.fix, known)},
+        position_bias=given("position_bias", options.position_bias),
+        timing_uncertainty=given("timing_uncertainty", options.timing_uncertainty),
+        **{name: given(name, getattr(options, name)) for name in CALIBRATION},
         assumed_mass=known.get("mass", defaults.assumed_mass),
     )

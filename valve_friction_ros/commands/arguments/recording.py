@@ -2,19 +2,13 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
 
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice
-from valve_friction_ros.records.csv_recording import (
-    KNOWN_UNITS,
-    CsvColumns,
-    CsvFormat,
-    CsvUnits,
-)
-from valve_friction_ros.records.csv_table import CsvLayout
+from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, holds_force, read_recordings
 from valve_friction_ros.records.stretch import Stretch
@@ -23,14 +17,14 @@ from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 __all__ = [
     "add_reading_arguments",
     "add_recording_arguments",
+    "described",
     "read_one",
     "reading_options",
     "require_one",
-    "valve_of",
 ]
 
-_TABS = {"tab": "\t", "\\t": "\t"}
-"""What people type for a tab, which a shell makes hard to type."""
+_OWN_DESCRIPTION = "valve.yaml"
+"""The valve file in a bag, as ``~/save`` leaves it."""
 
 
 def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,14 +33,15 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         metavar="FILE",
-        help="recording: CSV, may be gzipped; or a bag of ROS 2, MCAP or SQLite3: its folder or "
-        "one of its files, may be compressed",
+        help="recording: CSV, may be gzipped, or - for standard input; Excel or Parquet; or a bag "
+        "of ROS 2, MCAP or SQLite3: its folder or one of its files, may be compressed",
     )
     parser.add_argument(
         "--valve",
         type=Path,
         metavar="FILE.yaml",
-        help="diaphragm_area, pressure_reference, travel …; needed unless the file holds force_n",
+        help="diaphragm_area, pressure_reference, travel, columns …, or parameters of an "
+        "identifier; needed unless the file holds force_n, or a bag its own valve.yaml",
     )
     add_reading_arguments(parser)
 
@@ -75,43 +70,38 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--joint", metavar="NAME", help="joint that is the stem (the only one, or 'stem')"
     )
     bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
-    table = parser.add_argument_group("CSV")
-    for name, units in KNOWN_UNITS.items():
-        header, unit = getattr(CsvColumns(), name), getattr(CsvUnits(), name)
-        table.add_argument(
-            f"--{name}-column", default=header, metavar="HEADER", help="column header (%(default)s)"
-        )
-        table.add_argument(
-            f"--{name}-unit",
-            default=unit,
-            choices=units,
-            metavar="UNIT",
-            help=f"{', '.join(units)} (%(default)s)",
-        )
-    table.add_argument(
-        "--delimiter",
-        default=",",
-        metavar="MARK",
-        help="between the entries of a row: , ; tab … (%(default)s)",
+    table = parser.add_argument_group(
+        "CSV, Excel, Parquet",
+        "each may stand in the valve file instead, in its section `columns:`, as time_column: Time",
     )
-    table.add_argument(
-        "--decimal", default=".", metavar="MARK", help="decimal mark, . or , (%(default)s)"
-    )
+    for each in fields(Columns):
+        option, text = f"--{each.name.replace('_', '-')}", each.metadata["help"]
+        if isinstance(each.default, bool):
+            table.add_argument(
+                option, action=argparse.BooleanOptionalAction, default=None, help=text
+            )
+        else:
+            table.add_argument(
+                option,
+                type=type(each.default),
+                metavar=each.metadata["metavar"],
+                help=f"{text} ({each.default})" if each.default else text,
+            )
 
 
-def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
-    """Build the options of reading from the parsed arguments.
+def reading_options(
+    arguments: argparse.Namespace, columns: Columns | None = None
+) -> ReadingOptions:
+    """Build the options of reading from the parsed arguments, and from what the valve file says.
 
     Raises ValueError if they do not go together.
     """
-    columns = {
-        field.name: getattr(arguments, f"{field.name}_column") for field in fields(CsvColumns)
-    }
-    units = {field.name: getattr(arguments, f"{field.name}_unit") for field in fields(CsvUnits)}
-    delimiter = _TABS.get(arguments.delimiter, arguments.delimiter)
+    options = {each.name: getattr(arguments, each.name) for each in fields(Columns)}
+    given = {name: value for name, value in options.items() if value is not None}
     return ReadingOptions(
-        CsvFormat(
-            CsvColumns(**columns), CsvUnits(**units), CsvLayout(delimiter, arguments.decimal)
+        replace(
+            columns or Columns(),
+            **{name: value for name, value in given.items() if value is not None},
         ),
         TopicChoice(
             arguments.pressure_topic, arguments.stem_topic, arguments.joint, arguments.valve_name
@@ -120,16 +110,33 @@ def reading_options(arguments: argparse.Namespace) -> ReadingOptions:
     )
 
 
-def valve_of(recording: Path, valve_file: Path | None, reading: ReadingOptions) -> ValveFile:
-    """Read the valve file of a recording; a recorded force needs none.
+def _own_description(recording: Path) -> Path | None:
+    folder = recording if recording.is_dir() else recording.parent
+    place = folder / _OWN_DESCRIPTION
+    is_own = recording.is_dir() or (folder / "metadata.yaml").exists()
+    return place if is_own and place.is_file() else None
+
+
+def described(
+    recording: Path, valve_file: Path | None, arguments: argparse.Namespace
+) -> tuple[ValveFile, ReadingOptions]:
+    """Read the valve file of a recording, or that in a bag; a recorded force needs none.
+
+    Return the options of reading too.
 
     Raises ValueError if the valve file cannot be read, or is needed and not given.
     """
+    valve_file = valve_file or _own_description(recording)
     if valve_file is not None:
-        return read_valve_file(valve_file)
+        description = read_valve_file(valve_file, arguments.valve_name)
+        return description, reading_options(arguments, description.columns)
+    reading = reading_options(arguments)
     if not holds_force(recording, reading):
-        raise ValueError("pressure needs the diaphragm_area: give a valve file by --valve")
-    return ValveFile(Valve(), MappingProxyType({}))
+        raise ValueError(
+            "pressure needs the diaphragm_area: give a valve file by --valve; "
+            "`valve_friction describe-valve` writes one"
+        )
+    return ValveFile(Valve(), MappingProxyType({})), reading
 
 
 def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:

@@ -5,8 +5,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from valve_friction_ros.commands.arguments.identification import identification_settings
-from valve_friction_ros.commands.arguments.recording import reading_options, valve_of
+from valve_friction_ros.commands.arguments.identification import (
+    identification_settings,
+    method_name,
+)
+from valve_friction_ros.commands.arguments.recording import described
 from valve_friction_ros.fleet import (
     Baselines,
     Entry,
@@ -51,18 +54,18 @@ def make_plan(
     reports: Path | None,
 ) -> Iterator[Plan]:
     """Plan each recording, in the order of their names; `reports` is the folder of the reports."""
-    reading = reading_options(options)
 
     def plan(found: FoundRecording) -> Plan:
         content = ""
         try:
             content = found.content()
-            description = valve_of(found.path, _valve_file(found, options.valve), reading)
+            valve_file = _valve_file(found, options.valve)
+            description, reading = described(found.path, valve_file, options)
             wanted = Options(
                 description.valve,
                 reading,
-                options.method,
-                identification_settings(options, description.known),
+                method_name(options, description.settings),
+                identification_settings(options, description.known, description.settings),
                 baselines.of(found.name),
             )
         except (ValueError, OSError) as error:

@@ -1,0 +1,176 @@
+"""How a table of samples is written: its columns, their units, and its layout."""
+
+import codecs
+import math
+import zoneinfo
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any
+
+from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.units import (
+    FORCE_UNITS,
+    NANOSECONDS,
+    PERCENT,
+    POSITION_UNITS,
+    PRESSURE_UNITS,
+    unit_named,
+)
+
+__all__ = ["KNOWN_UNITS", "Columns"]
+
+KNOWN_UNITS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "time": (*NANOSECONDS,),
+        "position": (*POSITION_UNITS, PERCENT),
+        "pressure": (*PRESSURE_UNITS,),
+        "force": (*FORCE_UNITS,),
+    }
+)
+"""Names of the units in which a column may be."""
+
+_DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
+"""What people type for characters that a shell makes hard to type."""
+
+
+def _described(default: Any, text: str, metavar: str = "") -> Any:
+    return field(default=default, metadata={"help": text, "metavar": metavar})
+
+
+def _units(quantity: str) -> str:
+    return ", ".join(KNOWN_UNITS[quantity])
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What a table holds and how it is written, in the words of the options of the commands.
+
+    The same words are the keys of the section ``columns:`` of a valve file. Units are those of
+    `records.units`; an empty text leaves out what it describes.
+
+    Raises ValueError, which names the word, if a value is impossible.
+    """
+
+    time_column: str = _described("time_s", "header of the time", "HEADER")
+    time_unit: str = _described(
+        "s", f"{_units('time')}; ISO 8601 is recognized, whatever the unit", "UNIT"
+    )
+    time_zone: str = _described(
+        "", "zone of local times that name none, as Europe/Berlin; without it: UTC", "ZONE"
+    )
+    time_format: str = _described(
+        "", "form of other dates, as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
+    )
+    position_column: str = _described("position_m", "header of the stem position", "HEADER")
+    position_unit: str = _described("m", _units("position"), "UNIT")
+    inverted_position: bool = _described(
+        False,
+        "the position falls while the pressure pushes the stem, as the opening of an air-to-close "
+        "valve: take the travel (100 %%) less the position",
+    )
+    pressure_column: str = _described("pressure_pa", "header of the pressure", "HEADER")
+    pressure_unit: str = _described("Pa", _units("pressure"), "UNIT")
+    opposing_pressure_column: str = _described(
+        "", "header of the pressure on the other side of a double-acting actuator", "HEADER"
+    )
+    opposing_area_ratio: float = _described(
+        1.0, "area of the other side (that of the rod) over diaphragm_area", "RATIO"
+    )
+    force_column: str = _described("force_n", "header of the force", "HEADER")
+    force_unit: str = _described("N", _units("force"), "UNIT")
+    delimiter: str = _described(",", "between the entries of a row: , ; tab …", "MARK")
+    decimal: str = _described(".", "decimal mark, . or ,", "MARK")
+    encoding: str = _described(
+        "", "as utf-16 or cp1252; without it: by its first bytes, else UTF-8", "NAME"
+    )
+    skip_rows: int = _described(
+        0, "rows to skip at the top; those above the headers are found without it", "N"
+    )
+    comment: str = _described("", "leave out rows that begin with this mark, as #", "MARK")
+    sheet: str = _described("", "sheet of a workbook; without it: the first", "NAME")
+    maximum_rows: int = _described(10_000_000, "most rows to read", "N")
+    maximum_megabytes: float = _described(2000.0, "most of the file to read, unpacked", "MB")
+
+    def __post_init__(self) -> None:
+        """Refuse impossible values."""
+        set_ = object.__setattr__
+        set_(self, "delimiter", _DELIMITERS.get(self.delimiter, self.delimiter))
+        for quantity, known in KNOWN_UNITS.items():
+            name = f"{quantity}_unit"
+            unit = unit_named(getattr(self, name))
+            if unit not in known:
+                raise ValueError(
+                    f"unknown unit of {quantity} {unit[:40]!r}; known are {', '.join(known)}"
+                )
+            set_(self, name, unit)
+        self._require_layout()
+        self._require_clock()
+        if not (math.isfinite(self.opposing_area_ratio) and 0 < self.opposing_area_ratio <= 2):
+            raise ValueError(
+                f"opposing_area_ratio must be above 0 and at most 2, got {self.opposing_area_ratio}"
+            )
+        if not self.maximum_rows > 0 or not self.maximum_megabytes > 0 or self.skip_rows < 0:
+            raise ValueError(
+                "maximum_rows and maximum_megabytes must be above zero, and skip_rows not negative"
+            )
+
+    def _require_layout(self) -> None:
+        if len(self.delimiter) != 1 or self.delimiter in '"\r\n+-.' or self.delimiter.isalnum():
+            raise ValueError(
+                f"the delimiter must be one character such as ',', ';' or a tab, got "
+                f"{self.delimiter[:40]!r}"
+            )
+        if self.decimal not in (".", ","):
+            raise ValueError(f"the decimal mark must be '.' or ',', got {self.decimal[:40]!r}")
+        if self.decimal == self.delimiter:
+            raise ValueError(f"delimiter and decimal mark are both {self.decimal!r}")
+        try:
+            if self.encoding:
+                "".encode(self.encoding)
+                codecs.lookup(self.encoding)
+        except (LookupError, ValueError):
+            raise ValueError(
+                f"unknown encoding {self.encoding[:40]!r}: known are utf-8, utf-16, cp1252, "
+                "latin-1 and those of Python"
+            ) from None
+
+    def _require_clock(self) -> None:
+        try:
+            if self.time_zone:
+                zoneinfo.ZoneInfo(self.time_zone)
+        except (LookupError, ValueError, OSError):
+            known = zoneinfo.available_timezones()
+            hint = nearest(self.time_zone, sorted(known)) if known else "install tzdata"
+            raise ValueError(f"unknown time_zone {self.time_zone[:40]!r}: {hint}") from None
+
+    @classmethod
+    def section(cls, content: object) -> "Columns":
+        """Build it from the section ``columns:`` of a valve file.
+
+        Raises ValueError, which names the key, for one that is unknown or impossible.
+        """
+        if not isinstance(content, Mapping):
+            raise ValueError("columns must be lines such as 'time_column: Time'")
+        known = {each.name: type(each.default) for each in fields(cls)}
+        values = {}
+        for key, value in content.items():
+            if key not in known:
+                raise ValueError(f"columns: unknown key {key!r:.60}; {nearest(key, known)}")
+            values[key] = _of_kind(key, value, known[key])
+        try:
+            return cls(**values)
+        except ValueError as error:
+            raise ValueError(f"columns: {error}") from None
+
+
+def _of_kind(key: str, value: object, kind: type) -> Any:
+    """Return a value of YAML as `kind`; a header may be a number, and a number a whole one."""
+    if kind is str and isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        return str(value)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if type(value) is kind:
+        return value
+    words = {str: "a text", bool: "true or false", int: "a whole number", float: "a number"}
+    raise ValueError(f"columns: {key} must be {words[kind]}, got {value!r:.60}")

@@ -1,0 +1,22 @@
+"""Names that nobody knows, and the nearest one that somebody does."""
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["nearest"]
+
+_MOST_NAMED = 12
+"""Names in a message. Chosen: it stays readable."""
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
+    """Return the end of a message about an unknown name: the nearest known one, or all of few."""
+    names = list(known)
+    text = str(name)[:100]
+    close = difflib.get_close_matches(text, names, n=1)
+    if not close:  # such as position for position_column
+        close = [each for each in names if text and text in each.split("_")][:1]
+    if close:
+        return f"did you mean {close[0]!r}?"
+    more = ", …" if len(names) > _MOST_NAMED else ""
+    return f"known are {', '.join(names[:_MOST_NAMED])}{more}"

@@ -1,0 +1,1 @@
+"""Tables of text and numbers: CSV, Excel and Parquet, read row by row."""
