@@ -455,7 +455,12 @@ class TestUnreadableFiles:
     def test_no_table_at_all(self, tmp_path):
         path = tmp_path / "record.csv"
         path.write_bytes(b"x" * 200_000)
+        message = refused(path)
+        assert message.startswith(f"no column 'pressure_pa' (or 'force_n'), only '{'x' * 40}…'")
+        path.write_bytes(b'"' + b"x" * 200_000)
         assert refused(path) == "cannot be read as CSV: field larger than field limit (131072)"
+        path.write_bytes(b"x" * 2_000_000)
+        assert refused(path).startswith("cannot be read as CSV: a line has more than 1048576 bytes")
 
     def packed(self, write):
         """Enough gzipped text that its header can be read without its end."""

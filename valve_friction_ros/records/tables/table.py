@@ -123,7 +123,7 @@ class OpenTable:
             raise ValueError("Python reads what no file means by a number")
         if is_comma:
             texts = [text.replace(self.form.decimal, ".") for text in texts]
-        return np.array(texts, dtype=np.float64)
+        return np.fromiter(map(float, texts), np.float64, len(texts))
 
     def _is_number(self, text: str) -> bool:
         try:
