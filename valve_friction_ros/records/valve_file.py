@@ -25,7 +25,7 @@ from valve_friction_ros.records.valve_keys import (
 )
 from valve_friction_ros.records.yaml_file import read_yaml
 
-__all__ = ["ValveFile", "read_valve_file"]
+__all__ = ["ValveFile", "read_valve_file", "valve_file_of"]
 
 _BLOCK = "ros__parameters"
 _OUR_NODE = "identifier"
@@ -204,10 +204,14 @@ def read_valve_file(path: Path, valve: str | None = None) -> ValveFile:
     >>> described.valve.diaphragm_area, described.known["mass"]
     (0.0445, 1.6)
     """
-    content = read_yaml(path)
-    if not isinstance(content, dict):
-        raise ValueError(f"{path}: expected lines such as 'diaphragm_area: 0.0445'")
+    return valve_file_of(read_yaml(path), path, valve)
+
+
+def valve_file_of(content: object, path: Path, valve: str | None = None) -> ValveFile:
+    """Build a valve from the content of the YAML file `path`, as `read_valve_file` does."""
     try:
+        if not isinstance(content, dict):
+            raise ValueError("expected lines such as 'diaphragm_area: 0.0445'")
         if _is_of_nodes(content):
             values = _flat(_of_node(content, valve), NODE_NAMES)
         else:

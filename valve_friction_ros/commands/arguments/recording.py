@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice
@@ -17,7 +18,9 @@ from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 __all__ = [
     "add_reading_arguments",
     "add_recording_arguments",
+    "add_table_arguments",
     "described",
+    "given_columns",
     "read_one",
     "reading_options",
     "require_one",
@@ -70,10 +73,15 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--joint", metavar="NAME", help="joint that is the stem (the only one, or 'stem')"
     )
     bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
-    table = parser.add_argument_group(
-        "CSV, Excel, Parquet",
+    add_table_arguments(
+        parser,
         "each may stand in the valve file instead, in its section `columns:`, as time_column: Time",
     )
+
+
+def add_table_arguments(parser: argparse.ArgumentParser, text: str) -> None:
+    """Declare how a table is written."""
+    table = parser.add_argument_group("CSV, Excel, Parquet", text)
     for each in fields(Columns):
         option, text = f"--{each.name.replace('_', '-')}", each.metadata["help"]
         if isinstance(each.default, bool):
@@ -87,6 +95,12 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
                 metavar=each.metadata["metavar"],
                 help=f"{text} ({each.default})" if each.default else text,
             )
+
+
+def given_columns(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return what the parsed arguments say of a table."""
+    options = {each.name: getattr(arguments, each.name) for each in fields(Columns)}
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def reading_options(

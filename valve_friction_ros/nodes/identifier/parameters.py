@@ -14,6 +14,7 @@ from valve_friction_ros.identification import (
     TIMING_UNCERTAINTY,
     UNITS,
     IdentificationSettings,
+    require_valve_units,
 )
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT, VALVE_PARAMETERS, valve_from
@@ -202,5 +203,6 @@ def baseline_from(values: Mapping[str, Any]) -> Baseline | None:
 
 def require_valid(values: Mapping[str, Any]) -> None:
     """Raise ValueError, which names the broken rule, if parameter values break one."""
-    monitor_settings(values)
+    settings = monitor_settings(values)
+    require_valve_units(settings.valve, settings.identification.fixed)
     baseline_from(values)

@@ -1,8 +1,11 @@
 """Declaration of node parameters, each with a description, a unit and a range."""
 
 import contextlib
+import difflib
+import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +18,13 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.valve_keys import NODE_NAMES, is_known
+
 __all__ = ["ParameterSpec", "declare_parameters", "optional", "reject_invalid", "values_of"]
+
+_RESEMBLES = 0.8
+"""Likeness (difflib) of a misspelled name. Chosen: two letters of ten may differ."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +68,12 @@ def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
     """Declare `specs` on `node`; raises rclpy's parameter exceptions for a bad override.
 
     A number may be set later as its text, because ``ros2 param load`` sends ``.nan`` and ``1e-06``
-    as texts.
+    as texts. Raises ValueError for an override whose name no node of this package has, if it was
+    given by ``-p`` or resembles one; others, as in a file that nodes of several packages share, are
+    logged.
     """
     declared = tuple(specs)
+    _require_known(node, {spec.name for spec in declared})
     for spec in declared:
         node.declare_parameter(spec.name, spec.default, spec.descriptor())
     numbers = {spec.name for spec in declared if isinstance(spec.default, float)}
@@ -70,6 +82,28 @@ def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
         return [_read(change) if change.name in numbers else change for change in changes]
 
     node.add_pre_set_parameters_callback(read_numbers)
+
+
+def _typed_names(arguments: Sequence[str]) -> set[str]:
+    """Return the names that stand behind ``-p``, in any node's favour."""
+    behind = (word for option, word in itertools.pairwise(arguments) if option in ("-p", "--param"))
+    return {word.partition(":=")[0].rpartition(":")[2] for word in behind}
+
+
+def _require_known(node: Node, names: Collection[str]) -> None:
+    """Refuse overrides that nothing would ever read."""
+    overrides = getattr(node, "_parameter_overrides", {})  # rclpy offers no other way to them
+    typed = _typed_names(sys.argv)
+    for name in overrides:
+        if name in names or is_known(name):
+            continue
+        close = difflib.get_close_matches(name, {*names, *NODE_NAMES}, n=1, cutoff=_RESEMBLES)
+        if close or name in typed:
+            hint = nearest(name, close or sorted(names))
+            raise ValueError(f"{node.get_name()} has no parameter {name!r}: {hint}")
+        node.get_logger().warning(
+            f"no node of this package has the parameter {name!r}: it is ignored"
+        )
 
 
 def _read(parameter: Parameter) -> Parameter:
