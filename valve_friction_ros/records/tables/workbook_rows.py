@@ -54,14 +54,12 @@ def _excel(path: Path, columns: Columns) -> Iterator[tuple[Any, ...]]:
         raise ValueError(
             f"{size:.4g} MB, unpacked: raise maximum_megabytes (--maximum-megabytes), or cut it"
         )
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    try:
+    with path.open("rb") as stream:  # a name without .xlsx would be refused
+        book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
         if columns.sheet and columns.sheet not in book.sheetnames:
             raise ValueError(f"no sheet {columns.sheet!r} among {', '.join(book.sheetnames)}")
         sheet = book[columns.sheet] if columns.sheet else book.worksheets[0]
         yield from sheet.iter_rows(values_only=True)
-    finally:
-        book.close()
 
 
 def _parquet(path: Path, columns: Columns) -> Iterator[tuple[Any, ...]]:
