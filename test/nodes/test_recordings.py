@@ -1,6 +1,7 @@
 """Recorded topics and saved buffers: the command reads out of them what the node found."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -130,7 +131,8 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
     saved = Path(response.message)
     assert saved.parent == run.folder / "saved"
     assert re.fullmatch(r"fv_101_\d{8}T\d{6}Z", saved.name)
-    assert numbers_of(identified(saved, "--valve", saved / "valve.yaml")) == run.numbers
+    for options in (("--valve", saved / "valve.yaml"), ()):  # its own is found
+        assert numbers_of(identified(saved, *options)) == run.numbers
 
 
 def test_the_refined_numbers_and_their_evidence_are_those_of_the_node(run):
@@ -140,7 +142,21 @@ def test_the_refined_numbers_and_their_evidence_are_those_of_the_node(run):
     assert run.client.set_together(IDENTIFIER, {"method": "best"}).successful
     assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
     saved = Path(run.client.trigger("save").message)
-    answer = identified(saved, "--valve", saved / "valve.yaml", "--method", "refined")
+    answer = identified(saved, "--method", "refined")
+    assert numbers_of(answer) == numbers
+
+
+def test_a_saved_buffer_knows_the_settings_of_the_node(run):
+    changes = {"method": "refined", "fixed.mass": 1.6, "derivative_window": 51}
+    assert run.client.set_together(IDENTIFIER, changes).successful
+    assert run.client.trigger("identify").success
+    numbers = told_by(run.client)
+    saved = Path(run.client.trigger("save").message)
+    before = {"method": "best", "fixed.mass": math.nan, "derivative_window": 0}
+    assert run.client.set_together(IDENTIFIER, before).successful
+    answer = identified(saved)
+    assert answer["method"] == "refined"
+    assert answer["parameters"]["mass"]["verdict"] == "fixed"
     assert numbers_of(answer) == numbers
 
 

@@ -34,7 +34,7 @@ def buffer(loose_record):
 
 
 def write(folder, buffer, name="fv_101", valve=BENCH_VALVE):
-    return write_bag(folder, name, buffer.snapshot(), NAMES, valve, 1.6)
+    return write_bag(folder, name, buffer.snapshot(), NAMES, valve, {"assumed_mass": 1.6})
 
 
 def test_every_sample_to_the_last_bit(tmp_path, buffer):
@@ -132,7 +132,7 @@ for number in range(2000):
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 try:
     names = StreamNames("/p", "/x", "")
-    write_bag(Path(sys.argv[1]), "fv_101", buffer.snapshot(), names, BENCH_VALVE, 1.0)
+    write_bag(Path(sys.argv[1]), "fv_101", buffer.snapshot(), names, BENCH_VALVE, {})
 except OSError as error:
     print(error.strerror)
 """

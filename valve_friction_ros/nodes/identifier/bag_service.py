@@ -12,6 +12,7 @@ from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
 from valve_friction_ros.records.bags.libraries import bag_libraries
 from valve_friction_ros.records.bags.topics import StreamNames
+from valve_friction_ros.records.valve_keys import SETTINGS
 
 __all__ = ["saved_bag"]
 
@@ -26,6 +27,7 @@ async def saved_bag(
     given = node.get_parameter(SAVE_FOLDER.name).value
     name = file_name(node, node.get_clock().now().nanoseconds)
     snapshot, settings = monitor.input()
+    described = {name: node.get_parameter(name).value for name in SETTINGS}
 
     def write() -> Path:
         # Costs memory and time at the start, and most nodes never save.
@@ -35,8 +37,7 @@ async def saved_bag(
         except ValueError as error:
             raise RefusalError(str(error)) from None
 
-        mass = settings.identification.assumed_mass
         with output_folder(given, "saved", "a bag") as folder:
-            return write_bag(folder, name, snapshot, names, settings.valve, mass)
+            return write_bag(folder, name, snapshot, names, settings.valve, described)
 
     return await done_in(worker, write)

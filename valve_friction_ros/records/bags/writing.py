@@ -6,10 +6,10 @@ import os
 import shutil
 import struct
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import yaml
@@ -118,15 +118,15 @@ def write_bag(
     snapshot: Snapshot,
     names: StreamNames,
     valve: Valve,
-    assumed_mass: float,
+    settings: Mapping[str, Any],
 ) -> Path:
     """Write a snapshot as a bag of MCAP, with the stamps it was received with; return its path.
 
     It is written in a hidden folder beside its place and then renamed, so that nobody reads
     half a bag. The folder is made if it is not there; where the name is taken, a number is put
-    after it. Rejected samples are only counted, in the metadata. A valve file with the assumed mass
-    (kg) lies in the bag: `valve_friction identify BAG --valve BAG/valve.yaml` gives the numbers
-    that the snapshot gives.
+    after it. Rejected samples are only counted, in the metadata. A valve file lies in the bag, with
+    the settings of the identification by the names of `records.valve_keys`: `valve_friction
+    identify BAG` gives the numbers that the snapshot gives.
 
     Raises RefusalError if there is nothing to write, and OSError if it cannot be written; then
     nothing is left behind.
@@ -141,7 +141,7 @@ def write_bag(
     try:
         whole = workplace / name
         _write(whole, snapshot, names)
-        description = yaml.safe_dump({**asdict(valve), "mass": assumed_mass}, sort_keys=False)
+        description = yaml.safe_dump({**asdict(valve), **settings}, sort_keys=False)
         (whole / VALVE_FILE).write_text(description, encoding="utf-8")
         _flush(whole)
         return _moved(whole, folder, name)
