@@ -147,7 +147,7 @@ def test_the_refined_numbers_and_their_evidence_are_those_of_the_node(run):
 
 
 def test_a_saved_buffer_knows_the_settings_of_the_node(run):
-    changes = {"method": "refined", "fixed.mass": 1.6, "derivative_window": 51}
+    changes = {"method": "refined", "fixed.mass": 1.6, "derivative_window": 21}
     assert run.client.set_together(IDENTIFIER, changes).successful
     assert run.client.trigger("identify").success
     numbers = told_by(run.client)

@@ -34,6 +34,7 @@ from valve_friction_ros.identification import (
     Result,
 )
 from valve_friction_ros.model import Valve
+from valve_friction_ros.records.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.stretch import Stretch
@@ -101,7 +102,7 @@ def _print_tables(results: Sequence[_Answer]) -> None:
         if isinstance(outcome, RefusalError):
             continue
         if len(results) > 1:
-            print("\n" * (printed > 0) + recorded.name)
+            print("\n" * (printed > 0) + printable(recorded.name))
         print_table(outcome, recorded.notes, diagnosis)
         printed += 1
 

@@ -24,6 +24,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.identification.trust.misfit import LEAST_FIT
 from valve_friction_ros.model import Valve
+from valve_friction_ros.records.outside_text import printable
 
 __all__ = ["REFUSALS", "declare", "run"]
 
@@ -137,7 +138,7 @@ def _print(result: _Result, poor: str) -> None:
     print(f"rms error {validation.rms * 1e6:.3g} µm{of_travel}")
     print(f"largest error {validation.maximum_error * 1e6:.3g} µm")
     for note in notes:
-        print(f"note: {note}")
+        print(f"note: {printable(note)}")
 
 
 def _draw(result: _Result, path: Path) -> None:

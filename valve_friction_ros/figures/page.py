@@ -26,7 +26,12 @@ def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
     """
     figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
     figure.suptitle(
-        textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
+        textwrap.fill(title, _TITLE_WIDTH),
+        fontsize=12,
+        fontweight="bold",
+        x=0.02,
+        ha="left",
+        parse_math=False,
     )
     if notes:
         shown = [f"note: {note}" for note in notes[:_MOST_NOTES]]

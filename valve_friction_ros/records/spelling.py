@@ -3,10 +3,18 @@
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["nearest"]
+__all__ = ["nearest", "resembling"]
 
 _MOST_NAMED = 12
 """Names in a message. Chosen: it stays readable."""
+
+_RESEMBLES = 0.8
+"""Likeness (difflib) of a misspelled name. Chosen: two letters of ten may differ."""
+
+
+def resembling(name: str, known: Iterable[str]) -> list[str]:
+    """Return the known name that a misspelled one resembles, if there is one."""
+    return difflib.get_close_matches(name, known, n=1, cutoff=_RESEMBLES)
 
 
 def nearest(name: object, known: Iterable[str]) -> str:

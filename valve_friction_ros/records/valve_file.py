@@ -15,13 +15,14 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.model import KarnoppParameters, Valve
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.spelling import nearest, resembling
 from valve_friction_ros.records.valve_keys import (
     COLUMNS,
     GEOMETRY,
     NODE_NAMES,
     SETTINGS,
     VALVE_KEYS,
+    is_known,
 )
 from valve_friction_ros.records.yaml_file import read_yaml
 
@@ -115,8 +116,11 @@ def _is_of_nodes(content: Mapping[Any, Any]) -> bool:
     return any(True for _ in _blocks(content))
 
 
-def _flat(content: Mapping[Any, Any], known: frozenset[str] | tuple[str, ...]) -> dict[str, Any]:
-    """Return all keys with dots between their levels; refuse unknown ones."""
+def _flat(content: Mapping[Any, Any], is_shared: bool) -> dict[str, Any]:
+    """Return all keys with dots between their levels; refuse unknown ones.
+
+    In a file that is shared with nodes of other packages, only those that resemble a known one.
+    """
     values: dict[str, Any] = {}
     for key, value in content.items():
         nested = (
@@ -125,7 +129,10 @@ def _flat(content: Mapping[Any, Any], known: frozenset[str] | tuple[str, ...]) -
             else {key: value}
         )
         for name, each in nested.items():
-            if name not in known and name != COLUMNS:
+            is_other = is_shared and (
+                is_known(str(name)) or not resembling(str(name), (*NODE_NAMES, COLUMNS))
+            )
+            if name not in (*VALVE_KEYS, COLUMNS) and not is_other:
                 raise ValueError(
                     f"unknown key {name!r:.80}; {nearest(name, (*VALVE_KEYS, COLUMNS))}"
                 )
@@ -213,9 +220,9 @@ def valve_file_of(content: object, path: Path, valve: str | None = None) -> Valv
         if not isinstance(content, dict):
             raise ValueError("expected lines such as 'diaphragm_area: 0.0445'")
         if _is_of_nodes(content):
-            values = _flat(_of_node(content, valve), NODE_NAMES)
+            values = _flat(_of_node(content, valve), is_shared=True)
         else:
-            values = _flat(content, VALVE_KEYS)
+            values = _flat(content, is_shared=False)
         if "diaphragm_area" not in values:
             raise ValueError(
                 "diaphragm_area is missing: add a line such as 'diaphragm_area: 0.0445'"

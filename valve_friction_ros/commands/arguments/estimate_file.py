@@ -6,8 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from valve_friction_ros.identification import PARAMETER_UNITS
+from valve_friction_ros.records.spelling import nearest
 
 __all__ = ["read_estimate"]
+
+_LARGEST = 10_000_000
+"""Most bytes of an estimate. Chosen: `identify --json` writes some ten thousand."""
 
 
 def _value(path: Path, name: str, entry: Any) -> float:
@@ -17,8 +21,13 @@ def _value(path: Path, name: str, entry: Any) -> float:
     if value is None:
         return math.nan
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{path}: parameters.{name}.value must be a number or null, got {value!r}")
-    return float(value)
+        raise ValueError(
+            f"{path}: parameters.{name}.value must be a number or null, got {value!r:.80}"
+        )
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{path}: parameters.{name}.value is too large") from None
 
 
 def read_estimate(path: Path) -> dict[str, float]:
@@ -27,12 +36,21 @@ def read_estimate(path: Path) -> dict[str, float]:
     Raises ValueError, one line with the file and what it lacks.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as stream:
+            text = stream.read(_LARGEST + 1)
+        if len(text) > _LARGEST:
+            raise ValueError(
+                f"{path}: more than {_LARGEST // 1_000_000} MB: no estimate is so long"
+            )
+        content = json.loads(text.decode("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         cause = (isinstance(error, OSError) and error.strerror) or error
         raise ValueError(f"{path}: cannot be read: {cause}") from None
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
+    except ValueError as error:  # a number of thousands of digits
+        cause = str(error).removeprefix(f"{path}: ")
+        raise ValueError(f"{path}: {cause}") from None
     if isinstance(content, dict) and "valves" in content:
         raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
     parameters = content.get("parameters") if isinstance(content, dict) else None
@@ -42,5 +60,6 @@ def read_estimate(path: Path) -> dict[str, float]:
         )
     for name in parameters:
         if name not in PARAMETER_UNITS:
-            raise ValueError(f"{path}: unknown parameter {name!r}")
+            hint = nearest(name, PARAMETER_UNITS)
+            raise ValueError(f"{path}: unknown parameter {name!r:.80}; {hint}")
     return {name: _value(path, name, entry) for name, entry in parameters.items()}

@@ -10,6 +10,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
+from valve_friction_ros.records.outside_text import printable
+
 __all__ = [
     "PROGRAM",
     "ExitCode",
@@ -84,6 +86,7 @@ def complain(command: str, error: Exception | str) -> None:
     """
     speaker = " ".join(filter(None, (PROGRAM, command)))
     try:
-        print(f"{speaker}:", *_text(error).splitlines(), file=sys.stderr)
+        lines = _text(error).splitlines()
+        print(f"{speaker}:", *map(printable, lines), file=sys.stderr)
     except OSError:  # a full device, or a closed pipe: there is nowhere else to say it
         silence(sys.stderr)

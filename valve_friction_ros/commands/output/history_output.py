@@ -19,6 +19,7 @@ from valve_friction_ros.identification import (
     plain,
     two_digits,
 )
+from valve_friction_ros.records.outside_text import cell, printable
 from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["as_json", "print_table", "write_csv"]
@@ -129,7 +130,7 @@ def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     text = io.StringIO()
     writer = csv.DictWriter(text, header, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({name: cell(value) for name, value in row.items()} for row in rows)
     write_whole(path, text.getvalue().encode())
 
 
@@ -153,7 +154,7 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             "diagnosis",
             box=None,
             header_style="bold",
-            title=f"{tag}{history.valve.name}",
+            title=printable(f"{tag}{history.valve.name}"),
             title_justify="left",
         )
         for column in (1, 2, 4):

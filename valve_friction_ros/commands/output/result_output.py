@@ -5,6 +5,7 @@ from typing import Any
 
 from valve_friction_ros.health import Diagnosis
 from valve_friction_ros.identification import Result
+from valve_friction_ros.records.outside_text import printable
 
 __all__ = ["as_json", "print_table"]
 
@@ -27,6 +28,6 @@ def print_table(
     """Print a result for people; `notes` join its warnings, and a `diagnosis` ends it."""
     print(result.summary())
     for note in notes:
-        print(f"note: {note}")
+        print(f"note: {printable(note)}")
     if diagnosis is not None:
         print(diagnosis)

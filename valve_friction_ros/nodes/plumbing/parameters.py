@@ -1,7 +1,6 @@
 """Declaration of node parameters, each with a description, a unit and a range."""
 
 import contextlib
-import difflib
 import itertools
 import math
 import sys
@@ -18,13 +17,10 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.spelling import nearest, resembling
 from valve_friction_ros.records.valve_keys import NODE_NAMES, is_known
 
 __all__ = ["ParameterSpec", "declare_parameters", "optional", "reject_invalid", "values_of"]
-
-_RESEMBLES = 0.8
-"""Likeness (difflib) of a misspelled name. Chosen: two letters of ten may differ."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +93,7 @@ def _require_known(node: Node, names: Collection[str]) -> None:
     for name in overrides:
         if name in names or is_known(name):
             continue
-        close = difflib.get_close_matches(name, {*names, *NODE_NAMES}, n=1, cutoff=_RESEMBLES)
+        close = resembling(name, {*names, *NODE_NAMES})
         if close or name in typed:
             hint = nearest(name, close or sorted(names))
             raise ValueError(f"{node.get_name()} has no parameter {name!r}: {hint}")

@@ -1,0 +1,141 @@
+"""`describe-valve`: what people have in hand becomes a valve file that commands and nodes read."""
+
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.valve_file import read_valve_file
+
+SINGLE = {
+    "tag": "FV-101",
+    "area": "690 cm2",
+    "travel": "1.125 in",
+    "acting": "single",
+    "spring_range": "3..15 psi",
+    "air_to": "close",
+    "position": "plug",
+    "sensor": "absolute",
+    "sensor_range": "0..7 bar",
+    "mass": "3.5 lb",
+}
+
+
+def options(answers):
+    return [f"--{name.replace('_', '-')}={value}" for name, value in answers.items()]
+
+
+@pytest.fixture
+def described(command, tmp_path):
+    def described(*arguments):
+        path = tmp_path / "fv_101.yaml"
+        code, out, err = command("describe-valve", *arguments, "--output", path)
+        assert (code, out, err) == (0, f"{path}\n", "")
+        return read_valve_file(path)
+
+    return described
+
+
+def test_units_of_people(described):
+    found = described(*options(SINGLE))
+    assert found.valve.diaphragm_area == pytest.approx(0.069, rel=1e-8)
+    assert found.valve.travel == pytest.approx(0.028575, rel=1e-8)
+    assert found.valve.pressure_reference == 101325.0
+    assert (found.valve.pressure_minimum, found.valve.pressure_maximum) == (0.0, 7e5)
+    psi = 6894.757293
+    assert found.known["spring_constant"] == pytest.approx(0.069 * 12 * psi / 0.028575, rel=1e-7)
+    assert found.known["spring_preload"] == pytest.approx(0.069 * 3 * psi, rel=1e-7)
+    assert found.known["mass"] == pytest.approx(3.5 * 0.45359237, rel=1e-7)
+    assert not any(name.startswith("fixed.") for name in found.settings)
+    assert found.columns == Columns(inverted_position=True)
+
+
+@pytest.mark.parametrize(
+    ("air_to", "position", "inverted"),
+    [("open", "plug", False), ("open", "stem", False), ("close", "stem", False)],
+)
+def test_only_the_opening_of_an_air_to_close_valve_is_inverted(
+    described, air_to, position, inverted
+):
+    found = described(*options(SINGLE | {"air_to": air_to, "position": position}))
+    assert found.columns.inverted_position == inverted
+
+
+def test_double_acting_without_a_spring(described):
+    answers = {"area": "500cm²", "travel": "50 mm", "acting": "double", "opposing_area": "450cm^2"}
+    found = described("--yes", *options(answers))
+    assert found.columns.opposing_area_ratio == pytest.approx(0.9)
+    assert found.columns.opposing_pressure_column == "opposing_pressure_pa"
+    assert found.settings["fixed.spring_constant"] == 0.0
+
+
+def test_columns_are_kept(described):
+    answers = {"area": "690cm2", "travel": "28mm", "position_unit": "%", "time_zone": "Asia/Tokyo"}
+    found = described("--yes", *options(answers), "--time-column", 'Zeit: [s] # "x"')
+    assert found.columns == Columns(
+        time_column='Zeit: [s] # "x"', position_unit="percent", time_zone="Asia/Tokyo"
+    )
+
+
+def test_a_node_reads_it(command):
+    """ROS wants doubles with a point, below two lines of its own."""
+    code, out, _ = command("describe-valve", *options(SINGLE))
+    assert code == 0
+    parameters = yaml.safe_load(out)["/**"]["ros__parameters"]
+    numbers = [value for value in parameters.values() if not isinstance(value, (str, dict))]
+    assert len(numbers) == 8
+    assert all(type(number) is float for number in numbers)
+    assert out.count("  # ") >= 8
+
+
+def test_what_is_open_is_asked_for(tmp_path):
+    path = tmp_path / "fv_101.yaml"
+    answers = "".join(f"{SINGLE[name]}\n" for name in SINGLE if name != "area")
+    done = subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros", "describe-valve", "--output", path]
+        + ["--area", "690cm2"],
+        check=False,
+        input=answers,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, done.stdout) == (0, f"{path}\n")
+    assert "spring range (bench set) (0.2..1.0 bar, 3..15 psi) [none]: " in done.stderr
+    assert read_valve_file(path).valve.travel == pytest.approx(0.028575)
+
+
+@pytest.mark.parametrize(
+    ("answers", "cause"),
+    [
+        ({"area": "690"}, "--area: '690': there is no unit; known are m2, cm2, mm2, in2"),
+        ({"area": "690 ha"}, "--area: '690 ha': unknown unit 'ha'"),
+        ({"area": "large"}, "--area: 'large' is no number with its unit"),
+        ({"area": "690 m2"}, "cm² or in² read as m²?"),
+        ({"travel": "28 m"}, "mm read as m?"),
+        ({"spring_range": "1..0.2 bar"}, "the range must rise"),
+        ({"spring_range": "1 bar"}, "is no range with its unit"),
+        ({"acting": "triple"}, "choose single or double"),
+        ({"opposing_area": "1 cm2"}, "is of a double-acting actuator"),
+        ({"time_zone": "Mars"}, "unknown time_zone 'Mars'"),
+    ],
+)
+def test_one_line(command, answers, cause, tmp_path):
+    path = tmp_path / "fv_101.yaml"
+    given = {"area": "690cm2", "travel": "28mm", **answers}
+    code, out, err = command("describe-valve", "--yes", "--output", path, *options(given))
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert cause in err
+    assert not path.exists()
+
+
+def test_nothing_is_replaced_unasked(command, described, tmp_path):
+    given = options({"area": "690cm2", "travel": "28mm"})
+    described("--yes", *given)
+    code, _, err = command("describe-valve", "--yes", *given, "--output", tmp_path / "fv_101.yaml")
+    assert code == 2
+    assert err.endswith("it is there: give another name, or --replace\n")
+    described("--yes", "--replace", *given)

@@ -1,0 +1,161 @@
+"""Huge, nested and hostile files: one line, and memory that stays small."""
+
+import gzip
+import json
+import resource
+import subprocess
+import sys
+from functools import partial
+
+import pytest
+
+HEADER = b"time_s,position_m,pressure_pa\n"
+MEMORY = 1_500_000_000
+"""Address space, bytes, of a process that reads a file of 10 GB; numba and numpy take most."""
+
+
+@pytest.fixture
+def bounded(bench_yaml):
+    """Function of arguments of `identify`: the one line of a process of little memory."""
+
+    def bounded(*arguments):
+        done = subprocess.run(
+            [
+                *(sys.executable, "-m", "valve_friction_ros", "identify"),
+                *map(str, (*arguments, "--valve", bench_yaml)),
+            ],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            preexec_fn=partial(resource.setrlimit, resource.RLIMIT_DATA, (MEMORY, MEMORY)),
+        )
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.count("\n") == 1
+        return done.stderr
+
+    return bounded
+
+
+def packed(path, start, piece, count):
+    """Write a gzip file of `start` and many times `piece`, by its packed members."""
+    member = gzip.compress(piece)
+    with path.open("wb") as stream:
+        stream.write(gzip.compress(start))
+        for _ in range(count):
+            stream.write(member)
+    return path
+
+
+class TestTables:
+    def test_ten_gigabytes_of_zeros(self, bounded, tmp_path):
+        path = packed(tmp_path / "a.csv.gz", HEADER, bytes(10_000_000), 1000)
+        assert "a line has more than 1048576 bytes" in bounded(path)
+
+    def test_ten_gigabytes_of_blank_lines(self, bounded, tmp_path):
+        path = packed(tmp_path / "a.csv.gz", HEADER, b"\n" * 10_000_000, 1000)
+        line = bounded(path, "--maximum-megabytes", "20")
+        assert "more than 20 MB, unpacked: raise maximum_megabytes (--maximum-megabytes)" in line
+
+    def test_the_first_bad_row_ends_the_reading(self, bounded, tmp_path):
+        rows = b"0.0,0.0,1e5\n" * 800_000
+        path = packed(tmp_path / "a.csv.gz", HEADER + b"0.0,0,1e5\nx,0,1e5\n", rows, 1000)
+        assert "row 3, column 'time_s': 'x' is not a number" in bounded(path)
+
+    def test_most_rows(self, refusal, tmp_path, bench_options):
+        path = tmp_path / "a.csv"
+        rows = b"".join(b"%d.0,0,1e5\n" % index for index in range(30_000))
+        path.write_bytes(HEADER + rows)
+        message = refusal(path, *bench_options, "--maximum-rows", "20000")
+        assert "more than 20000 rows: raise maximum_rows (--maximum-rows)" in message
+
+    def test_a_part_needs_room_for_itself_only(self, refusal, tmp_path, bench_options):
+        """Beyond the end nothing is read: the bad row there is not met."""
+        path = tmp_path / "a.csv"
+        rows = b"".join(b"%d.0,0,1e5\n" % index for index in range(60_000))
+        path.write_bytes(HEADER + rows + b"x\n")
+        few = ("--maximum-rows", "20000")
+        for part in (("--end", "9000"), ("--begin", "20000", "--end", "29000")):
+            assert "rows" not in refusal(path, *bench_options, *few, *part)
+        path.write_bytes(HEADER + rows)
+        assert "rows" not in refusal(path, *bench_options, *few, "--last", "5000")
+
+    def test_a_huge_cell(self, refusal, tmp_path, bench_options):
+        path = tmp_path / "a.csv"
+        for cell in (b"y" * 5_000_000, b'"' + b"y" * 5_000_000 + b'"'):
+            path.write_bytes(HEADER + b"0," + cell + b",1e5\n")
+            assert len(refusal(path, *bench_options)) < 400
+        path.write_bytes(HEADER + b"0," + b"y" * 100_000 + b",1e5\n")
+        assert f"'{'y' * 40}…' is not a number" in refusal(path, *bench_options)
+
+    def test_hostile_headers(self, refusal, tmp_path, bench_options):
+        path = tmp_path / "a.csv"
+        path.write_bytes(b"\x1b[31mred\x07,<b>,$x^2$,=cmd\n1,2,3,4\n")
+        message = refusal(path, *bench_options)
+        assert message.isprintable()
+        assert "\\x1b[31mred\\x07" in message
+
+    def test_a_hostile_name(self, call, tmp_path, bench_options):
+        path = tmp_path / "a\x1b[2J\n.csv"
+        path.write_bytes(b"1,2\n")
+        code, _, err = call(path, *bench_options)
+        assert code == 2
+        assert err.count("\n") == 1
+        assert err.strip().isprintable()
+
+
+DEEP = 20_000
+
+
+class TestValveFiles:
+    @pytest.mark.parametrize(
+        ("text", "cause"),
+        [
+            ("a: " + "[" * DEEP, "nested too deeply"),
+            ("a: " + "{a: " * DEEP, "nested too deeply"),
+            ("diaphragm_area: 1.0\n" + "# x\n" * 300_000, "more than 1000 kB"),
+            ("diaphragm_area: " + "1" * 5000, "diaphragm_area"),
+            ("diaphragm_area: " + "x" * 500_000, "diaphragm_area must be a number, got 'xxx"),
+            ("x" * 1000 + ": 1", "unknown key 'xxx"),
+            ("/**:\n  ros__parameters: [1]\n", "diaphragm_area is missing"),
+            ("diaphragm_area: 1.0\ncolumns: [1]", "columns must be lines such as"),
+            ("diaphragm_area: 1.0\ncolumns: {delimiter: {}}", "columns: delimiter must be a text"),
+            ("diaphragm_area: 1.0\ncolumns: {time_colum: t}", "did you mean 'time_column'?"),
+            ("diaphragm_area: 1.0\ncolumns: {skip_rows: 1.5}", "must be a whole number"),
+            ("diaphragm_area: 1.0\ncolumns: {encoding: klingon}", "unknown encoding 'klingon'"),
+            ("diaphragm_area: 1.0\nmethod: guess", "method 'guess' is unknown"),
+            ("diaphragm_aera: 1.0", "unknown key 'diaphragm_aera'; did you mean 'diaphragm_area'?"),
+            ("diaphragm_area: 445", "cm² or in² read as m²?"),
+            ("diaphragm_area: 0.04\ntravel: 28.6", "mm read as m?"),
+        ],
+    )
+    def test_one_line(self, refusal, quick_csv, tmp_path, text, cause):
+        path = tmp_path / "valve.yaml"
+        path.write_text(text)
+        message = refusal(quick_csv, "--valve", path)
+        assert cause in message
+        assert len(message) < 700
+
+
+class TestEstimates:
+    @pytest.mark.parametrize(
+        ("text", "cause"),
+        [
+            ("[" * 200_000, "not JSON"),
+            ('{"a":' * 200_000, "not JSON"),
+            ('{"parameters": ' + json.dumps({"m" * 100_000: 1}) + "}", "unknown parameter"),
+            (
+                '{"parameters": {"mass": {"value": 1' + "0" * 5000 + "}}}",
+                "estimate.json: Exceeds the limit",
+            ),
+            (" " * 20_000_000, "more than 10 MB"),
+        ],
+    )
+    def test_one_line(self, command, quick_csv, bench_options, tmp_path, text, cause):
+        path = tmp_path / "estimate.json"
+        path.write_text(text)
+        code, out, err = command("validate", quick_csv, *bench_options, "--estimate", path)
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1
+        assert cause in err
+        assert len(err) < 500
