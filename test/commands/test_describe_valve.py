@@ -94,8 +94,10 @@ def test_what_is_open_is_asked_for(tmp_path):
     path = tmp_path / "fv_101.yaml"
     answers = "".join(f"{SINGLE[name]}\n" for name in SINGLE if name != "area")
     done = subprocess.run(
-        [sys.executable, "-m", "valve_friction_ros", "describe-valve", "--output", path]
-        + ["--area", "690cm2"],
+        [
+            *(sys.executable, "-m", "valve_friction_ros", "describe-valve"),
+            *("--output", path, "--area", "690cm2"),
+        ],
         check=False,
         input=answers,
         capture_output=True,

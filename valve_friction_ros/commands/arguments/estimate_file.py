@@ -39,18 +39,15 @@ def read_estimate(path: Path) -> dict[str, float]:
         with path.open("rb") as stream:
             text = stream.read(_LARGEST + 1)
         if len(text) > _LARGEST:
-            raise ValueError(
-                f"{path}: more than {_LARGEST // 1_000_000} MB: no estimate is so long"
-            )
+            raise ValueError(f"more than {_LARGEST // 1_000_000} MB: no estimate is so long")
         content = json.loads(text.decode("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         cause = (isinstance(error, OSError) and error.strerror) or error
         raise ValueError(f"{path}: cannot be read: {cause}") from None
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
-    except ValueError as error:  # a number of thousands of digits
-        cause = str(error).removeprefix(f"{path}: ")
-        raise ValueError(f"{path}: {cause}") from None
+    except ValueError as error:  # too large, as a whole or a number of thousands of digits
+        raise ValueError(f"{path}: {error}") from None
     if isinstance(content, dict) and "valves" in content:
         raise ValueError(f"{path}: is of several valves: identify the one by --valve-name")
     parameters = content.get("parameters") if isinstance(content, dict) else None
