@@ -198,7 +198,8 @@ class TestBadOptions:
 
     def test_no_valve_file_for_a_pressure(self, refusal, quick_csv):
         assert refusal(quick_csv) == (
-            "pressure needs the diaphragm_area: give a valve file by --valve"
+            "pressure needs the diaphragm_area: give a valve file by --valve; "
+            "`valve_friction describe-valve` writes one"
         )
 
     @pytest.mark.parametrize(

@@ -93,6 +93,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "Write the valve file of an actuator. What the options leave open is asked for; with --yes "
         "only what must be known."
     )
+    parser.epilog = "Exit code 2: an answer is missing or impossible, or the file was not written."
     parser.add_argument("--output", type=Path, metavar="FILE.yaml", help="file (standard output)")
     parser.add_argument("--replace", action="store_true", help="replace a file that is there")
     parser.add_argument("--yes", action="store_true", help="take the defaults instead of asking")

@@ -34,7 +34,7 @@ from valve_friction_ros.identification import (
     Result,
 )
 from valve_friction_ros.model import Valve
-from valve_friction_ros.records.outside_text import printable
+from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.stretch import Stretch

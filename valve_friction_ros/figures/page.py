@@ -26,12 +26,7 @@ def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
     """
     figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
     figure.suptitle(
-        textwrap.fill(title, _TITLE_WIDTH),
-        fontsize=12,
-        fontweight="bold",
-        x=0.02,
-        ha="left",
-        parse_math=False,
+        textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
     )
     if notes:
         shown = [f"note: {note}" for note in notes[:_MOST_NOTES]]

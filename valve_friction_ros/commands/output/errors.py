@@ -10,7 +10,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
-from valve_friction_ros.records.outside_text import printable
+from valve_friction_ros.outside_text import printable
 
 __all__ = [
     "PROGRAM",

@@ -19,7 +19,7 @@ from valve_friction_ros.identification import (
     plain,
     two_digits,
 )
-from valve_friction_ros.records.outside_text import cell, printable
+from valve_friction_ros.outside_text import cell, printable
 from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["as_json", "print_table", "write_csv"]

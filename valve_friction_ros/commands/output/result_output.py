@@ -5,7 +5,7 @@ from typing import Any
 
 from valve_friction_ros.health import Diagnosis
 from valve_friction_ros.identification import Result
-from valve_friction_ros.records.outside_text import printable
+from valve_friction_ros.outside_text import printable
 
 __all__ = ["as_json", "print_table"]
 
