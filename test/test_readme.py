@@ -1,9 +1,15 @@
 """The README: its Python can be pasted, and its links lead somewhere."""
 
+import contextlib
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+
+from valve_friction_ros.commands.main import run
 
 PROJECT = Path(__file__).resolve().parents[1]
 README = (PROJECT / "README.md").read_text(encoding="utf-8")
@@ -25,6 +31,43 @@ def test_the_notebook_section_runs(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "valve.png").stat().st_size > 10_000
     bracket = names["test"].dead_band
     assert (bracket.ignored, bracket.answered) == pytest.approx((4, 5), rel=1e-9)
+
+
+NEED_NODES = ("history", "call", "identify fv_101_2026", "reproduce-paper")  # or minutes: the last
+
+
+def test_the_offline_commands_run_as_they_are_pasted(tmp_path, monkeypatch, capsys):
+    for folder in ("examples", "config"):
+        (tmp_path / folder).symlink_to(PROJECT / folder)
+    monkeypatch.chdir(tmp_path)
+    blocks = "".join(re.findall(r"```sh\n(.*?)```", README, re.DOTALL)).replace("\\\n", " ")
+    commands = re.findall(r"^\.venv/bin/valve_friction (.*)$", blocks, re.MULTILINE)
+    offline = [each for each in commands if not each.startswith(NEED_NODES)]
+    assert len(offline) == 7
+    for each in offline:
+        line, _, output = each.partition(" > ")
+        with contextlib.ExitStack() as stack:
+            if output:
+                stream = stack.enter_context((tmp_path / output).open("w"))
+                stack.enter_context(contextlib.redirect_stdout(stream))
+            assert run(shlex.split(line, comments=True)) == 0, each
+    assert "coulomb_friction   400" in capsys.readouterr().out
+    written = {path.name for path in tmp_path.iterdir()}
+    assert {"one_minute.png", "one_minute.html", "five_seconds.png", "fv_102.yaml"} <= written
+    assert (tmp_path / "friction.csv").read_text().count("\n") == 3
+
+
+def test_the_examples_are_what_their_script_makes(tmp_path):
+    """Within the last digit, which a processor may round otherwise."""
+    script = PROJECT / "examples" / "make_examples.py"
+    subprocess.run([sys.executable, str(script), str(tmp_path)], check=True, timeout=300)
+    for name in ("one_minute.csv", "five_seconds.csv"):
+        made, kept = (
+            (folder / name).read_text().splitlines() for folder in (tmp_path, script.parent)
+        )
+        assert (script.parent / name).stat().st_size < 200_000
+        assert len(made) == len(kept)
+        assert sum(one != other for one, other in zip(made, kept, strict=True)) < 10
 
 
 @pytest.mark.parametrize("target", sorted(set(re.findall(r"\]\(([^)]+)\)", README))))

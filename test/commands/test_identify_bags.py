@@ -235,7 +235,7 @@ class TestNoRecording:
         assert code == 2
         assert err == (
             "valve_friction identify: pressure needs the diaphragm_area: give a valve file by "
-            "--valve\n"
+            "--valve; `valve_friction describe-valve` writes one\n"
         )
 
 

@@ -287,7 +287,9 @@ class TestWorkbooks:
         for content in (b"PK\x03\x04", b"PAR1"):
             path = tmp_path / "export.bin"
             path.write_bytes(content + bytes(100))
-            assert "pip install 'valve_friction_ros[tables]'" in refusal(path, "--valve", valve())
+            assert "pip install openpyxl pandas pyarrow (the extra `tables`)" in refusal(
+                path, "--valve", valve()
+            )
 
     @pytest.mark.parametrize("start", [b"PK\x03\x04", b"PAR1", b"\xd0\xcf\x11\xe0"])
     def test_damaged(self, refusal, valve, tmp_path, start):

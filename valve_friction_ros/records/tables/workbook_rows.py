@@ -30,8 +30,8 @@ def _library(name: str) -> Any:
         return importlib.import_module(name)
     except ImportError:
         raise ValueError(
-            "Excel and Parquet are an extra: pip install 'valve_friction_ros[tables]', or export "
-            "the table as CSV"
+            "Excel and Parquet need libraries that are not installed: pip install openpyxl pandas "
+            "pyarrow (the extra `tables`), or export the table as CSV"
         ) from None
 
 
