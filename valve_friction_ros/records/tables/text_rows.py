@@ -8,12 +8,9 @@ import itertools
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, cast
+from typing import IO, Any, cast
 
 from valve_friction_ros.records.columns import Columns
-
-if TYPE_CHECKING:
-    from _typeshed import WriteableBuffer
 
 __all__ = ["csv_rows", "repaired"]
 
@@ -68,7 +65,7 @@ class _Bounded(io.RawIOBase):
             self._stream.close()
         super().close()
 
-    def readinto(self, room: "WriteableBuffer", /) -> int:
+    def readinto(self, room: Any, /) -> int:
         """Read the next bytes."""
         piece = self._stream.read(len(memoryview(room)))
         self._left -= len(piece)
