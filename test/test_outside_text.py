@@ -1,0 +1,45 @@
+"""Names and tags from outside: shown, never obeyed."""
+
+import csv
+
+import pytest
+from histories import START, VALVE, success
+
+from valve_friction_ros.commands.main import run
+from valve_friction_ros.history import HistoryFile, KeptValve
+from valve_friction_ros.outside_text import cell, printable
+
+TAG = "=1+1 cost $\\foo{$ \x1b[2J\x07"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("FV-101 µm ²", "FV-101 µm ²"),
+        ("\x1b[31mred\x07\n", "\\x1b[31mred\\x07\\n"),
+        ("\x9b2J\u202etxt\udcff", "\\x9b2J\\u202etxt\\udcff"),
+        ("x" * 20_000, "x" * 10_000 + "…"),
+    ],
+)
+def test_printable(text, shown):
+    assert printable(text) == shown
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@x", "\t=1", "\r=1"])
+def test_a_formula_is_a_text(text):
+    assert cell(text) == f"'{text}"
+    assert (cell("FV-101"), cell(-1.0), cell(None)) == ("FV-101", -1.0, None)
+
+
+def test_a_hostile_tag_in_table_csv_and_picture(tmp_path, capsys):
+    file = tmp_path / "plant.sqlite"
+    HistoryFile(file).add(success(START, valve=KeptValve(VALVE.name, TAG)))
+    table, picture = tmp_path / "a.csv", tmp_path / "a.png"
+    assert run(["history", str(file), "--csv", str(table), "--plot", str(picture)]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "=1+1 cost $\\foo{$ \\x1b[2J\\x07" in out
+    with table.open(newline="") as stream:
+        (row,) = csv.DictReader(stream)
+    assert row["tag"] == f"'{TAG}"
+    assert picture.stat().st_size > 5000
