@@ -13,6 +13,7 @@ from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.health import Baseline, friction_words
 from valve_friction_ros.history import FrictionPoint, Trend, ValveHistory, trended
 from valve_friction_ros.identification import SLIDING, Verdict, two_digits
+from valve_friction_ros.outside_text import printable
 
 __all__ = ["draw_history", "drift_text", "entitle", "set_dates", "span_of_time"]
 
@@ -95,7 +96,9 @@ def entitle(axes: Axes, history: ValveHistory) -> None:
     lines = textwrap.wrap(title, _TITLE, max_lines=2, placeholder=" …")
     if drift and len(lines[-1]) + len(drift) > _TITLE:
         lines.append("")
-    axes.set_title("\n".join(lines), loc="left", fontsize="medium", parse_math=False)
+    axes.set_title(
+        "\n".join(map(printable, lines)), loc="left", fontsize="medium", parse_math=False
+    )
     axes.set_title(drift, loc="right", fontsize="medium", color=_TREND)
 
 
