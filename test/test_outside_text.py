@@ -7,7 +7,7 @@ from histories import START, VALVE, success
 
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.history import HistoryFile, KeptValve
-from valve_friction_ros.outside_text import cell, printable
+from valve_friction_ros.outside_text import harmless, printable
 
 TAG = "=1+1 cost $\\foo{$ \x1b[2J\x07"
 
@@ -27,8 +27,8 @@ def test_printable(text, shown):
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@x", "\t=1", "\r=1"])
 def test_a_formula_is_a_text(text):
-    assert cell(text) == f"'{text}"
-    assert (cell("FV-101"), cell(-1.0), cell(None)) == ("FV-101", -1.0, None)
+    assert harmless(text) == f"'{text}"
+    assert (harmless("FV-101"), harmless(-1.0), harmless(None)) == ("FV-101", -1.0, None)
 
 
 def test_a_hostile_tag_in_table_csv_and_picture(tmp_path, capsys):

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-__all__ = ["cell", "printable"]
+__all__ = ["as_read", "harmless", "printable"]
 
 _LONGEST = 10_000
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -17,6 +17,15 @@ def printable(text: str, most: int = _LONGEST) -> str:
     return "".join(mark if mark.isprintable() else ascii(mark)[1:-1] for mark in short)
 
 
-def cell(value: Any) -> Any:
-    """Return the value of a CSV cell; a text that would be a formula begins with a quote mark."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+def _is_formula(text: str) -> bool:
+    return text.lstrip("'").startswith(_FORMULA)
+
+
+def harmless(cell: Any) -> Any:
+    """Return the value of a CSV cell; a text that looks like a formula gets an apostrophe first."""
+    return f"'{cell}" if isinstance(cell, str) and _is_formula(cell) else cell
+
+
+def as_read(cell: str) -> str:
+    """Return the text that `harmless` was given."""
+    return cell[1:] if cell.startswith("'") and _is_formula(cell) else cell

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from valve_friction_ros.fleet import COLUMNS, ResultsFile, database_of, error_cells, key_cells
-from valve_friction_ros.fleet.cells import as_read
+from valve_friction_ros.outside_text import as_read
 
 TEXTS = st.text(
     st.characters(categories=("L", "N", "P", "S", "Zs")), max_size=20

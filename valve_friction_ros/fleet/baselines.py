@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from valve_friction_ros.fleet.cells import as_read
 from valve_friction_ros.health import Baseline, SlidingFriction
 from valve_friction_ros.health.baseline import LARGEST_SHARE
 from valve_friction_ros.identification import Verdict
+from valve_friction_ros.outside_text import as_read
 
 __all__ = ["Baselines", "read_baselines"]
 

@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from valve_friction_ros.fleet.cells import harmless
 from valve_friction_ros.fleet.page import page_text
 from valve_friction_ros.fleet.row import COLUMNS, Cell
+from valve_friction_ros.outside_text import harmless
 
 __all__ = ["is_page", "writer_of"]
 

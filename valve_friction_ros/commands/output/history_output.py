@@ -19,7 +19,7 @@ from valve_friction_ros.identification import (
     plain,
     two_digits,
 )
-from valve_friction_ros.outside_text import cell, printable
+from valve_friction_ros.outside_text import harmless, printable
 from valve_friction_ros.records.whole_file import write_whole
 
 __all__ = ["as_json", "print_table", "write_csv"]
@@ -130,7 +130,7 @@ def write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
     text = io.StringIO()
     writer = csv.DictWriter(text, header, lineterminator="\n")
     writer.writeheader()
-    writer.writerows({name: cell(value) for name, value in row.items()} for row in rows)
+    writer.writerows({name: harmless(value) for name, value in row.items()} for row in rows)
     write_whole(path, text.getvalue().encode())
 
 
