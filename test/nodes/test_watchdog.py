@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 
+import frozen_identifier
 import pytest
 import stuck_identifiers
 from live_nodes import NAMESPACE, PATIENCE, values_of
@@ -183,3 +184,47 @@ class TestWorker:
             worker.submit(time.sleep, 0.3)
             assert workers_have_ended(PATIENCE) == finishes
         assert workers_have_ended(0.0)
+
+
+def frozen_end(live, tmp_path, what):
+    """Freeze an identifier within C; return its process when it has ended, and the time it took."""
+    process = live.start("identifier", script=frozen_identifier.SCRIPT)
+    live.client.next_status()
+    live.client.watched.clear()
+    live.nodes.remove(process)
+    (tmp_path / "draft").write_text(what)
+    (tmp_path / "draft").rename(tmp_path / frozen_identifier.FREEZE)
+    begin = time.monotonic()
+    if what == frozen_identifier.CLEAN_UP:
+        process.interrupt()
+    try:
+        assert process.exit_code() == 1, process.errors
+        return process, time.monotonic() - begin
+    finally:
+        process.kill()
+
+
+@pytest.mark.parametrize(
+    ("what", "where"),
+    [
+        (frozen_identifier.LOOP, "in _run"),
+        (frozen_identifier.MIDDLEWARE, "in _end_if_the_middleware_hangs"),
+        (frozen_identifier.CLEAN_UP, "in _run_until"),
+    ],
+)
+def test_a_process_that_is_frozen_within_c_ends_by_itself(live, tmp_path, what, where):
+    process, lasted = frozen_end(live, tmp_path, what)
+    assert where in process.errors
+    assert "Timeout (" in process.errors
+    if what == frozen_identifier.CLEAN_UP:
+        assert lasted < WITHIN + 1.0
+
+
+def test_silent_inputs_alone_end_nothing(live):
+    """The middleware is asked several times, and answers."""
+    process = live.start("identifier", script=frozen_identifier.SCRIPT)
+    live.client.next_status()
+    begin = time.monotonic()
+    live.client.wait_until(lambda: time.monotonic() > begin + 4.0, "four seconds")
+    process.require_running()
+    live.client.next_status()

@@ -1,6 +1,7 @@
 """Nodes that look for their messages themselves, and the executor of their services."""
 
 import contextlib
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -26,7 +27,16 @@ class PolledNode(Node):
     callbacks for them. rclpy watches two events of each by default, only to log that a quality of
     service or a type does not match; each would be looked at in every turn of the executor, and
     rmw_fastrtps can lock up while it takes an event.
+
+    Attributes
+    ----------
+    last_heard : float
+        When a message of its streams was taken last, s of the monotonic clock; at first its start.
     """
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        self.last_heard = time.monotonic()
+        super().__init__(*arguments, **named)
 
     def create_publisher(self, *arguments: Any, **named: Any) -> Publisher:
         """Create a publisher as rclpy does, without its default callbacks for events."""

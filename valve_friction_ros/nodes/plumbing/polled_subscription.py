@@ -9,14 +9,15 @@ rclpy offers no public method that takes a message. Its own executors and ``wait
 ``Subscription.handle.take_message``, and so does this file, and no other. Checked with rclpy 7.1.6.
 """
 
+import time
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
 
 __all__ = ["PolledSubscription", "TakenMessage"]
@@ -55,7 +56,7 @@ class PolledSubscription:
     """
 
     def __init__(
-        self, node: Node, kind: type, topic: str, quality: QoSProfile, raw: bool = False
+        self, node: PolledNode, kind: type, topic: str, quality: QoSProfile, raw: bool = False
     ) -> None:
         self._node = node
         self._kind, self._raw = kind, raw
@@ -113,4 +114,6 @@ class PolledSubscription:
             while len(taken) < _MOST and (found := handle.take_message(kind, raw)) is not None:
                 message, details = found
                 taken.append(TakenMessage(message, details["received_timestamp"]))
+        if taken:
+            self._node.last_heard = time.monotonic()
         return taken

@@ -11,6 +11,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from valve_friction_ros.nodes.plumbing.deadman import Deadman, disarm
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
@@ -48,6 +49,7 @@ def _run(
     pause: float,
     stop: StopRequest,
     watchdog: Watchdog,
+    deadman: Deadman,
 ) -> None:
     """Take turns until the stop is requested."""
     least = _PAUSE_OF_A_NODE * len(nodes)
@@ -57,6 +59,7 @@ def _run(
         for node in nodes:
             node.poll()
         watchdog.turned()
+        deadman.turned()
         now = time.monotonic()
         if is_lively:
             lively_until = now + _LIVELY_TIME
@@ -75,7 +78,8 @@ def run_nodes(
     process by default. The `pause` is the time between two turns, s, while no service is in use:
     for so long messages gather, and a first request waits.
 
-    Where a worker is still busy at the end, the process ends here, without it.
+    Where a worker is still busy at the end, the process ends here, without it. Where the loop or
+    the middleware hangs for good, the process ends with exit code 1.
     """
     with StopRequest() as stop:
         exit_code = _run_until(stop, create, arguments, pause)
@@ -110,8 +114,8 @@ def _run_until(
         for node in nodes:
             executor.add_node(node)
         polled = [node for node in nodes if isinstance(node, PolledNode)]
-        with Watchdog(polled) as watchdog:
-            _run(polled, executor, pause, stop, watchdog)
+        with Watchdog(polled) as watchdog, Deadman(polled) as deadman:
+            _run(polled, executor, pause, stop, watchdog, deadman)
     except ExternalShutdownException:
         pass
     finally:
@@ -122,6 +126,7 @@ def _run_until(
         for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
+        disarm()
     return 0
 
 

@@ -1,0 +1,32 @@
+"""The identifier, frozen for good within C when a file says so, as a node to start."""
+
+import ctypes
+import sys
+from pathlib import Path
+
+SCRIPT = Path(__file__)
+FREEZE = "freeze"
+"""Name of the file, in the node's working directory, that names what freezes."""
+LOOP, MIDDLEWARE, CLEAN_UP = "loop", "middleware", "clean-up"
+
+if __name__ == "__main__":
+    from valve_friction_ros.nodes.identifier import node
+    from valve_friction_ros.nodes.plumbing import deadman
+
+    deadman._LOOP_END = deadman._ANSWER = 2.0
+    deadman._SILENCE = deadman._AGAIN = 0.5
+    forever = ctypes.PyDLL(None).sleep  # holds Python's lock, as rclpy does
+
+    def freezing(name, method):
+        def call(self, *arguments, **named):
+            if Path(FREEZE).exists() and Path(FREEZE).read_text() == name:
+                forever(1000)
+            return method(self, *arguments, **named)
+
+        return call
+
+    one = node.Identifier
+    one.poll = freezing(LOOP, one.poll)
+    one.create_publisher = freezing(MIDDLEWARE, one.create_publisher)
+    one.destroy_node = freezing(CLEAN_UP, one.destroy_node)
+    sys.exit(node.main())
