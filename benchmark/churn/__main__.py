@@ -16,7 +16,7 @@ from rich.console import Console
 from benchmark.churn.crowd import Crowd
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import nodes, process_of
-from benchmark.churn.processes import NodeProcess, Usage
+from benchmark.churn.processes import FROZEN, NodeProcess, Usage
 from benchmark.churn.summary import hung_services, rows
 from benchmark.speed.table import machine_shape, rows_table
 from valve_friction_ros.commands.demo.bench_processes import free_domain
@@ -27,6 +27,8 @@ _WIDTH_OF_A_FILE = 120
 _TURN = 0.05
 _LOOK = 10.0
 _SETTLED = 60.0
+_HANG = 30.0
+"""Time, s, in which a node that gives no answers may still end itself."""
 _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where Fast DDS has its files
 
 
@@ -67,7 +69,7 @@ def _run(folder: Path, seconds: float, crowd: Crowd, ledger: Ledger) -> None:
         for name, node in nodes(folder).items():
             processes[name] = NodeProcess(node, folder / f"{name}.log")
         crowd.begin(folder, seconds)
-        _watch(processes, seconds, crowd, ledger)
+        _watch(processes, folder, seconds, crowd, ledger)
         crowd.end()
     finally:
         crowd.end(0.0)
@@ -78,9 +80,12 @@ def _run(folder: Path, seconds: float, crowd: Crowd, ledger: Ledger) -> None:
                 ledger.add("ending", node=name, alive=seconds, seconds=took, code=code)
 
 
-def _watch(processes: dict[str, NodeProcess], seconds: float, crowd: Crowd, ledger: Ledger) -> None:
+def _watch(
+    processes: dict[str, NodeProcess], folder: Path, seconds: float, crowd: Crowd, ledger: Ledger
+) -> None:
     """Let the crowd come and go until the time is over or a node has died."""
     begin = next_look = time.monotonic()
+    first = dict(processes)
     early: dict[str, Usage] = {}
     most = (0, 0.0)
     while (elapsed := time.monotonic() - begin) < seconds:
@@ -88,27 +93,37 @@ def _watch(processes: dict[str, NodeProcess], seconds: float, crowd: Crowd, ledg
         if time.monotonic() > next_look:
             next_look += _LOOK
             most = max(most, _shared_memory(), key=lambda one: one[1])
-            if _have_died(processes, ledger):
+            if _have_died(processes, folder, ledger):
                 break
             if not early and elapsed > min(_SETTLED, seconds / 2):
                 early = {name: process.usage() for name, process in processes.items()}
         time.sleep(_TURN)
     for name, process in processes.items():
-        if process.exit_code() is None and name in early:
+        if process is first[name] and process.exit_code() is None and name in early:
             ledger.add("node", name=name, **process.usage().since(early[name]))
     ledger.add("shared memory", files=most[0], megabytes=most[1])
 
 
-def _have_died(processes: dict[str, NodeProcess], ledger: Ledger) -> bool:
-    """Note the nodes that are gone, and those that hang, with their stacks in their logs."""
-    for service in hung_services(list(ledger.events())):
+def _have_died(processes: dict[str, NodeProcess], folder: Path, ledger: Ledger) -> bool:
+    """Note the nodes that are gone, and those that hang, with their stacks in their logs.
+
+    A node that has ended itself, because it or its middleware was frozen, is started again, as
+    launch and systemd do.
+    """
+    for service in hung_services(list(ledger.events()), time.time() - _HANG):
         hung = processes[process_of(service)]
         if hung.exit_code() is None:
             hung.write_stacks()
-    dead = {name: code for name, one in processes.items() if (code := one.exit_code()) is not None}
-    for name, code in dead.items():
-        ledger.add("died", name=name, code=code)
-    return bool(dead)
+    has_died = False
+    for name, process in processes.items():
+        code = process.exit_code()
+        if code == FROZEN:
+            ledger.add("ended itself", name=name)
+            processes[name] = NodeProcess(nodes(folder)[name], process.log)
+        elif code is not None:
+            ledger.add("died", name=name, code=code)
+            has_died = True
+    return has_died
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 from benchmark.churn.places import Node
 
-__all__ = ["CODES", "PATIENCE", "NodeProcess", "Usage"]
+__all__ = ["CODES", "FROZEN", "PATIENCE", "NodeProcess", "Usage"]
 
 CODES = (0, -signal.SIGINT, -signal.SIGTERM)
 """Exit codes of a node that was told to end; those of the signals before Python minds them."""
+FROZEN = 1
+"""Exit code of a node that has ended itself because it was frozen."""
 PATIENCE = 20.0
 """Time, s, after which a process that was told to end is hung."""
 _TICKS, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")

@@ -1,6 +1,7 @@
 """The events of a run as rows with their goals."""
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -20,8 +21,10 @@ _SILENCE_LIMIT = 5.0
 _Events = Sequence[Mapping[str, Any]]
 
 
-def hung_services(events: _Events) -> list[str]:
+def hung_services(events: _Events, until: float = math.inf) -> list[str]:
     """Return the services without an answer whose process has answered nobody else meanwhile.
+
+    Those that were found `until` a time count, s since 1970.
 
     One client may lose its answers; a node that hangs answers none.
     """
@@ -33,6 +36,7 @@ def hung_services(events: _Events) -> list[str]:
         one["service"]
         for one in events
         if one["kind"] == "unanswered twice"
+        and one["time"] < until
         and answered.get(process_of(one["service"]), 0.0) < one["since"]
     ]
 
@@ -114,6 +118,8 @@ def rows(events: _Events) -> Iterator[Row]:
         yield Row(f"{name}: processor", one["cores"], "cores")
         yield Row(f"{name}: memory", one["memory"], "MB", one["early_memory"], "after a minute")
         yield Row(f"{name}: threads", one["threads"], "", one["early_threads"], "after a minute")
+    ended = len(of("ended itself"))
+    yield Row("nodes that ended themselves, frozen", ended, "", goal="none", met=ended == 0)
     died = len(of("died"))
     yield Row("nodes that died or hung", died, "", goal="none", met=died == 0)
     for one in of("shared memory"):

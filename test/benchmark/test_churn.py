@@ -30,6 +30,7 @@ BAD = {
     "longest silence on /diagnostics": {"kind": "diagnostics", "longest": 6.0},
     "ended after more than 3 s": dict(GOOD[6], seconds=3.1),
     "ended with another code": dict(GOOD[6], code=1),
+    "nodes that ended themselves, frozen": {"kind": "ended itself", "name": "simulator"},
     "nodes that died or hung": {"kind": "died", "name": "simulator", "code": -6},
 }
 
@@ -54,10 +55,12 @@ def test_each_failure_misses_its_goal(item):
 
 def test_a_node_that_answers_others_does_not_hang():
     lost = {"kind": "unanswered twice", "service": "/fv_101/identifier/save", "since": 10.0}
+    lost["time"] = 40.0
     answer = {"kind": "call", "service": "/fv_101/identifier/clear", "seconds": 0.1, "time": 20.0}
     other = dict(answer, service="/fv_201/identifier/clear")
     assert hung_services([lost, answer]) == []
     assert hung_services([lost, dict(answer, time=5.0), other]) == [lost["service"]]
+    assert hung_services([lost], until=40.0) == []
 
 
 def test_a_run_without_a_look_at_the_samples_has_not_shown_that_none_is_lost():
