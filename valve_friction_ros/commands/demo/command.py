@@ -4,7 +4,6 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -84,7 +83,6 @@ def _record(client: BenchClient, console: Console, label: str) -> None:
 
 
 def _nodes() -> list[NodeProcess]:
-    simulated = {**asdict(LOW_FRICTION)}
     monitored = {
         "position_bias": _POSITION_BIAS,
         "assumed_mass": 1.6,
@@ -93,7 +91,7 @@ def _nodes() -> list[NodeProcess]:
     }
     return [
         NodeProcess("identifier", monitored),
-        NodeProcess("simulator", simulated),
+        NodeProcess("simulator", {}),  # the bench valve, low friction
         NodeProcess("pressure_source", {}),
     ]
 
