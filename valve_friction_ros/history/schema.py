@@ -13,8 +13,8 @@ SCHEMA_VERSION = 5
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
-and no half widths without calibration; version 3 has no records of baselines; version 4 does not say what a
-baseline replaced."""
+and no half widths without calibration; version 3 has no records of baselines; version 4 does not
+say what a baseline replaced."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
