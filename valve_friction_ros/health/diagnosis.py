@@ -178,14 +178,15 @@ def dead_band(result: Frictions, valve: Valve) -> float:
     frictionless stem by (F_c + F_s)/k. Without a slip jump F_s is F_c. The result is nan without a
     spring, without travel stops, or where F_c or k is not identifiable.
     """
-    values = result.values
-    if not values["spring_constant"] > 0:
+    names = ("spring_constant", "coulomb_friction", "static_friction")
+    spring_constant, coulomb_friction, static_friction = (
+        result.values.get(name, math.nan) for name in names
+    )
+    if not spring_constant > 0:
         return math.nan
-    coulomb_friction, static_friction = values["coulomb_friction"], values["static_friction"]
     if math.isnan(static_friction):
         static_friction = coulomb_friction
-    force = coulomb_friction + static_friction
-    return valve.share_of_travel(force / values["spring_constant"])
+    return valve.share_of_travel((coulomb_friction + static_friction) / spring_constant)
 
 
 def _consequence(result: Frictions, valve: Valve) -> str:

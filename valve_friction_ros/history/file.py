@@ -109,7 +109,10 @@ class HistoryFile:
             if row is None:
                 return None
             found = entries_in(connection, [valve], row["time_ns"], row["time_ns"] + 1)
-        return next(one for one in reversed(found) if not one.refusal)
+            last = next(one for one in reversed(found) if not one.refusal)
+            if last.friction is None:
+                raise ValueError("a success without coulomb_friction")
+        return last
 
     def points(
         self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None

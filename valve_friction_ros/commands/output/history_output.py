@@ -72,7 +72,7 @@ def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
 
 
 def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
-    """Build the object that JSON shows: a list of valves, each with trend, baselines and entries."""
+    """Build the object that JSON shows: valves, each with trend, baselines and entries."""
     return {
         "valves": [
             {
@@ -180,11 +180,10 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             table.columns[column].justify = "right"
         for column in range(6):
             table.columns[column].no_wrap = True
-        for row in sorted((*history.entries, *history.baselines), key=lambda one: one.time):
-            table.add_row(
-                time_text(row.time, "seconds")[:-1].replace("T", " "),
-                *_cells(row),
-            )
+        rows: list[HistoryEntry | KeptBaseline] = [*history.entries, *history.baselines]
+        for row in sorted(rows, key=lambda one: one.time):
+            time = time_text(row.time, "seconds")[:-1].replace("T", " ")
+            table.add_row(time, *_cells(row))
         console.print(table)
         for line in _trend_lines(history.trend):
             console.print(line)
