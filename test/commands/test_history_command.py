@@ -101,6 +101,61 @@ class TestTable:
         assert valve["trend"] is None
 
 
+class TestBaselines:
+    """Each change of a baseline, with who made it, and what it replaced."""
+
+    @pytest.fixture
+    def changed(self, tmp_path):
+        history = HistoryFile(tmp_path / "changed.sqlite")
+        grown, later = Baseline(600.0, 8.0), START + DAY
+        kept = KeptBaseline(
+            grown, later, START, replaced=BASELINE, by="set_baseline", level=Level.ERROR
+        )
+        history.add(success(START, 600.0, baseline=BASELINE))
+        history.set_baseline(VALVE, kept)
+        history.add(success(START + 2 * DAY, 600.0, baseline=grown))
+        back = {"by": "restore_baseline", "level": Level.OK, "replaced": grown}
+        history.set_baseline(
+            VALVE, replace(kept, baseline=BASELINE, time=START + 3 * DAY, since=0, **back)
+        )
+        history.set_baseline(VALVE, replace(kept, time=START + 4 * DAY, withdrawn=True, **back))
+        return history.path
+
+    def test_in_the_table_by_time(self, run, changed, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "160")
+        words = " ".join(run(path=changed)[1].split())
+        rows = [f"2026-{row}" for row in words.split("2026-")[1:]]
+        assert ["baseline" in row for row in rows] == [False, True, False, True, True]
+        old, new = "coulomb friction 141 ± 1 N", "coulomb friction 600 ± 8 N"
+        assert rows[1].startswith("2026-09-22 14:13:20 baseline ERROR set_baseline: ")
+        assert rows[1].strip().endswith(f"{new}; before: {old}")
+        assert rows[3].startswith("2026-09-24 14:13:20 baseline OK restore_baseline: ")
+        assert rows[3].strip().endswith(f"{old}; before: {new}")
+        assert rows[4].strip().endswith(f"OK restore_baseline: none; before: {new}")
+
+    def test_in_json(self, run, changed):
+        _, output, _ = run("--json", path=changed)
+        first, second, third = json.loads(output)["valves"][0]["baselines"]
+        assert first == {
+            "time": "2026-09-22T14:13:20.000Z",
+            "since": "2026-09-21T14:13:20.000Z",
+            "set_by": "set_baseline",
+            "level": "ERROR",
+            "baseline": 600.0,
+            "baseline_half_width": 8.0,
+            "baseline_sliding": None,
+            "replaced": 141.0,
+            "replaced_half_width": 1.0,
+            "replaced_sliding": None,
+        }
+        assert (second["set_by"], second["baseline"], second["replaced"]) == (
+            "restore_baseline",
+            141.0,
+            600.0,
+        )
+        assert (third["baseline"], third["replaced"]) == (None, 600.0)
+
+
 class TestJson:
     def test_an_entry(self, run):
         valve = told(run, "--valve", "FV-101")[0]

@@ -12,8 +12,15 @@ from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, succ
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.health import Baseline, SlidingFriction
-from valve_friction_ros.history import FrictionPoint, HistoryFile, KeptBaseline, KeptValve, schema
+from valve_friction_ros.health import Baseline, Level, SlidingFriction
+from valve_friction_ros.history import (
+    FrictionPoint,
+    HistoryError,
+    HistoryFile,
+    KeptBaseline,
+    KeptValve,
+    schema,
+)
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.trust.calibration import calibrated
 from valve_friction_ros.model import Drive, Recording
@@ -128,10 +135,41 @@ def test_records_go_with_their_baselines(history):
     assert select(history, "SELECT count(*) FROM baseline_record") == [(0,)]
 
 
+def make_version_4(history):
+    """Take away what version 5 knows of a baseline: who set it, and what it replaced."""
+    columns = [
+        name for (name,) in select(history, "SELECT name FROM pragma_table_info('baseline')")
+    ]
+    new = [one for one in columns if one.startswith("replaced_")] + ["set_by", "level", "withdrawn"]
+    connection = sqlite3.connect(history.path)
+    drop = "".join(f"ALTER TABLE baseline DROP COLUMN {name};" for name in new)
+    connection.executescript(f"{drop} PRAGMA user_version = 4")
+    connection.close()
+
+
+def test_a_file_of_version_4_is_read_and_extended(history):
+    """Version 4 did not say what a baseline replaced: it is that of the row before."""
+    first = KeptBaseline(Baseline(150.0, 2.0, SLIDING), START, START)
+    second = KeptBaseline(Baseline(600.0, 7.0), START + 1, START)
+    for valve, kept in ((VALVE, first), (OTHER, second), (VALVE, second)):
+        history.set_baseline(valve, kept)
+    entry = success(baseline=first.baseline)
+    history.add(entry)
+    make_version_4(history)
+    assert history.baselines(VALVE.name) == (first, second)
+    assert same(history.last_success(VALVE.name), entry)
+    assert select(history, "PRAGMA user_version") == [(4,)]
+    history.prepare()
+    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert history.baselines(VALVE.name) == (first, replace(second, replaced=first.baseline))
+    assert history.baselines(OTHER.name) == (second,)
+
+
 def test_a_file_of_version_3_is_read_and_extended(history):
     """Version 3 had no records of baselines."""
     kept = KeptBaseline(Baseline(150.0), START, START)
     history.set_baseline(VALVE, kept)
+    make_version_4(history)
     connection = sqlite3.connect(history.path)
     connection.executescript("DROP TABLE baseline_record; PRAGMA user_version = 3")
     connection.close()
@@ -282,12 +320,75 @@ class TestBaseline:
         assert history.baseline(VALVE.name, until=START + 10) == first
         assert history.baseline(OTHER.name) is None
 
+    def test_it_says_what_it_replaced(self, history):
+        old = Baseline(150.0, 2.0, SLIDING)
+        first = KeptBaseline(old, START, START, replaced=Baseline(140.0))
+        second = KeptBaseline(
+            Baseline(600.0, 7.0), START + 1, START, replaced=old, level=Level.ERROR
+        )
+        for kept in (first, second):
+            history.set_baseline(VALVE, kept)
+        history.set_baseline(OTHER, first)
+        assert history.baselines(VALVE.name) == (first, second)
+        assert history.baselines(VALVE.name, START + 1) == (second,)
+        assert history.baselines(VALVE.name, until=START + 1) == (first,)
+        told = second.to_dict()
+        assert (told["set_by"], told["level"]) == ("set_baseline", "ERROR")
+        assert (told["baseline"], told["baseline_half_width"]) == (600.0, 7.0)
+        assert (told["replaced"], told["replaced_half_width"]) == (150.0, 2.0)
+        assert (told["baseline_sliding"], told["replaced_sliding"]) == (None, vars(SLIDING))
+
+    def test_one_that_was_withdrawn_leaves_none(self, history):
+        kept = KeptBaseline(Baseline(150.0), START, START)
+        history.set_baseline(VALVE, kept)
+        gone = replace(kept, time=START + 1, by="restore_baseline", withdrawn=True)
+        history.set_baseline(VALVE, gone)
+        assert history.baseline(VALVE.name) is None
+        assert history.baseline(VALVE.name, until=START + 1) == kept
+        assert history.baselines(VALVE.name) == (kept, gone)
+        assert gone.in_force is None
+        assert gone.to_dict()["baseline"] is None
+
     def test_it_outlives_the_retention(self, history):
         for k in range(2):
             history.set_baseline(VALVE, KeptBaseline(Baseline(150.0 + k), START + k, START))
         history.add(success(START + 100 * DAY), days=10)
         assert history.baseline(VALVE.name).baseline == Baseline(151.0)
         assert select(history, "SELECT count(*) FROM baseline") == [(1,)]
+
+
+class TestLastSuccess:
+    def test_it_is_the_one_written_last(self, history):
+        """In the order of writing, as a clock may go back; no refusal, no other valve."""
+        history.add(refused(START))
+        assert history.last_success(VALVE.name) is None
+        last = success(START + 1, 400.0, baseline=Baseline(100.0))
+        for entry in (success(START + 2), last, refused(START + 3), success(valve=OTHER)):
+            history.add(entry)
+        assert same(history.last_success(VALVE.name), last)
+
+    def test_it_outlives_the_retention(self, history):
+        history.add(success(START))
+        history.add(success(START + 1))
+        history.add(refused(START + 100 * DAY), days=10)
+        assert [one.time - START for one in history.entries()] == [1, 100 * DAY]
+
+    @pytest.mark.parametrize(
+        "damage",
+        [
+            "identification SET level = 'high'",
+            "identification SET status_signal = 'X'",
+            "identification SET warn_ratio = 'much'",
+            "parameter SET name = 'friction' WHERE name = 'coulomb_friction'",
+        ],
+    )
+    def test_a_row_that_holds_none_is_an_error(self, history, damage):
+        history.add(success())
+        connection = sqlite3.connect(history.path)
+        connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {damage}")
+        connection.close()
+        with pytest.raises(HistoryError, match="a row holds no result"):
+            history.last_success(VALVE.name)
 
 
 class TestRetention:

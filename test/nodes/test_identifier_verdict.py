@@ -46,7 +46,7 @@ def test_baseline_needs_an_estimate(healthy):
     assert "the valve has no result" in refused.message
     assert accepted.success
     result = identify(quick_record(), BENCH_VALVE)
-    assert accepted.message == f"baseline: {Baseline.of(result)}"
+    assert accepted.message == f"baseline: {Baseline.of(result)}; before: none"
     healthy = result.parameters["coulomb_friction"]
     assert healthy.interval[0] < 152.7 < healthy.interval[1]
 

@@ -18,6 +18,7 @@ REFUSALS = (RefusalError,)
 _SERVICES = {
     "identify": "identify the buffered samples, and say the diagnosis",
     "set_baseline": "take the last result as the friction of the healthy valve",
+    "restore_baseline": "undo the last set_baseline",
     "save": "save the buffered samples as a bag",
     "report": "write a page about the last result",
     "clear": "empty the buffer",
@@ -29,7 +30,7 @@ _DISCOVERY = 5.0
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
-    listed = "\n".join(f"  {name:<14} {text}" for name, text in _SERVICES.items())
+    listed = "\n".join(f"  {name:<17} {text}" for name, text in _SERVICES.items())
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.description = f"Call a service of a running identifier, and wait:\n{listed}"
     parser.epilog = (

@@ -50,7 +50,9 @@ def _until(text: str) -> datetime:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
-    parser.description = "List what the identifiers have kept: identifications, refusals and trend."
+    parser.description = (
+        "List what the identifiers have kept: identifications, refusals, baselines and trend."
+    )
     parser.epilog = (
         "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
         "picture could not be written; 3: the latest diagnosis of a valve reached --fail-on."

@@ -10,11 +10,13 @@ from valve_friction_ros.health.comparison import (
 )
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
+    EarlierEstimate,
     FrictionLimits,
     Level,
     StatusSignal,
     dead_band,
     diagnose,
+    diagnose_again,
     percentage,
 )
 from valve_friction_ros.health.friction_monitor import (
@@ -28,6 +30,7 @@ __all__ = [
     "Baseline",
     "Comparison",
     "Diagnosis",
+    "EarlierEstimate",
     "FrictionLimits",
     "FrictionMonitor",
     "IdentificationInput",
@@ -40,6 +43,7 @@ __all__ = [
     "compared",
     "dead_band",
     "diagnose",
+    "diagnose_again",
     "friction_words",
     "identify_snapshot",
     "percentage",

@@ -1,9 +1,10 @@
 """From a result to the diagnosis: whether friction has grown or collapsed, and its consequence."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
-from typing import Any
+from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
@@ -13,13 +14,18 @@ from valve_friction_ros.model.valve import Valve
 
 __all__ = [
     "Diagnosis",
+    "EarlierEstimate",
     "FrictionLimits",
+    "Frictions",
     "Level",
     "StatusSignal",
     "dead_band",
     "diagnose",
+    "diagnose_again",
     "percentage",
 ]
+
+_DOUBT = "the Karnopp model does not describe this valve"
 
 
 class Level(IntEnum):
@@ -125,7 +131,46 @@ class Diagnosis:
         return f"{self.level.name}: {self.message}"
 
 
-def dead_band(result: Result, valve: Valve) -> float:
+class Frictions(Protocol):
+    """The numbers that a diagnosis compares: those of a `Result`, or kept ones."""
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters by name."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Their values."""
+
+    @property
+    def sliding_speed(self) -> float:
+        """Speed that the sliding friction belongs to, m/s."""
+
+
+class EarlierEstimate(Frictions, Protocol):
+    """An estimate that was kept, with the diagnosis that was made by it."""
+
+    @property
+    def time(self) -> int:
+        """When it was identified, ns since 1970 (UTC)."""
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """The diagnosis of that time."""
+
+    @property
+    def baseline(self) -> Baseline | None:
+        """The baseline of that time."""
+
+    @property
+    def limits(self) -> FrictionLimits:
+        """The limits of that time."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values, with the keys of `Result.to_dict`."""
+
+
+def dead_band(result: Frictions, valve: Valve) -> float:
     """Return the dead band of the stem as a share of the travel.
 
     After a move the sliding friction F_c still holds the spring off balance; to move back, the
@@ -133,17 +178,18 @@ def dead_band(result: Result, valve: Valve) -> float:
     frictionless stem by (F_c + F_s)/k. Without a slip jump F_s is F_c. The result is nan without a
     spring, without travel stops, or where F_c or k is not identifiable.
     """
-    values = result.values
-    if not values["spring_constant"] > 0:
+    names = ("spring_constant", "coulomb_friction", "static_friction")
+    spring_constant, coulomb_friction, static_friction = (
+        result.values.get(name, math.nan) for name in names
+    )
+    if not spring_constant > 0:
         return math.nan
-    coulomb_friction, static_friction = values["coulomb_friction"], values["static_friction"]
     if math.isnan(static_friction):
         static_friction = coulomb_friction
-    force = coulomb_friction + static_friction
-    return valve.share_of_travel(force / values["spring_constant"])
+    return valve.share_of_travel((coulomb_friction + static_friction) / spring_constant)
 
 
-def _consequence(result: Result, valve: Valve) -> str:
+def _consequence(result: Frictions, valve: Valve) -> str:
     share = dead_band(result, valve)
     if math.isnan(share):
         friction = next(one for one in _frictions(result) if not math.isnan(one.value))
@@ -151,7 +197,7 @@ def _consequence(result: Result, valve: Valve) -> str:
     return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
 
 
-def _frictions(result: Result) -> list[Parameter]:
+def _frictions(result: Frictions) -> list[Parameter]:
     """Return F_c and, where the result has one, the sliding friction."""
     return [result.parameters[n] for n in ("coulomb_friction", SLIDING) if n in result.parameters]
 
@@ -204,8 +250,28 @@ def diagnose(
     return _with_model_doubt(_by_size(result, valve, baseline, limits), result)
 
 
+def diagnose_again(
+    earlier: EarlierEstimate, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
+) -> Diagnosis:
+    """Return the diagnosis of an estimate that was kept.
+
+    It is the one of that time, unless another baseline, or other limits, are in force and the kept
+    frictions can be compared with them. Without a baseline it stays: an alarm does not end because
+    the baseline of that time was not kept. A doubt about the model stays.
+    """
+    kept = earlier.diagnosis
+    is_same = (baseline, limits) == (earlier.baseline, earlier.limits)
+    if baseline is None or is_same or any(one.value < 0 for one in _frictions(earlier)):
+        return kept
+    if compared(earlier.parameters, earlier.sliding_speed, baseline) is None:
+        return kept
+    again = _by_size(earlier, valve, baseline, limits)
+    doubt, _, _ = kept.message.partition(";")
+    return _doubted(again, doubt) if doubt.startswith(_DOUBT) else again
+
+
 def _by_size(
-    result: Result, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
+    result: Frictions, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
 ) -> Diagnosis:
     found = None
     if baseline is not None:
@@ -223,7 +289,7 @@ def _by_size(
     return Diagnosis(Level.OK, StatusSignal.GOOD, f"{why}; {effect}", None)
 
 
-def _why_not_compared(result: Result, baseline: Baseline) -> str:
+def _why_not_compared(result: Frictions, baseline: Baseline) -> str:
     """Return why a result has no friction to compare with a baseline, in one sentence."""
     reasons = []
     for one in _frictions(result):
@@ -240,7 +306,7 @@ def _why_not_compared(result: Result, baseline: Baseline) -> str:
     return f"no comparison with the baseline ({baseline}): {'; '.join(reasons)}"
 
 
-def _vanished(result: Result, baseline: Baseline, limits: FrictionLimits) -> str:
+def _vanished(result: Frictions, baseline: Baseline, limits: FrictionLimits) -> str:
     """Return that a friction too small to be identified lies below the low limit, or nothing.
 
     The sliding friction decides where both have it. F_c decides only where no sliding friction
@@ -270,14 +336,15 @@ def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
     misfit = result.misfit
     if misfit is None or misfit.describes:
         return diagnosis
-    doubt = (
-        "the Karnopp model does not describe this valve "
-        f"({misfit.words} of misfit); {diagnosis.message}"
-    )
+    return _doubted(diagnosis, f"{_DOUBT} ({misfit.words} of misfit)")
+
+
+def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:
+    message = f"{doubt}; {diagnosis.message}"
     if diagnosis.level >= Level.WARN:
-        return replace(diagnosis, message=doubt)
+        return replace(diagnosis, message=message)
     return replace(
-        diagnosis, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=doubt
+        diagnosis, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=message
     )
 
 

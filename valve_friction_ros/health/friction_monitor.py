@@ -6,10 +6,12 @@ from typing import NamedTuple
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
+    EarlierEstimate,
     FrictionLimits,
     Level,
     StatusSignal,
     diagnose,
+    diagnose_again,
 )
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
@@ -87,6 +89,16 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
         ) from refusal
 
 
+def _ago(age: int) -> str:
+    """Write an age, ns, as whole units before a comma; nothing where the clock went back."""
+    seconds = age / 1e9
+    if seconds < 0:
+        return ""
+    units = (("days", 86400), ("h", 3600), ("min", 60))
+    unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
+    return f"{seconds // length:.0f} {unit} ago, "
+
+
 class FrictionMonitor:
     """The monitor of one valve.
 
@@ -106,6 +118,7 @@ class FrictionMonitor:
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
         self._result: Result | None = None
+        self._earlier: EarlierEstimate | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
         self._internal_error: str | None = None
@@ -124,8 +137,18 @@ class FrictionMonitor:
 
     @property
     def stamp(self) -> int | None:
-        """When the latest result was found, ns."""
+        """When the latest result was found, or the earlier estimate, ns."""
         return self._stamp
+
+    @property
+    def earlier(self) -> EarlierEstimate | None:
+        """The estimate from before the monitor began; None once there is a result."""
+        return self._earlier
+
+    @property
+    def estimate(self) -> Result | EarlierEstimate | None:
+        """The latest result, or else the earlier estimate."""
+        return self._result or self._earlier
 
     @property
     def refusal(self) -> str | None:
@@ -148,9 +171,13 @@ class FrictionMonitor:
         """Return a copy of the buffer, with the settings in force."""
         return IdentificationInput(self.buffer.snapshot(), self._settings)
 
+    def remember(self, earlier: EarlierEstimate) -> None:
+        """Go on with an estimate from before the monitor began, until there is a result."""
+        self._earlier, self._stamp = earlier, earlier.time
+
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
-        self._result, self._stamp = result, stamp
+        self._result, self._earlier, self._stamp = result, None, stamp
         self._refusal = self._internal_error = None
 
     def refuse(self, refusal: RefusalError) -> None:
@@ -170,12 +197,13 @@ class FrictionMonitor:
             raise RefusalError("the valve has no result to take as baseline: identify it first")
         return Baseline.of(self._result)
 
-    def diagnosis(self) -> Diagnosis:
-        """Return the diagnosis by the latest result, also after a refusal; OK without a result.
+    def diagnosis(self, now: int | None = None) -> Diagnosis:
+        """Return the diagnosis by the latest result, also after a refusal; OK without any.
 
+        That of an earlier estimate says how old it is at the time `now`, ns, where that is given.
         A bug in an identification raises the level to WARN at least, until one succeeds.
         """
-        diagnosis = self._diagnosis_by_result()
+        diagnosis = self._diagnosis_by_result(now)
         if self._internal_error is None:
             return diagnosis
         message = f"{self._internal_error}; before: {diagnosis.message}"
@@ -183,13 +211,18 @@ class FrictionMonitor:
             return replace(diagnosis, message=message)
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
 
-    def _diagnosis_by_result(self) -> Diagnosis:
-        if self._result is None:
+    def _diagnosis_by_result(self, now: int | None) -> Diagnosis:
+        valve, limits = self._settings.valve, self._settings.limits
+        if self._result is not None:
+            diagnosis = diagnose(self._result, valve, self.baseline, limits)
+        elif self._earlier is not None:
+            diagnosis = diagnose_again(self._earlier, valve, self.baseline, limits)
+            if now is not None:
+                age = f"(identified {_ago(now - self._earlier.time)}before the restart)"
+                diagnosis = replace(diagnosis, message=f"{diagnosis.message} {age}")
+        else:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
-        diagnosis = diagnose(
-            self._result, self._settings.valve, self.baseline, self._settings.limits
-        )
         if self._refusal is None:
             return diagnosis
         message = f"the latest identification was refused: {self._refusal}; before: "

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from valve_friction_ros import __version__
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import carried
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Level
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
 from valve_friction_ros.identification import (
     SLIDING,
@@ -94,7 +94,7 @@ class FrictionPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class KeptBaseline:
-    """A baseline and its source.
+    """A baseline and its source: one change of the baseline in force.
 
     Attributes
     ----------
@@ -106,12 +106,40 @@ class KeptBaseline:
         When its result was identified, ns: a new trend begins there.
     record : Recording or None
         Its record, thinned (`thin`), for pictures; None where it is unknown.
+    replaced : Baseline or None
+        The baseline that was in force before; None: there was none, or it is unknown.
+    by : str
+        The service that set it.
+    level : Level or None
+        Level of the diagnosis when it was set; None where it is unknown.
+    withdrawn : bool
+        Whether this baseline was withdrawn then, so that none is in force.
     """
 
     baseline: Baseline
     time: int
     since: int
     record: Recording | None = field(default=None, repr=False, compare=False)
+    replaced: Baseline | None = None
+    by: str = "set_baseline"
+    level: Level | None = None
+    withdrawn: bool = False
+
+    @property
+    def in_force(self) -> Baseline | None:
+        """The baseline in force from then on."""
+        return None if self.withdrawn else self.baseline
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as a mapping of plain values, SI units; times are ns since 1970 (UTC)."""
+        return {
+            "time": self.time,
+            "since": self.since,
+            "set_by": self.by,
+            "level": None if self.level is None else self.level.name,
+            **_frictions_of("baseline", self.in_force),
+            **_frictions_of("replaced", self.replaced),
+        }
 
     @staticmethod
     def thin(record: Recording) -> Recording:
@@ -124,6 +152,15 @@ class KeptBaseline:
             record.start_time,
             driven_by=record.driven_by,
         )
+
+
+def _frictions_of(name: str, baseline: Baseline | None) -> dict[str, Any]:
+    sliding = None if baseline is None else baseline.sliding
+    return {
+        name: None if baseline is None else baseline.coulomb_friction,
+        f"{name}_half_width": None if baseline is None else baseline.half_width,
+        f"{name}_sliding": None if sliding is None else dict(vars(sliding)),
+    }
 
 
 @dataclass(frozen=True)
@@ -184,6 +221,11 @@ class HistoryEntry:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
 
     @property
+    def values(self) -> dict[str, float]:
+        """Values of the parameters by name."""
+        return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    @property
     def friction(self) -> Parameter | None:
         """The Coulomb friction; None for a refusal."""
         return self.parameters.get("coulomb_friction")
@@ -194,8 +236,6 @@ class HistoryEntry:
         What it keeps of a result has the keys of `Result.to_dict`.
         """
         begin, end = self.span or (None, None)
-        baseline = self.baseline
-        sliding = None if baseline is None else baseline.sliding
         return {
             "time": self.time,
             "begin": begin,
@@ -208,9 +248,7 @@ class HistoryEntry:
             "systematic_misfit": plain(self.fit.systematic),
             "warnings": list(self.warnings),
             "diagnosis": self.diagnosis.to_dict(),
-            "baseline": None if baseline is None else baseline.coulomb_friction,
-            "baseline_half_width": None if baseline is None else baseline.half_width,
-            "baseline_sliding": None if sliding is None else vars(sliding),
+            **_frictions_of("baseline", self.baseline),
             "limits": plain(vars(self.limits)),
             "refusal": self.refusal,
             "settings": json.loads(self.settings),
@@ -311,7 +349,7 @@ def entry_of(
         valve=valve,
         span=span_of(snapshot),
         method=settings.method_used,
-        diagnosis=monitor.diagnosis(),
+        diagnosis=monitor.diagnosis(time),
         limits=monitor.settings.limits,
         baseline=monitor.baseline,
         settings=settings_text(settings),

@@ -1,8 +1,9 @@
 """The history of a plant's valves: one file that several processes write at once."""
 
+import contextlib
 import sqlite3
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from valve_friction_ros.health.baseline import Baseline
@@ -14,11 +15,11 @@ from valve_friction_ros.history.entry import (
     friction_point,
 )
 from valve_friction_ros.history.rows import (
-    baseline_in,
     entries_in,
     frictions_in,
     insert_baseline,
     insert_entry,
+    kept_baseline_in,
     record_in,
     valve_id,
 )
@@ -32,6 +33,11 @@ _DAY = 86_400_000_000_000
 
 _END_OF_TIME = 2**63 - 1
 """Largest integer in SQLite."""
+
+_BASELINES = (
+    "SELECT baseline.* FROM baseline JOIN valve ON valve.id = valve_id "
+    "WHERE name = ? AND time_ns >= ? AND time_ns < ?"
+)
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,7 @@ class HistoryFile:
     def add(self, entry: HistoryEntry, days: float = 0.0) -> None:
         """Add an identification; delete those of its valve that are `days` older, none for 0.
 
-        The newest baseline stays, at any age.
+        The newest baseline and the last success stay, at any age.
         """
         with writing(self.path) as connection:
             valve = valve_id(connection, entry.valve)
@@ -72,20 +78,41 @@ class HistoryFile:
             insert_baseline(connection, valve_id(connection, valve), kept)
 
     def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
-        """Return the newest baseline set before `until` (ns) for the valve of this name, if any."""
-        with reading(self.path) as connection:
-            connection.row_factory = sqlite3.Row
+        """Return the newest baseline set before `until` (ns) for the valve of this name, if any.
+
+        There is none where the newest one was withdrawn.
+        """
+        with self._rows() as connection:
             row = connection.execute(
-                "SELECT baseline.* FROM baseline "
-                "JOIN valve ON valve.id = valve_id WHERE name = ? AND time_ns < ? "
-                "ORDER BY baseline.id DESC",
-                (valve, until),
+                f"{_BASELINES} ORDER BY baseline.id DESC", (valve, -_END_OF_TIME, until)
             ).fetchone()
-            baseline = None if row is None else baseline_in(row)
-            if baseline is None:
+            if row is None or (kept := kept_baseline_in(row)).withdrawn:
                 return None
-            record = record_in(connection, row["id"])
-        return KeptBaseline(baseline, row["time_ns"], row["since_ns"], record)
+            return replace(kept, record=record_in(connection, row["id"]))
+
+    def baselines(
+        self, valve: str, since: int = -_END_OF_TIME, until: int = _END_OF_TIME
+    ) -> tuple[KeptBaseline, ...]:
+        """Return each change of a valve's baseline, oldest first, without records."""
+        with self._rows() as connection:
+            rows = connection.execute(f"{_BASELINES} ORDER BY baseline.id", (valve, since, until))
+            return tuple(map(kept_baseline_in, rows))
+
+    def last_success(self, valve: str) -> HistoryEntry | None:
+        """Return the identification that a valve's diagnosis was last made by, if any."""
+        with self._rows() as connection:
+            row = connection.execute(
+                "SELECT time_ns FROM identification JOIN valve ON valve.id = valve_id "
+                "WHERE name = ? AND refusal IS NULL ORDER BY identification.id DESC",
+                (valve,),
+            ).fetchone()
+            if row is None:
+                return None
+            found = entries_in(connection, [valve], row["time_ns"], row["time_ns"] + 1)
+            last = next(one for one in reversed(found) if not one.refusal)
+            if last.friction is None:
+                raise ValueError("a success without coulomb_friction")
+        return last
 
     def points(
         self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None
@@ -126,17 +153,26 @@ class HistoryFile:
 
         They lie from `since` on and before `until`, ns since 1970 (UTC).
         """
+        with self._rows() as connection:
+            return entries_in(connection, valves, since, until)
+
+    @contextlib.contextmanager
+    def _rows(self) -> Iterator[sqlite3.Connection]:
+        """Read rows by the names of their columns; a row that holds no value is an error."""
         with reading(self.path) as connection:
+            connection.row_factory = sqlite3.Row
             try:
-                return entries_in(connection, valves, since, until)
-            except ValueError as error:
+                yield connection
+            except (LookupError, TypeError, ValueError) as error:
                 raise HistoryError(f"{self.path}: a row holds no result: {error}") from None
 
 
 def _forget(connection: sqlite3.Connection, valve: int, before: int) -> None:
     """Delete the rows of a valve from before a time (ns), and settings without a reference."""
     done = connection.execute(
-        "DELETE FROM identification WHERE valve_id = ? AND time_ns < ?", (valve, before)
+        "DELETE FROM identification WHERE valve_id = ? AND time_ns < ? AND id != coalesce("
+        "(SELECT max(id) FROM identification WHERE valve_id = ? AND refusal IS NULL), 0)",
+        (valve, before, valve),
     )
     if done.rowcount:
         connection.execute(

@@ -30,11 +30,11 @@ from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 
 __all__ = [
-    "baseline_in",
     "entries_in",
     "frictions_in",
     "insert_baseline",
     "insert_entry",
+    "kept_baseline_in",
     "record_in",
     "valve_id",
 ]
@@ -55,7 +55,8 @@ _OF_ENTRY = (
     "baseline_sliding_half_width",
     "baseline_sliding_speed",
 )
-"""Columns of a baseline, in its own table and in that of the identifications."""
+_OF_REPLACED = tuple(f"replaced_{name}" for name in _OF_BASELINE)
+"""Columns of a baseline: in its table, in that of the identifications, and as the one before."""
 
 
 def valve_id(connection: sqlite3.Connection, valve: KeptValve) -> int:
@@ -141,6 +142,10 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         time_ns=kept.time,
         since_ns=kept.since,
         **_baseline_columns(kept.baseline, _OF_BASELINE),
+        **_baseline_columns(kept.replaced, _OF_REPLACED),
+        set_by=kept.by,
+        level=kept.level,
+        withdrawn=kept.withdrawn,
     )
     if kept.record is not None:
         _insert(
@@ -183,9 +188,24 @@ def _baseline_columns(baseline: Baseline | None, names: Sequence[str]) -> dict[s
     return dict(zip(names, values, strict=True))
 
 
-def baseline_in(row: sqlite3.Row, names: Sequence[str] | None = None) -> Baseline | None:
-    """Return the baseline in a row of its table, or in columns of other names, if any."""
-    friction, width, *sliding = (_cell(row, name) for name in names or _OF_BASELINE)
+def kept_baseline_in(row: sqlite3.Row) -> KeptBaseline:
+    """Return the baseline in a row of its table, without its record."""
+    baseline, level = _baseline_in(row, _OF_BASELINE), _cell(row, "level")
+    if baseline is None:
+        raise ValueError("a baseline without a friction")
+    return KeptBaseline(
+        baseline,
+        row["time_ns"],
+        row["since_ns"],
+        replaced=_baseline_in(row, _OF_REPLACED),
+        by=_cell(row, "set_by") or "set_baseline",
+        level=None if level is None else Level(level),
+        withdrawn=bool(_cell(row, "withdrawn")),
+    )
+
+
+def _baseline_in(row: sqlite3.Row, names: Sequence[str]) -> Baseline | None:
+    friction, width, *sliding = (_cell(row, name) for name in names)
     if friction is None and sliding[0] is None:
         return None
     return Baseline(friction, width, None if sliding[0] is None else SlidingFriction(*sliding))
@@ -242,7 +262,7 @@ def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
             None if row["ratio"] is None else ratio,
         ),
         limits=FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"]),
-        baseline=baseline_in(row, _OF_ENTRY),
+        baseline=_baseline_in(row, _OF_ENTRY),
         sliding_speed=_number(_cell(row, "sliding_speed")),
         settings=row["content"],
         parameters={one.name: one for one in parameters},
@@ -269,7 +289,6 @@ def entries_in(
     """Read identifications, oldest first; see `HistoryFile.entries`."""
     names = [name for (name,) in connection.execute("SELECT name FROM valve")]
     wanted = names if valves is None else valves
-    connection.row_factory = sqlite3.Row
     found = [
         entry for valve in wanted for entry in _entries_of_valve(connection, (valve, since, until))
     ]

@@ -9,11 +9,12 @@ from urllib.parse import quote
 
 __all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
-and no half widths without calibration; version 3 has no records of baselines."""
+and no half widths without calibration; version 3 has no records of baselines; version 4 does not
+say what a baseline replaced."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -129,6 +130,25 @@ CREATE TABLE baseline_record (
 """
 """Samples of the record of a baseline, single precision, the least significant byte first."""
 
+_REPLACED = """
+ALTER TABLE baseline ADD COLUMN set_by TEXT NOT NULL DEFAULT 'set_baseline';
+ALTER TABLE baseline ADD COLUMN level INTEGER;
+ALTER TABLE baseline ADD COLUMN withdrawn INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE baseline ADD COLUMN replaced_coulomb_friction REAL;
+ALTER TABLE baseline ADD COLUMN replaced_half_width REAL;
+ALTER TABLE baseline ADD COLUMN replaced_sliding_friction REAL;
+ALTER TABLE baseline ADD COLUMN replaced_sliding_half_width REAL;
+ALTER TABLE baseline ADD COLUMN replaced_sliding_speed REAL;
+UPDATE baseline SET
+    (replaced_coulomb_friction, replaced_half_width, replaced_sliding_friction,
+     replaced_sliding_half_width, replaced_sliding_speed)
+    = (SELECT coulomb_friction, half_width, sliding_friction, sliding_half_width, sliding_speed
+       FROM baseline AS former
+       WHERE former.valve_id = baseline.valve_id AND former.id < baseline.id
+       ORDER BY former.id DESC LIMIT 1);
+"""
+"""Who set a baseline, at which level, and what it replaced: in an older file the row before it."""
+
 _ADDED = {
     "ratio_of": "TEXT",
     "ratio_speed": "REAL",
@@ -153,6 +173,7 @@ _STEPS = {
         "DROP TABLE former_baseline",
     ),
     3: (_RECORD,),
+    4: tuple(_REPLACED.split(";")),
 }
 """What leads from a version to the next one."""
 
@@ -240,7 +261,9 @@ def _make_tables(connection: sqlite3.Connection) -> None:
     """Create the tables of a new file, and add to those of an older one what they lack."""
     version = _pragma(connection, "user_version")
     steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
-    statements = chain(*steps) if version else f"{_SCHEMA};{_BASELINE};{_RECORD}".split(";")
+    statements = (
+        chain(*steps) if version else f"{_SCHEMA};{_BASELINE};{_RECORD};{_REPLACED}".split(";")
+    )
     for statement in filter(str.strip, statements):
         connection.execute(statement)
     connection.execute(f"PRAGMA application_id = {_APPLICATION}")

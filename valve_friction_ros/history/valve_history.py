@@ -26,12 +26,15 @@ class ValveHistory:
     trend : Trend or None
         Drift of the results of the last method, against the last baseline and limits. Two methods
         may differ by themselves, so a trend uses the results of one method.
+    baselines : tuple of KeptBaseline
+        Each change of its baseline, oldest first, without records.
     """
 
     valve: KeptValve
     entries: tuple[HistoryEntry, ...]
     set_baseline: KeptBaseline | None
     trend: Trend | None
+    baselines: tuple[KeptBaseline, ...] = ()
 
 
 def valve_histories(
@@ -47,12 +50,13 @@ def valve_histories(
         if not entries:
             continue
         kept = history.baseline(valve.name, until)
+        baselines = history.baselines(valve.name, since, until)
         begin = since if kept is None else max(since, kept.since)
         last = entries[-1]
         same = (one for one in entries if one.time >= begin and one.method == last.method)
         points = [point for one in same if (point := one.point(last.baseline)) is not None]
         trend = trend_of(points, last.baseline, last.limits)
-        found.append(ValveHistory(valve, entries, kept, trend))
+        found.append(ValveHistory(valve, entries, kept, trend, baselines))
     return tuple(found)
 
 

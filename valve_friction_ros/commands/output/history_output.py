@@ -11,7 +11,7 @@ from typing import Any
 from rich.table import Table
 
 from valve_friction_ros.commands.output.formatting import plain_console
-from valve_friction_ros.history import HistoryEntry, Trend, ValveHistory
+from valve_friction_ros.history import HistoryEntry, KeptBaseline, Trend, ValveHistory
 from valve_friction_ros.identification import (
     parameter_cells,
     parameter_columns,
@@ -63,22 +63,23 @@ def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
     return told
 
 
-def _shown(entry: HistoryEntry) -> dict[str, Any]:
-    """Return an entry as a mapping, with its times as text."""
+def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
+    """Return an entry, or a baseline, as a mapping, with its times as text."""
     shown = entry.to_dict()
-    for name in ("time", "begin", "end"):
+    for name in {"time", "begin", "end", "since"} & {*shown}:
         shown[name] = None if shown[name] is None else time_text(shown[name])
     return shown
 
 
 def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
-    """Build the object that JSON shows: a list of valves, each with entries and trend; SI units."""
+    """Build the object that JSON shows: valves, each with trend, baselines and entries."""
     return {
         "valves": [
             {
                 "name": history.valve.name,
                 "tag": history.valve.tag,
                 "trend": _trend_as_json(history.trend),
+                "baselines": [_shown(kept) for kept in history.baselines],
                 "entries": [_shown(entry) for entry in history.entries],
             }
             for history in histories
@@ -139,8 +140,26 @@ def _told(entry: HistoryEntry) -> str:
     return entry.refusal or re.split("[:;]", entry.diagnosis.message)[0]
 
 
+def _cells(row: HistoryEntry | KeptBaseline) -> tuple[str, ...]:
+    """Return what the table shows of an identification or a baseline, after its time."""
+    if isinstance(row, KeptBaseline):
+        level = "" if row.level is None else row.level.name
+        change = f"{row.by}: {row.in_force or 'none'}; before: {row.replaced or 'none'}"
+        return ("", "", "baseline", "", level, change)
+    one, ratio = row.friction, row.diagnosis.ratio
+    cells: tuple[str, ...] = ("", "–", "", "", "refused")
+    if one is not None:
+        cells = parameter_cells(one.name, parameter_mapping(one))
+    return (
+        *(cells[place] for place in (1, 2, 4)),
+        "" if ratio is None or row.refusal else f"{ratio.value:.2f}",
+        row.diagnosis.level.name,
+        _told(row),
+    )
+
+
 def print_table(histories: Sequence[ValveHistory]) -> None:
-    """Print a table a valve, and the trend below it."""
+    """Print a table a valve, with its baselines, and the trend below it."""
     console = plain_console()
     for history in histories:
         tag = f"{history.valve.tag} " if history.valve.tag else ""
@@ -161,18 +180,10 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             table.columns[column].justify = "right"
         for column in range(6):
             table.columns[column].no_wrap = True
-        for entry in history.entries:
-            one, ratio = entry.friction, entry.diagnosis.ratio
-            cells: tuple[str, ...] = ("", "–", "", "", "refused")
-            if one is not None:
-                cells = parameter_cells(one.name, parameter_mapping(one))
-            table.add_row(
-                time_text(entry.time, "seconds")[:-1].replace("T", " "),
-                *(cells[place] for place in (1, 2, 4)),
-                "" if ratio is None or entry.refusal else f"{ratio.value:.2f}",
-                entry.diagnosis.level.name,
-                _told(entry),
-            )
+        rows: list[HistoryEntry | KeptBaseline] = [*history.entries, *history.baselines]
+        for row in sorted(rows, key=lambda one: one.time):
+            time = time_text(row.time, "seconds")[:-1].replace("T", " ")
+            table.add_row(time, *_cells(row))
         console.print(table)
         for line in _trend_lines(history.trend):
             console.print(line)

@@ -1,19 +1,26 @@
-"""The baseline in force: parameter, service and history all set it here."""
+"""The baseline in force: parameter, services and history all set it here."""
 
 import math
 from collections.abc import Iterable
 from datetime import datetime, timezone
-from pathlib import Path
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import Baseline, FrictionMonitor
+from valve_friction_ros.health import Baseline, FrictionMonitor, Level
 from valve_friction_ros.history import KeptBaseline
-from valve_friction_ros.nodes.identifier.parameters import BASELINE, baseline_from
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.parameters import (
+    BASELINE,
+    BASELINE_IN_ALARM,
+    baseline_from,
+)
 from valve_friction_ros.nodes.plumbing.parameters import values_of
 
 __all__ = ["BaselineInForce"]
+
+_RESTORE = "restore_baseline"
 
 
 def _value(baseline: Baseline | None) -> float | None:
@@ -26,19 +33,21 @@ def _described_with_date(kept: KeptBaseline) -> str:
 
 
 class BaselineInForce:
-    """Puts a baseline in force: that of the parameter, of ``~/set_baseline`` or of the history.
+    """Puts a baseline in force: that of the parameter, of the services or of the history.
 
     The parameter shows F_c of the baseline in force, nan where that has only a sliding friction. A
     parameter that is set to another value stands for an exact F_c, and no sliding friction; nan
     leaves no baseline.
     """
 
-    def __init__(self, node: Node, monitor: FrictionMonitor) -> None:
+    def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
         self._node = node
         self._monitor = monitor
+        self._history = history
 
-    def begin(self, kept: KeptBaseline | None, history: Path | None) -> None:
+    def begin(self) -> None:
         """Take the baseline of the parameter, or else of the history, and log which."""
+        kept = self._history.baseline
         self._monitor.baseline = baseline_from(values_of(self._node, (BASELINE,)))
         given, log = self._monitor.baseline, self._node.get_logger()
         if given is not None:
@@ -47,12 +56,58 @@ class BaselineInForce:
                 source += f"; the history's is not used: {_described_with_date(kept)}"
             log.info(f"baseline {given}, {source}")
         elif kept is not None:
-            self.put_in_force(kept.baseline)
-            log.info(f"{_described_with_date(kept)}, from the history {history}")
+            self._put_in_force(kept.baseline)
+            log.info(f"{_described_with_date(kept)}, from the history {self._history.path}")
 
-    def put_in_force(self, baseline: Baseline) -> None:
+    async def set(self) -> str:
+        """Take the latest result as the baseline, and keep it; return the old and the new one.
+
+        Raises RefusalError in an alarm, or if the result cannot be a baseline.
+        """
+        baseline = self._monitor.result_as_baseline()
+        self._require_no_alarm()
+        return await self._change(self._history.kept_now(baseline))
+
+    async def restore(self) -> str:
+        """Put the baseline in force that the last ``~/set_baseline`` has replaced, and keep it.
+
+        Raises RefusalError in an alarm, or if there is nothing to undo.
+        """
+        last = self._history.baseline
+        if last is None or last.by == _RESTORE:
+            raise RefusalError("there is no ~/set_baseline to undo: call it to set a baseline")
+        if last.baseline != self._monitor.baseline:
+            raise RefusalError(
+                f"the baseline of the last ~/set_baseline ({last.baseline}) is not in force any "
+                f"more: set {BASELINE.name}, or call ~/set_baseline"
+            )
+        self._require_no_alarm()
+        return await self._change(self._history.replaced_now(last, _RESTORE))
+
+    def _require_no_alarm(self) -> None:
+        diagnosis = self._monitor.diagnosis()
+        allowed = self._node.get_parameter(BASELINE_IN_ALARM.name).value
+        if diagnosis.level >= Level.WARN and not allowed:
+            raise RefusalError(
+                f"the valve is in {diagnosis.level.name}, which another baseline may hide "
+                f"({diagnosis.message}): repair it and identify again, or set "
+                f"{BASELINE_IN_ALARM.name} to true if its friction is healthy, and call again"
+            )
+
+    async def _change(self, kept: KeptBaseline) -> str:
+        self._put_in_force(kept.in_force)
+        await self._history.keep_baseline(kept)
+        answer = (
+            f"baseline: {kept.in_force or 'none'}; before: {kept.replaced or 'none'}"
+            f"{self._history.reservation}"
+        )
+        self._node.get_logger().info(answer)
+        return answer
+
+    def _put_in_force(self, baseline: Baseline | None) -> None:
         """Compare with this baseline from now on."""
-        shown = math.nan if baseline.coulomb_friction is None else baseline.coulomb_friction
+        value = _value(baseline)
+        shown = math.nan if value is None else value
         self._node.set_parameters([Parameter(BASELINE.name, value=shown)])
         self._monitor.baseline = baseline  # after the node has followed the parameter
 

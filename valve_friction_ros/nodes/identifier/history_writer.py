@@ -3,6 +3,7 @@
 import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -11,6 +12,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput
 from valve_friction_ros.history import (
+    HistoryEntry,
     HistoryError,
     HistoryFile,
     KeptBaseline,
@@ -58,6 +60,7 @@ class HistoryWriter:
         self._problem: str | None = None
         self._trend: Trend | None = None
         self._baseline: KeptBaseline | None = None
+        self._former: KeptBaseline | None = None
 
     @property
     def valve(self) -> KeptValve:
@@ -76,6 +79,13 @@ class HistoryWriter:
             return [f"the history is not written: {self.path} has not answered for {busy:.0f} s"]
         return [f"the history is not written: {self._problem}"] if self._problem else []
 
+    def values(self) -> dict[str, str]:
+        """Return the value of the diagnostic that says that nothing is kept, if so."""
+        if self._file is not None:
+            return {}
+        lost = f"none, as {HISTORY_FILE.name} is empty: diagnosis and baseline end with this node"
+        return {"history": lost}
+
     @property
     def reservation(self) -> str:
         """Addition to the answer that something was kept; empty if it is in the file."""
@@ -83,7 +93,10 @@ class HistoryWriter:
 
     @property
     def baseline(self) -> KeptBaseline | None:
-        """The baseline that was kept last, with its record; another one may be in force."""
+        """The baseline that was kept last, with its record; another one may be in force.
+
+        None where that was withdrawn.
+        """
         return self._baseline
 
     def read(self) -> ValveHistory | None:
@@ -101,11 +114,17 @@ class HistoryWriter:
         """Drift of the Coulomb friction, as of the latest identification."""
         return self._trend
 
-    def prepare(self) -> KeptBaseline | None:
-        """Make the file if it is not there, and return the valve's baseline in it, if any."""
+    def prepare(self) -> HistoryEntry | None:
+        """Make the file if it is not there, and read the valve's baseline in it, if any.
+
+        Returns the last success, if any.
+        """
+        name = self._valve.name
         self._tried(HistoryFile.prepare)
-        self._baseline = self._tried(lambda file: file.baseline(self._valve.name))
-        return self._baseline
+        self._baseline = last = self._tried(lambda file: file.baseline(name))
+        if last is not None:
+            self._former = self._tried(lambda file: file.baseline(name, until=last.time))
+        return self._tried(lambda file: file.last_success(name))
 
     def read_trend(self) -> None:
         """Compute the trend with the baseline and settings of now."""
@@ -130,13 +149,34 @@ class HistoryWriter:
             entry = entry_of(self._monitor, self._valve, *identified, time=now)
             await self._written(lambda file: file.add(entry, days))
 
-    async def keep_baseline(self, baseline: Baseline) -> None:
-        """Keep the baseline that was taken from the latest estimate."""
-        now = self._node.get_clock().now().nanoseconds
-        since = now if self._monitor.stamp is None else self._monitor.stamp
-        result = self._monitor.result
-        record = None if result is None else KeptBaseline.thin(result.recording)
-        self._baseline = kept = KeptBaseline(baseline, now, since, record)
+    def kept_now(self, baseline: Baseline) -> KeptBaseline:
+        """Describe a baseline that is taken from the latest result now."""
+        now, monitor = self._node.get_clock().now().nanoseconds, self._monitor
+        since = now if monitor.stamp is None else monitor.stamp
+        record = None if monitor.result is None else KeptBaseline.thin(monitor.result.recording)
+        replaced, level = monitor.baseline, monitor.diagnosis().level
+        return KeptBaseline(baseline, now, since, record, replaced, level=level)
+
+    def replaced_now(self, last: KeptBaseline, by: str) -> KeptBaseline:
+        """Describe that what the last baseline has replaced comes back now, for `by`.
+
+        Where it was kept, it comes back with its record and the beginning of its trend.
+        """
+        former = self._former
+        if former is None or former.baseline != last.replaced:
+            former = replace(last, baseline=last.replaced or last.baseline, since=0, record=None)
+        return replace(
+            former,
+            time=self._node.get_clock().now().nanoseconds,
+            replaced=last.baseline,
+            by=by,
+            level=self._monitor.diagnosis().level,
+            withdrawn=last.replaced is None,
+        )
+
+    async def keep_baseline(self, kept: KeptBaseline) -> None:
+        """Keep a baseline that is in force from now on, or none."""
+        self._former, self._baseline = self._baseline, None if kept.withdrawn else kept
         with self._failures_remembered():
             await self._written(lambda file: file.set_baseline(self._valve, kept))
 

@@ -80,14 +80,17 @@ class Identifier(PolledNode):
         self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
         self._level_log = LevelLog(self)
-        self._identification = Identification(
-            self, self._monitor, ResultTopics(self), workers.identify
-        )
+        results = ResultTopics(self)
+        self._identification = Identification(self, self._monitor, results, workers.identify)
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
-        self._baseline = BaselineInForce(self, self._monitor)
-        self._baseline.begin(self._history.prepare(), self._history.path)
+        self._baseline = BaselineInForce(self, self._monitor, self._history)
+        earlier = self._history.prepare()
+        self._baseline.begin()
+        if earlier is not None:
+            self._monitor.remember(earlier)
+            results.publish(earlier, self._monitor)
         self._history.read_trend()
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
@@ -95,6 +98,7 @@ class Identifier(PolledNode):
             ("save", self._save, "the buffer was not saved"),
             ("report", self._report, "no report was written"),
             ("set_baseline", self._set_baseline, ""),
+            ("restore_baseline", self._restore_baseline, ""),
             ("clear", self._clear, ""),
         ):
             create_trigger_service(self, f"~/{name}", work, waiting, failure)
@@ -203,12 +207,13 @@ class Identifier(PolledNode):
         return str(await written_report(self, self._monitor, self._history, files))
 
     async def _set_baseline(self) -> str:
-        baseline = self._monitor.result_as_baseline()
-        self._baseline.put_in_force(baseline)
-        await self._history.keep_baseline(baseline)
+        answer = await self._baseline.set()
         self._publish_diagnostics()
-        answer = f"baseline: {baseline}{self._history.reservation}"
-        self.get_logger().info(answer)
+        return answer
+
+    async def _restore_baseline(self) -> str:
+        answer = await self._baseline.restore()
+        self._publish_diagnostics()
         return answer
 
     async def _clear(self) -> str:
@@ -234,6 +239,7 @@ class Identifier(PolledNode):
             [*filter(None, [self.overdue()]), *self._input_problems()],
             self._history.problems,
             {
+                **self._history.values(),
                 **trend_values(self._history.trend),
                 **self._schedule.values(),
                 **self._readiness.values(),

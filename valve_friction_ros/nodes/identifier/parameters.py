@@ -22,6 +22,7 @@ from valve_friction_ros.records.data_folder import history_file
 
 __all__ = [
     "BASELINE",
+    "BASELINE_IN_ALARM",
     "CHANGEABLE",
     "HISTORY_DAYS",
     "HISTORY_FILE",
@@ -69,6 +70,11 @@ BASELINE = ParameterSpec(
     "baseline_coulomb_friction",
     math.nan,
     "Coulomb friction of the healthy valve [N], above zero; .nan: not known",
+)
+BASELINE_IN_ALARM = ParameterSpec(
+    "baseline_in_alarm",
+    False,
+    "Whether ~/set_baseline and ~/restore_baseline may change the baseline in WARN or ERROR [-]",
 )
 SAVE_FOLDER = ParameterSpec(
     "save_folder",
@@ -150,6 +156,7 @@ CHANGEABLE = (
         for name in FIXABLE
     ),
     BASELINE,
+    BASELINE_IN_ALARM,
     ParameterSpec(
         "warn_ratio", _LIMITS.warn_ratio, "Friction over baseline worth maintenance [-]", (1.0, 1e3)
     ),

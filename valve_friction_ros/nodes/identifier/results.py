@@ -4,6 +4,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
 
 from valve_friction_ros.health import FrictionMonitor, dead_band
+from valve_friction_ros.history import HistoryEntry
 from valve_friction_ros.identification import SLIDING, UNITS, Result
 from valve_friction_ros.nodes.plumbing.messages import sweep_message
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
@@ -39,19 +40,24 @@ class ResultTopics:
         )
         self._sweep = node.create_publisher(Float64MultiArray, "~/sweep", LATCHED)
 
-    def publish(self, result: Result, monitor: FrictionMonitor) -> None:
-        """Publish a result that the monitor has accepted."""
+    def publish(self, result: Result | HistoryEntry, monitor: FrictionMonitor) -> None:
+        """Publish a result that the monitor has accepted, or the numbers kept of an earlier one."""
         ratio = monitor.diagnosis().ratio
-        evidence = result.evidence
         unknown = float("nan")
+        if isinstance(result, Result):
+            evidence, fit, rms = result.evidence, result.fit, result.rms
+            sweep = None if result.estimate is None else result.estimate.sweep
+            self._sweep.publish(sweep_message(sweep))
+        else:
+            evidence, (fit, rms, _) = {}, result.fit
         figures = {
-            SLIDING: unknown,
+            **dict.fromkeys(_FRICTIONS, unknown),
             **result.values,
             "dead_band": dead_band(result, monitor.settings.valve),
             "friction_ratio": unknown if ratio is None else ratio.value,
             "sliding_speed": result.sliding_speed,
-            "fit": result.fit,
-            "rms": result.rms,
+            "fit": fit,
+            "rms": rms,
             **{name: evidence.get(name, unknown) for name in ("threshold", "sigma", "r_squared")},
         }
         for name, publisher in self._friction.items():
@@ -60,7 +66,5 @@ class ResultTopics:
             one = result.parameters.get(name)
             publisher.publish(Float64(data=unknown if one is None else one.half_width))
         for name, publisher in self._published.items():
-            publisher.publish(Float64(data=result.parameters[name].published))
-        self._sweep.publish(
-            sweep_message(None if result.estimate is None else result.estimate.sweep)
-        )
+            one = result.parameters.get(name)
+            publisher.publish(Float64(data=unknown if one is None else one.published))

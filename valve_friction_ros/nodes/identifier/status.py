@@ -3,12 +3,13 @@
 import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from valve_friction_ros.health import Baseline, FrictionMonitor, Level, StatusSignal, dead_band
 from valve_friction_ros.history import Trend
-from valve_friction_ros.identification import SLIDING, Result
+from valve_friction_ros.identification import SLIDING
 
 __all__ = ["friction_status", "stuck_status", "trend_values"]
 
@@ -20,9 +21,8 @@ def _number(value: float | None) -> str:
     return f"{math.nan if value is None else value:.9g}"
 
 
-def _result_values(result: Result, dead_band_share: float) -> dict[str, str]:
-    """Return what the diagnostic shows of a result, from its one rendering."""
-    shown = result.to_dict()
+def _result_values(shown: Mapping[str, Any], dead_band_share: float) -> dict[str, str]:
+    """Return what the diagnostic shows of a result, or of what is kept of one, as `to_dict`."""
     values: dict[str, str] = {}
     for name, parameter in shown["parameters"].items():
         unit = parameter["unit"]
@@ -42,12 +42,13 @@ def _result_values(result: Result, dead_band_share: float) -> dict[str, str]:
     if shown["systematic_misfit"] is not None:
         values["systematic misfit [µm]"] = _number(1e6 * shown["systematic_misfit"])
     values["method"] = shown["method"]
-    if shown["derivative_window"]:
+    if shown.get("derivative_window"):
         values["derivative_window [samples]"] = str(shown["derivative_window"])
     for name, unit in _EVIDENCE_UNITS.items():
-        if name in shown["evidence"]:
+        if name in shown.get("evidence", {}):
             values[name + unit] = _number(shown["evidence"][name])
-    values["fixed"] = ", ".join(shown["settings"]["fixed"])
+    settings = shown["settings"]
+    values["fixed"] = ", ".join(settings.get("identification", settings).get("fixed", ()))
     values["warnings"] = "; ".join(shown["warnings"])
     return values
 
@@ -101,14 +102,14 @@ def friction_status(
     Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
     level to WARN at least. `more` holds further values.
     """
-    diagnosis = monitor.diagnosis()
+    diagnosis = monitor.diagnosis(now)
     level, signal = diagnosis.level, diagnosis.status_signal
     if input_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
     elif upkeep_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
-    result = monitor.result
-    found = {} if result is None else result.parameters
+    estimate = monitor.estimate
+    found = {} if estimate is None else estimate.parameters
     frictions = [found[name] for name in (SLIDING, "coulomb_friction") if name in found]
     trouble = monitor.internal_error or monitor.refusal
     valid = trouble is None and any(math.isfinite(one.value) for one in frictions)
@@ -118,9 +119,11 @@ def friction_status(
         "reason": reason,
         "NE 107": signal.value,
     }
-    if result is not None and monitor.stamp is not None:
+    if estimate is not None and monitor.stamp is not None:
         values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
-        values |= _result_values(result, dead_band(result, monitor.settings.valve))
+        values["estimate_from"] = "this run" if monitor.earlier is None else "before the restart"
+        share = dead_band(estimate, monitor.settings.valve)
+        values |= _result_values(estimate.to_dict(), share)
     values |= _baseline_values(monitor.baseline)
     if (ratio := diagnosis.ratio) is not None:
         values["friction_ratio"] = _number(ratio.value)

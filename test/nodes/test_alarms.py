@@ -1,0 +1,196 @@
+"""Alarms and baselines over DDS: they outlive a killed node, and no call hides an alarm."""
+
+import math
+import re
+import sqlite3
+
+import pytest
+from histories import DAY, START, VALVE, success
+from live_nodes import NAMESPACE, values_of
+from records import quick_record
+from std_msgs.msg import Float64
+
+from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.history import HistoryFile, KeptBaseline
+from valve_friction_ros.identification import identify
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+PATIENT = {"input_timeout": 600.0}
+HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
+OLD, NEW = (Baseline.of(identify(record, BENCH_VALVE)) for record in (HEALTHY, TIGHT))
+AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)$")
+
+
+@pytest.fixture
+def history(tmp_path):
+    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
+    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+
+
+def killed(live, node):
+    """End a node by kill -9; what comes now is of the next one."""
+    live.client.watched.clear()
+    node.kill()
+    live.nodes.remove(node)
+    live.client.statuses.clear()
+
+
+def test_an_alarm_outlives_a_kill(live):
+    node = live.start_identifier(PATIENT)
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    client.identified(TIGHT)
+    before = client.statuses[-1][1]
+    assert before.level == ERROR
+    killed(live, node)
+
+    live.start_identifier(PATIENT)
+    after = client.next_status()
+    assert after.level == ERROR
+    assert AGE.sub("", after.message) == before.message
+    assert AGE.search(after.message)
+    old, new = values_of(before), values_of(after)
+    assert new["estimate_from"] == "before the restart"
+    assert float(new["estimate_age [s]"]) > 0
+    changing = {"estimate_from", "estimate_age [s]", "buffered_samples"}
+    same = [key for key in new if key in old and key not in changing]
+    assert {key: new[key] for key in same} == {key: old[key] for key in same}
+    for key in (
+        "NE 107",
+        "friction_ratio",
+        "friction_ratio low",
+        "coulomb_friction [N]",
+        "fit [%]",
+    ):
+        assert key in same
+    ratio = client.latched(Float64, f"{NODE}/friction/friction_ratio").data
+    assert ratio == pytest.approx(float(old["friction_ratio"]), rel=1e-8)
+
+    refused = client.trigger("set_baseline")
+    assert not refused.success
+    assert not client.trigger("identify").success
+    status = client.next_status(lambda one: "refused" in one.message, "a refusal")
+    assert status.level == ERROR
+    assert AGE.search(status.message)
+    client.identified(HEALTHY)
+    status = client.statuses[-1][1]
+    assert status.level == OK
+    assert "before the restart" not in status.message
+    assert values_of(status)["estimate_from"] == "this run"
+
+
+def test_an_age_of_days(live, history):
+    """The kept diagnosis is told whatever its age is, and the level as well."""
+    now = live.client.node.get_clock().now().nanoseconds
+    history.add(success(now - 5 * DAY - DAY // 2, 400.0, baseline=None))
+    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
+    node = live.start_identifier(PATIENT)
+    status = live.client.next_status()
+    assert status.level == ERROR
+    assert status.message.startswith("excess friction: coulomb friction is 4.00 (")
+    assert status.message.endswith(" (identified 5 days ago, before the restart)")
+    live.client.wait_until(lambda: "level OK → ERROR: excess" in node.errors, "a logged level")
+
+
+@pytest.mark.parametrize(
+    "damage", ["identification SET level = 'high'", "baseline SET half_width = 'x'"]
+)
+def test_rows_that_cannot_be_read_stop_no_node(live, history, damage):
+    history.add(success())
+    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0), START, START))
+    connection = sqlite3.connect(history.path)
+    connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {damage}")
+    connection.close()
+    live.start_identifier(PATIENT)
+    status = live.client.next_status()
+    assert status.level == WARN
+    assert f"{history.path}: a row holds no result: " in status.message
+    live.client.identified(HEALTHY)
+
+
+def test_a_node_without_a_history_says_so(live):
+    live.start_identifier({**PATIENT, "history_file": "''"})
+    client = live.client
+    told = client.status_values()["history"]
+    assert told == "none, as history_file is empty: diagnosis and baseline end with this node"
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none"
+    assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
+
+
+def test_the_baseline_is_guarded_and_restored(live, history):
+    node = live.start_identifier(PATIENT)
+    client = live.client
+    nothing = client.trigger("restore_baseline")
+    assert not nothing.success
+    assert nothing.message.startswith("there is no ~/set_baseline to undo")
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none"
+    client.identified(TIGHT)
+    for service in ("set_baseline", "restore_baseline"):
+        refused = client.trigger(service)
+        assert not refused.success
+        assert refused.message.startswith("the valve is in ERROR, which another baseline may hide")
+        assert "set baseline_in_alarm to true if its friction is healthy" in refused.message
+    assert client.status_values()["friction_ratio"] != "1"
+    assert len(history.baselines(VALVE.name)) == 1
+
+    assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
+    answer = client.trigger("set_baseline")
+    assert answer.success
+    assert answer.message == f"baseline: {NEW}; before: {OLD}"
+    assert client.next_status().level == OK
+    killed(live, node)
+
+    live.start_identifier(PATIENT)  # by its default again
+    assert client.next_status().level == OK
+    answer = client.trigger("restore_baseline")
+    assert answer.success
+    assert answer.message == f"baseline: {OLD}; before: {NEW}"
+    status = client.next_status()
+    assert status.level == ERROR
+    assert "excess friction" in status.message
+    assert client.parameters(NODE, "baseline_coulomb_friction") == [OLD.coulomb_friction]
+    first, second, third = history.baselines(VALVE.name)
+    assert (first.in_force, first.replaced, first.level) == (OLD, None, Level.OK)
+    assert (second.in_force, second.replaced, second.level) == (NEW, OLD, Level.ERROR)
+    assert (third.in_force, third.replaced, third.level) == (OLD, NEW, Level.OK)
+    assert [one.by for one in (first, second, third)] == [*["set_baseline"] * 2, "restore_baseline"]
+    kept = history.baseline(VALVE.name)
+    assert kept.since == first.since < second.since
+    assert kept.record is not None
+    again = client.trigger("restore_baseline")
+    assert not again.success
+    assert again.message.startswith("there is no ~/set_baseline to undo")
+
+
+def test_the_first_baseline_can_be_undone(live):
+    node = live.start_identifier(PATIENT)
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
+    client.next_status(lambda one: "no baseline yet" in one.message, "no baseline")
+    assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
+    killed(live, node)
+    live.start_identifier(PATIENT)
+    assert "baseline_coulomb_friction [N]" not in client.status_values()
+
+
+def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
+    live.start_identifier({**PATIENT, "baseline_coulomb_friction": 140.0})
+    client = live.client
+    client.identified(HEALTHY)
+    given = Baseline(140.0)
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: {given}"
+    assert client.set_together(NODE, {"baseline_coulomb_friction": 145.0}).successful
+    refused = client.trigger("restore_baseline")
+    assert not refused.success
+    assert "is not in force any more: set baseline_coulomb_friction" in refused.message
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: {Baseline(145.0)}"
+    answer = client.trigger("restore_baseline").message
+    assert answer == f"baseline: {Baseline(145.0)}; before: {OLD}"
+    assert history.baseline(VALVE.name).baseline == Baseline(145.0)
