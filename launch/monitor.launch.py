@@ -136,7 +136,7 @@ ARGUMENTS = {
     ),
     "stem_topic": ("stem_state", "Stem position, sensor_msgs/JointState; may contain {valve}."),
     "one_process": ("true", "false to start a process for each valve."),
-    "respawn": ("false", "true to start a process again that has ended."),
+    "respawn": ("true", "false to leave a process ended that has ended by itself."),
     "log_level": ("info", "debug, info, warn, error or fatal."),
     "use_sim_time": ("false", "true to take time from /clock, as when a bag is played."),
     "reliability": (

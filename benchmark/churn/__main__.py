@@ -84,6 +84,7 @@ def _watch(
     processes: dict[str, NodeProcess], folder: Path, seconds: float, crowd: Crowd, ledger: Ledger
 ) -> None:
     """Let the crowd come and go until the time is over or a node has died."""
+    ledger.add("run", seconds=seconds)
     begin = next_look = time.monotonic()
     first = dict(processes)
     early: dict[str, Usage] = {}

@@ -47,7 +47,7 @@ def _forked(work: Callable[[], None], ledger: Ledger, name: str) -> int:
 def _endings(ledger: Ledger, folder: Path, seed: int, seconds: float) -> None:
     """Start one node after the other, and end it at any time, often in its first seconds."""
     chance, until, number = random.Random(seed), time.monotonic() + seconds, 0
-    kinds = nodes(folder, "/fv_301")
+    kinds = nodes(folder, "/fv_301", ("/fv_401", "/fv_402"))
     while time.monotonic() < until:
         number += 1
         name = chance.choice(sorted(kinds))

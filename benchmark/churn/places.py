@@ -45,10 +45,10 @@ def _parameters(**values: object) -> list[str]:
     return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
 
 
-def nodes(folder: Path, valve: str = _VALVE) -> dict[str, Node]:
+def nodes(folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS) -> dict[str, Node]:
     """Return the processes of a plant that writes into a folder.
 
-    The valve streams as its bench does; two more identifiers in one process hear the same streams.
+    The valve streams as its bench does; the others, in one process, hear the same streams.
     """
     files = _parameters(
         history_file=folder / "history.sqlite",
@@ -59,7 +59,7 @@ def nodes(folder: Path, valve: str = _VALVE) -> dict[str, Node]:
     streams = (f"{valve}/actuator_pressure", f"{valve}/stem_state")
     heard = [
         word
-        for other in _OTHERS
+        for other in others
         for stream in streams
         for word in ("-r", f"{other}/{stream.rpartition('/')[2]}:={stream}")
     ]
@@ -69,7 +69,7 @@ def nodes(folder: Path, valve: str = _VALVE) -> dict[str, Node]:
             *heard,
             "--params-file",
             str(_BENCH),
-            *_parameters(valves=f"[{','.join(_OTHERS)}]"),
+            *_parameters(valves=f"[{','.join(others)}]"),
             *files,
         ],
         "simulator": [*place, *_parameters(position_noise=5e-6)],

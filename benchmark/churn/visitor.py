@@ -118,7 +118,7 @@ def _parameters(visitor: Visitor, chance: random.Random) -> None:
 
 def _listen(visitor: Visitor, chance: random.Random) -> None:
     kinds = [(DiagnosticArray, "/diagnostics"), (FluidPressure, STREAMS[0])]
-    kinds += [(JointState, STREAMS[1]), (Float64, f"{AUDITED}/coulomb_friction")]
+    kinds += [(JointState, STREAMS[1]), (Float64, f"{AUDITED}/friction/coulomb_friction")]
     subscriptions = [
         visitor.node.create_subscription(
             kind,

@@ -14,6 +14,7 @@ from benchmark.churn.processes import NodeProcess
 from benchmark.churn.summary import hung_services, rows
 
 GOOD = (
+    {"kind": "run", "seconds": 60.0},
     {"kind": "visit", "end": "gone"},
     {"kind": "visit", "end": "killed"},
     {"kind": "call", "service": "/fv_101/identifier/identify", "seconds": 0.4},
@@ -26,10 +27,13 @@ BAD = {
     "never answered": {"kind": "call", "service": "/fv_101/identifier/save", "seconds": None},
     "answered after more than 5 s": {"kind": "call", "service": "/a/b/c", "seconds": 5.1},
     "services not found in 30 s": {"kind": "undiscovered", "service": "/a/b/c"},
-    "samples lost": dict(GOOD[3], missing=1),
+    "samples lost": dict(GOOD[4], missing=1),
+    "stream looked at, both signals": {"kind": "run", "seconds": 120.0},
+    "times at which the look came too late": {"kind": "unsaved", "message": "no answer"},
+    "of these and their helpers failed": {"kind": "broken", "name": "audit"},
     "longest silence on /diagnostics": {"kind": "diagnostics", "longest": 6.0},
-    "ended after more than 3 s": dict(GOOD[6], seconds=3.1),
-    "ended with another code": dict(GOOD[6], code=1),
+    "ended after more than 3 s": dict(GOOD[7], seconds=3.1),
+    "ended with another code": dict(GOOD[7], code=1),
     "nodes that ended themselves, frozen": {"kind": "ended itself", "name": "simulator"},
     "nodes that died or hung": {"kind": "died", "name": "simulator", "code": -6},
 }
@@ -63,8 +67,14 @@ def test_a_node_that_answers_others_does_not_hang():
     assert hung_services([lost], until=40.0) == []
 
 
-def test_a_run_without_a_look_at_the_samples_has_not_shown_that_none_is_lost():
-    assert missed([one for one in GOOD if one["kind"] != "samples"]) == ["samples lost"]
+def test_a_run_in_which_nothing_was_looked_at_has_shown_nothing():
+    assert missed([{"kind": "run", "seconds": 120.0}]) == [
+        "participants that came and went",
+        "calls of services and parameters",
+        "stream looked at, both signals",
+        "longest silence on /diagnostics",
+        "nodes ended by SIGINT or SIGTERM",
+    ]
 
 
 def test_missing_samples_are_counted_within_the_record():

@@ -13,14 +13,17 @@ if __name__ == "__main__":
     from valve_friction_ros.nodes.identifier import node
     from valve_friction_ros.nodes.plumbing import deadman
 
-    deadman._LOOP_END = deadman._ANSWER = 2.0
+    deadman.arm.__defaults__ = (2.0,)
+    deadman._ANSWER = 2.0
     deadman._SILENCE = deadman._AGAIN = 0.5
-    forever = ctypes.PyDLL(None).sleep  # holds Python's lock, as rclpy does
+    lock = ctypes.PyDLL(None).pthread_mutex_lock  # holds Python's lock, as rclpy does
+    mutex = ctypes.create_string_buffer(64)
 
     def freezing(name, method):
         def call(self, *arguments, **named):
             if Path(FREEZE).exists() and Path(FREEZE).read_text() == name:
-                forever(1000)
+                lock(mutex)
+                lock(mutex)
             return method(self, *arguments, **named)
 
         return call

@@ -42,12 +42,27 @@ def _kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
     except RuntimeError:  # numba's "cannot cache function: no locator available"
         kernel = numba.njit(nogil=True, **options)(function)
         _without_cache.add(function.__name__)
+    _forgive_a_full_disk(kernel)
     folders = (Path(function.__code__.co_filename).parent, Path(__file__).parent)
     # Numba renews a cache when the kernel's own file changes, and has nothing public to widen that.
     # A plain function, and a kernel without a cache, have no such attribute.
     with contextlib.suppress(AttributeError):
         kernel._cache._cache_file._source_stamp = tuple(map(_sources, folders))  # noqa: SLF001
     return kernel  # type: ignore[no-any-return]
+
+
+def _forgive_a_full_disk(kernel: Any) -> None:
+    """Go on without the cache where it cannot be written."""
+    with contextlib.suppress(AttributeError):
+        save = kernel._cache.save_overload  # noqa: SLF001
+
+        def save_if_possible(signature: object, data: object) -> None:
+            try:
+                save(signature, data)
+            except OSError:
+                _without_cache.add(kernel.__name__)
+
+        kernel._cache.save_overload = save_if_possible  # noqa: SLF001
 
 
 def kernels_are_cached() -> bool:

@@ -10,6 +10,7 @@ from valve_friction_ros.nodes.identifier import parameters
 from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.running import run_nodes
 
 __all__ = ["PARAMETERS", "identifiers_of_valves", "main"]
@@ -31,7 +32,7 @@ def identifiers_of_valves(workers: Workers) -> Iterator[Node]:
     rclpy.exceptions.InvalidNamespaceException
         If a name cannot be a namespace.
     """
-    host = Node("identifiers")
+    host = PolledNode("identifiers")
     yield host
     declare_parameters(host, (_VALVES,))
     valves = [valve for valve in host.get_parameter(_VALVES.name).value if valve]

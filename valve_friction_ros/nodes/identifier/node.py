@@ -124,8 +124,9 @@ class Identifier(PolledNode):
     def overdue(self) -> str | None:
         """Say that the work under way has not ended within its limit, if so."""
         limit = self.get_parameter(IDENTIFICATION_LIMIT.name).value
+        identify = self._workers.identify
         busy, thread = max(
-            (self._workers.identify.busy_for(), "identifications"),
+            (0.0 if identify.is_preparing else identify.busy_for(), "identifications"),
             (self._workers.files.busy_for(), "bags and reports"),
         )
         if busy <= limit:
@@ -236,7 +237,7 @@ class Identifier(PolledNode):
             self._status_name,
             self._history.valve.tag,
             now.nanoseconds,
-            [*filter(None, [self.overdue()]), *self._input_problems()],
+            [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
             self._history.problems,
             {
                 **self._history.values(),

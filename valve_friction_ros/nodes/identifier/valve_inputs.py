@@ -1,6 +1,6 @@
 """The inputs of one valve: two topics of single samples, or one of blocks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -11,7 +11,7 @@ from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
 from valve_friction_ros.nodes.plumbing.messages import rows_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription, TakenMessage
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
-from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of
+from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, readable
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Arrivals
 
@@ -68,9 +68,28 @@ class ValveInputs:
         """Take the samples that have arrived."""
         pressures, stems = self._pressure.take(), self._stem.take()
         if pressures or stems:
-            self._hand_on(arrivals_of(pressures, stems, self._joint))
+            try:
+                arrivals = arrivals_of(pressures, stems, self._joint)
+            except RuntimeError:
+                pressures = self._readable(self._pressure, pressures, FluidPressure)
+                stems = self._readable(self._stem, stems, JointState)
+                arrivals = arrivals_of(pressures, stems, self._joint)
+            self._hand_on(arrivals)
         for block in self._blocks.take():
             self._take_block(block.message)
+
+    def _readable(
+        self, source: _Input, taken: Sequence[TakenMessage], kind: type
+    ) -> list[TakenMessage]:
+        """Drop what is no message of the topic's type, and warn of it."""
+        found = readable(taken, kind)
+        if len(found) < len(taken):
+            self._node.get_logger().warning(
+                f"{len(taken) - len(found)} messages on {source.watch.topic} are damaged, and were "
+                "dropped",
+                throttle_duration_sec=5.0,
+            )
+        return found
 
     def follow_publishers(self) -> None:
         """Take from best-effort and from reliable publishers; to be called now and then."""

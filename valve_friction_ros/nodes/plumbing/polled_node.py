@@ -17,7 +17,14 @@ from rclpy.publisher import Publisher
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
+
 __all__ = ["PolledNode", "TurnExecutor"]
+
+
+_LONGEST_TURN = 0.5
+"""Time, s, after which what is still ready waits for the next turn."""
 
 
 class PolledNode(Node):
@@ -32,10 +39,13 @@ class PolledNode(Node):
     ----------
     last_heard : float
         When a message of its streams was taken last, s of the monotonic clock; at first its start.
+    poll_failure : str or None
+        The bug in the latest work, if there was one.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         self.last_heard = time.monotonic()
+        self.poll_failure: str | None = None
         super().__init__(*arguments, **named)
 
     def create_publisher(self, *arguments: Any, **named: Any) -> Publisher:
@@ -50,6 +60,16 @@ class PolledNode(Node):
 
     def poll(self) -> None:
         """Do the work that is due; called in every turn."""
+
+    def poll_guarded(self) -> None:
+        """Do the work that is due; a bug in it is logged, and costs no other node anything."""
+        try:
+            with bugs_reported(self, known=self.poll_failure):
+                self.poll()
+        except (InternalError, RefusalError) as error:
+            self.poll_failure = str(error)
+        else:
+            self.poll_failure = None
 
     def overdue(self) -> str | None:
         """Say which work in another thread has not ended within its limit; None if there is none.
@@ -76,10 +96,12 @@ class TurnExecutor(SingleThreadedExecutor):
     def turn(self) -> bool:
         """Run what is ready; return whether a service has a new or an unanswered request."""
         is_lively = False
+        until = time.monotonic() + _LONGEST_TURN
         while True:
             asked, answered = self._look()
             is_lively |= asked
-            if not answered:  # else the service may have more requests
+            # A service that has answered may have more requests, but the streams have their turn.
+            if not answered or time.monotonic() > until:
                 return is_lively
 
     def _look(self) -> tuple[bool, bool]:

@@ -20,7 +20,7 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import TakenMessage
 from valve_friction_ros.streams import Arrivals, Kind, Samples
 from valve_friction_ros.streams.joint_position import joint_index
 
-__all__ = ["arrivals_of", "positions_in", "pressures_in"]
+__all__ = ["arrivals_of", "positions_in", "pressures_in", "readable"]
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _BODY = 4
@@ -113,6 +113,19 @@ def _alike(
     return seconds * 1_000_000_000 + nanoseconds, values.astype(np.float64)
 
 
+def readable(taken: Sequence[TakenMessage], kind: type) -> list[TakenMessage]:
+    """Return those serialised messages that are of their type; anybody can publish other bytes."""
+
+    def is_readable(data: bytes) -> bool:
+        try:
+            deserialize_message(data, kind)
+        except RuntimeError:  # rclpy's
+            return False
+        return True
+
+    return [one for one in taken if is_readable(one.message)]
+
+
 def pressures_in(messages: Sequence[bytes]) -> Samples:
     """Return the samples of serialised sensor_msgs/FluidPressure messages, Pa."""
     if not messages:
@@ -147,7 +160,7 @@ def arrivals_of(
     """Return the samples of serialised messages of both topics, in the order of their receipt.
 
     The messages are sensor_msgs/FluidPressure and sensor_msgs/JointState; an empty `joint` means
-    the first joint.
+    the first joint. Raises RuntimeError if one of them is no such message.
     """
     pressure = pressures_in([one.message for one in pressures])
     stem = positions_in([one.message for one in stems], joint)

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterable, Sequence
 
 import rclpy
@@ -11,7 +12,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from valve_friction_ros.nodes.plumbing.deadman import Deadman, disarm
+from valve_friction_ros.nodes.plumbing.deadman import Deadman, arm, disarm
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
@@ -27,6 +28,8 @@ _LIVELY_TIME = 2.0
 _PAUSE_OF_A_NODE = 1e-3
 """Time, s, by which each node of a process lengthens the pause: ten times what its turn costs, so
 that a hundred nodes without any messages take a tenth of a core."""
+_CLEAN_UP = 2.7
+"""Time, s, that is left to the clean-up."""
 _WORKERS_PATIENCE = 2.0
 """Time, s, that the end of the process leaves to what is being written."""
 
@@ -57,7 +60,7 @@ def _run(
     while rclpy.ok() and not stop.has_come:
         is_lively = executor.turn()
         for node in nodes:
-            node.poll()
+            node.poll_guarded()
         watchdog.turned()
         deadman.turned()
         now = time.monotonic()
@@ -82,7 +85,11 @@ def run_nodes(
     the middleware hangs for good, the process ends with exit code 1.
     """
     with StopRequest() as stop:
-        exit_code = _run_until(stop, create, arguments, pause)
+        try:
+            exit_code = _run_until(stop, create, arguments, pause)
+        except Exception:  # noqa: BLE001 - Python's own end would wait for the workers
+            traceback.print_exc()
+            exit_code = 1
         have_ended = workers_have_ended(_WORKERS_PATIENCE)
     if not have_ended:
         # Python would wait for them, for a compilation or an identification of minutes.
@@ -100,26 +107,32 @@ def _run_until(
 ) -> int:
     nodes: list[Node] = []
     executor = None
+    arm()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except _WRONG_REQUESTS as error:
+        disarm()
         return _cannot_start(error)
     try:
         try:
             for node in create():
-                nodes.append(node)  # noqa: PERF402 - those before a refused one are destroyed too
+                nodes.append(node)  # those before a refused one are destroyed too
+                arm()
+                if stop.has_come:
+                    return 0
         except _WRONG_REQUESTS as error:
             return _cannot_start(error)
         executor = TurnExecutor()
         for node in nodes:
             executor.add_node(node)
         polled = [node for node in nodes if isinstance(node, PolledNode)]
-        with Watchdog(polled) as watchdog, Deadman(polled) as deadman:
-            _run(polled, executor, pause, stop, watchdog, deadman)
+        with Watchdog(polled) as watchdog:
+            _run(polled, executor, pause, stop, watchdog, Deadman(polled))
     except ExternalShutdownException:
         pass
     finally:
         stop.is_followed = True
+        arm(_CLEAN_UP)
         # An executor that still holds the node's entities would keep them alive.
         if executor is not None:
             executor.shutdown()

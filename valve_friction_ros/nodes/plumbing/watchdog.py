@@ -1,5 +1,6 @@
 """A thread that looks whether the nodes of a process still work, and says so where they do not."""
 
+import contextlib
 import faulthandler
 import threading
 from collections.abc import Sequence
@@ -72,7 +73,8 @@ class Watchdog:
             if not idle and all(node.overdue() is None for node in self._nodes):
                 notify("WATCHDOG=1")
             if idle >= allowed and (idle - allowed) % each == 0:
-                self._say(idle * self._look)
+                with contextlib.suppress(RuntimeError):  # the thread must live on
+                    self._say(idle * self._look)
             if idle == allowed:
                 faulthandler.dump_traceback()
 
