@@ -9,7 +9,7 @@ import pytest
 
 from valve_friction_ros.figures import save_picture
 from valve_friction_ros.fleet.row import result_cells
-from valve_friction_ros.health import Baseline, FrictionMonitor, MonitorSettings
+from valve_friction_ros.health import Baseline, FrictionMonitor, MonitorSettings, diagnose
 from valve_friction_ros.history import HistoryFile, KeptValve, entry_of
 from valve_friction_ros.identification import (
     UNITS,
@@ -122,7 +122,7 @@ def test_its_report(result):
     page = identification_report(IdentifiedRecord("FV-1", "made up", result, Baseline(40.0)))
     assert "Half width of the loop" in [section.title for section in page.sections]
     text = render(page)
-    for words in ("by stroke.", "strokes used", "a width is no model", "published method"):
+    for words in ("by stroke.", "strokes used", "a width is no model", "Published method"):
         assert words in text
 
 
@@ -138,7 +138,7 @@ def test_its_rows_and_diagnostics(recording, tmp_path):
     monitor.accept(result, SECOND)
     friction = result.parameters["coulomb_friction"]
 
-    cells = result_cells("fv_1", result, recording, ())
+    cells = result_cells("fv_1", result, diagnose(result, BENCH_VALVE), ())
     assert (cells["method"], cells["coulomb_friction_n"]) == ("width", friction.value)
 
     history = HistoryFile(tmp_path / "history.sqlite")

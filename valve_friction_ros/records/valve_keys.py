@@ -33,6 +33,7 @@ _IDENTIFIER_ONLY = (
     "input_timeout",
     "identification_limit",
     "baseline_coulomb_friction",
+    "baseline_in_alarm",
     "warn_ratio",
     "error_ratio",
     "low_ratio",

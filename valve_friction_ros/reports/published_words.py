@@ -19,16 +19,11 @@ def published_words(result: Result) -> str:
     samples = _UNKNOWN
     if "threshold" in evidence:
         samples = f"samples faster than δv = {evidence['threshold']:.3g} m/s"
-    how = (
-        f"fits the simulated stem to the measured one, over all samples{_counts_with(result)}"
-        if result.stem is not None
-        else "averages force and friction as the acceleration is averaged, over all samples"
-    )
     words = (
         "Published method: the regression of the paper, for comparison. It uses derivatives of "
         f"the smoothed position, and only {samples}. Noise, smoothing, lags and slow sliding bias "
-        "it; it has no interval, and gives a number also where the record determines none. The "
-        f"value {how}. Where the two differ, use the value."
+        f"it; it has no interval, and gives a number also where the record determines none. "
+        f"{_how_else(result)}Where the two differ, use the value."
     )
     outside = [one for one in beside if _differs(one)]
     if not outside:
@@ -38,6 +33,16 @@ def published_words(result: Result) -> str:
         for one in outside
     )
     return f"{words} Published values beyond the interval here: {told}."
+
+
+def _how_else(result: Result) -> str:
+    """Say how the value is found, where that is known of the method."""
+    if result.stem is not None:
+        samples = f"over all samples{_counts_with(result)}"
+        return f"The value fits the simulated stem to the measured one, {samples}. "
+    if result.method in ("refined", "robust"):
+        return "The value averages force and friction as the acceleration, over all samples. "
+    return ""
 
 
 def _counts_with(result: Result) -> str:
