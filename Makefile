@@ -43,9 +43,8 @@ test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some
 
 # What depends most on the libraries, in a few minutes: figures, reports, tables, kernels, statistics.
 OLDEST_TESTS = $(addprefix test/,test_package.py test_front_door.py model/test_simulation.py \
-    model/test_value_types.py signals identification/published identification/test_refusals.py records \
-    health/test_diagnosis.py history/test_file.py history/test_trend.py figures reports reproduction \
-    commands/test_identify_table.py nodes/test_start.py nodes/test_without_bag_libraries.py)
+    model/test_value_types.py signals identification/test_refusals.py records health/test_diagnosis.py \
+    history/test_file.py history/test_trend.py figures reports nodes/test_start.py)
 
 .PHONY: test-oldest
 test-oldest:  ## some tests with the oldest versions that the package declares
