@@ -8,8 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from valve_friction_ros.commands.main import run
+from valve_friction_ros.records.yaml_file import read_yaml
 
 PROJECT = Path(__file__).resolve().parents[1]
 README = (PROJECT / "README.md").read_text(encoding="utf-8")
@@ -36,13 +38,39 @@ def test_the_notebook_section_runs(tmp_path, monkeypatch, capsys):
 NEED_NODES = ("history", "call", "identify fv_101_2026", "reproduce-paper")  # or minutes: the last
 
 
+def offline_commands():
+    blocks = "".join(re.findall(r"```sh\n(.*?)```", README, re.DOTALL)).replace("\\\n", " ")
+    commands = re.findall(r"^\.venv/bin/valve_friction (.*)$", blocks, re.MULTILINE)
+    return [each for each in commands if not each.startswith(NEED_NODES)]
+
+
+def test_options_describe_a_table_as_its_valve_file_does(tmp_path, monkeypatch, capsys):
+    """The numbers are equal, and the options lack nothing that the section `columns:` says."""
+    monkeypatch.chdir(PROJECT)
+    (line,) = (each for each in offline_commands() if "--time-column" in each)
+    described = PROJECT / "examples" / "fv_101.yaml"
+    valve = read_yaml(described)["/**"]["ros__parameters"]
+    del valve["columns"]
+    bare = tmp_path / "bare.yaml"
+    bare.write_text(yaml.safe_dump(valve))
+    options = shlex.split(line)
+    place = options.index("--valve") + 1
+    answers = []
+    for words in (
+        options,
+        [*options[:place], str(bare), *options[place + 1 :]],
+        ["identify", "examples/five_seconds.csv", "--valve", str(described)],
+    ):
+        assert run([*words, "--method", "refined", "--json"]) == 0
+        answers.append(capsys.readouterr().out)
+    assert answers[0] == answers[1] == answers[2]
+
+
 def test_the_offline_commands_run_as_they_are_pasted(tmp_path, monkeypatch, capsys):
     for folder in ("examples", "config"):
         (tmp_path / folder).symlink_to(PROJECT / folder)
     monkeypatch.chdir(tmp_path)
-    blocks = "".join(re.findall(r"```sh\n(.*?)```", README, re.DOTALL)).replace("\\\n", " ")
-    commands = re.findall(r"^\.venv/bin/valve_friction (.*)$", blocks, re.MULTILINE)
-    offline = [each for each in commands if not each.startswith(NEED_NODES)]
+    offline = offline_commands()
     assert len(offline) == 7
     for each in offline:
         line, _, output = each.partition(" > ")
