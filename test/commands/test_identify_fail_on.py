@@ -29,10 +29,14 @@ def test_the_diagnosis_may_fail_the_command(
     assert json.loads(out)["diagnosis"]["level"] == level
 
 
-def test_without_a_baseline_the_diagnosis_is_printed_too(call, quick_csv, bench_options):
-    code, out, _ = call(quick_csv, *bench_options, *METHOD, "--fail-on", "warn")
+def test_without_a_baseline_nothing_was_compared(call, quick_csv, bench_options):
+    code, out, err = call(quick_csv, *bench_options, *METHOD, "--fail-on", "warn")
     assert code == 0
-    assert out.splitlines()[-1].startswith("OK: no baseline yet; ")
+    assert out.splitlines()[-1].startswith("unknown: no baseline yet; ")
+    assert err == (
+        "valve_friction identify: --fail-on: there is no baseline, so no friction was compared: "
+        "give --baseline-recording or --baseline-coulomb-friction\n"
+    )
 
 
 @pytest.mark.parametrize("method", ["best", "robust", "refined", "published"])

@@ -58,7 +58,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.epilog = (
         "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
         "were refused, or a file could not be written; 1: some valves were refused; 3: a diagnosis "
-        "reached --fail-on."
+        "reached --fail-on. Without a baseline no friction is compared: a line on stderr says so, and "
+        "the exit code stays 0."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
@@ -152,5 +153,11 @@ def run(options: argparse.Namespace) -> int:
         for each, outcome, _ in results:
             if isinstance(outcome, Result):
                 files.write(each, outcome, baseline)
+    if options.fail_on is not None and baseline is None:
+        complain(
+            options.command,
+            "--fail-on: there is no baseline, so no friction was compared: give "
+            "--baseline-recording or --baseline-coulomb-friction",
+        )
     levels = (each.diagnosis.level for each in results if each.diagnosis is not None)
     return ExitCode.ALARM if has_failed(options, levels) else code

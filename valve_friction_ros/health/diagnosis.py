@@ -127,8 +127,9 @@ class Diagnosis:
         }
 
     def __str__(self) -> str:
-        """Return level and message on one line."""
-        return f"{self.level.name}: {self.message}"
+        """Return level and message on one line; the level is unknown where nothing was compared."""
+        is_unknown = self.level is Level.OK and self.ratio is None
+        return f"{'unknown' if is_unknown else self.level.name}: {self.message}"
 
 
 class Frictions(Protocol):
