@@ -296,10 +296,34 @@ class TestColumns:
             "rename one or name the right one"
         )
 
+    @pytest.mark.parametrize(
+        ("header", "remedy"),
+        [
+            ("time_s,position_m,p_bar", "give --pressure-column p_bar --pressure-unit bar"),
+            ("time_s,position_m,P [kpa]", "give --pressure-column 'P [kpa]' --pressure-unit kPa"),
+            ("time_s,position_m,load_kN", "give --force-column load_kN --force-unit kN"),
+            ("time_s,travel (mm),pressure_pa", "give --position-column 'travel (mm)' --position-"),
+            ("t_ms,position_m,pressure_pa", "give --time-column t_ms --time-unit ms"),
+            ("time_s,position_m,bar", "rename one or name the right one"),
+            ("time_s,position_m,p_ba", "rename one or name the right one"),
+        ],
+    )
+    def test_a_unit_at_the_end_of_another_header(self, write, header, remedy):
+        _, _, told = refused(write([header, *GOOD])).rpartition(": ")
+        assert told.startswith(remedy)
+
     def test_another_delimiter(self, write):
         assert refused(write(["time_s;position_m;pressure_pa", "0;0;1e5"])) == (
             "no column 'pressure_pa' (or 'force_n'), only 'time_s;position_m;pressure_pa': "
             "name the delimiter of the file (--delimiter ';')"
+        )
+
+    @pytest.mark.parametrize("entry", ["23,58", "-0,5", " 1,0"])
+    def test_a_decimal_comma(self, write, entry):
+        path = write(["time_s;position_m;pressure_pa", f"0;{entry};1e5", "1;0;1e5"])
+        assert refused(path, form=Columns(delimiter=";")) == (
+            f"row 2, column 'position_m': {entry!r} is not a number: name its decimal mark, "
+            '--decimal , (decimal: "," in a valve file)'
         )
 
     def test_missing_under_its_other_name(self, write):

@@ -92,7 +92,8 @@ def _opened(path: Path, form: Columns) -> tuple[OpenTable, str]:
     for name in either:
         if name in table.header:
             return table, name
-    raise ValueError(table.no_column(f"{either[0]!r} (or {either[1]!r})"))
+    wanted = f"{either[0]!r} (or {either[1]!r})"
+    raise ValueError(table.no_column(wanted, ("pressure", "force")))
 
 
 def drive_column(path: Path, form: Columns) -> str:

@@ -1,6 +1,8 @@
 """A table of numbers: its headers, its rows in blocks, and the row of a bad entry."""
 
 import itertools
+import re
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -32,6 +34,8 @@ _LONGEST_QUOTE = 40
 """Characters of a bad entry in a message. Chosen: the message stays on one line."""
 
 _MOST_NAMES = 20
+
+_DECIMAL_COMMA = re.compile(r"\s*-?\d+,\d+\s*", re.ASCII)
 
 
 def _quoted(text: str) -> str:
@@ -134,22 +138,29 @@ class OpenTable:
 
     def _place(self, name: str) -> int:
         if name not in self.header:
-            raise ValueError(self.no_column(repr(name)))
+            of = [one for one in KNOWN_UNITS if getattr(self.form, f"{one}_column") == name]
+            raise ValueError(self.no_column(repr(name), of))
         if self.header.count(name) > 1:
             raise ValueError(f"{self.path}: two columns are named {name!r}: rename one of them")
         return self.header.index(name)
 
-    def no_column(self, wanted: str) -> str:
-        """Return the message for a file without a column."""
+    def no_column(self, wanted: str, quantities: Sequence[str] = ()) -> str:
+        """Return the message for a file without a column, which is one of some quantities."""
         if len(self.header) == 1:
             only = self.header[0]
             return f"{self.path}: no column {wanted}, only {_quoted(only)}: " + _separated(only)
         listed = [name[:_LONGEST_QUOTE] for name in self.header[:_MOST_NAMES]]
         more = ", …" if len(self.header) > _MOST_NAMES else ""
-        return (
-            f"{self.path}: no column {wanted} among {', '.join(listed)}{more}: "
-            "rename one or name the right one"
-        )
+        remedy = "rename one or name the right one"
+        for name, quantity in itertools.product(self.header, quantities):
+            if (unit := _unit_at_the_end(name, quantity)) and not self._is_named(name):
+                option = f"--{quantity}"
+                remedy = f"give {option}-column {shlex.quote(name)} {option}-unit {unit}"
+                break
+        return f"{self.path}: no column {wanted} among {', '.join(listed)}{more}: {remedy}"
+
+    def _is_named(self, header: str) -> bool:
+        return any(header == getattr(self.form, f"{one}_column") for one in KNOWN_UNITS)
 
     def _first_bad(self, rows: Sequence[_Row], columns: Sequence[_Column]) -> ValueError:
         """Find the entry that is not a number, for the message of an error."""
@@ -161,7 +172,10 @@ class OpenTable:
                         "delete it"
                     )
                 if convert == self._numbers and not self._is_number(row[place]):
-                    cause = f"{_quoted(row[place])} is not a number: correct it or delete the row"
+                    remedy = "correct it or delete the row"
+                    if _DECIMAL_COMMA.fullmatch(row[place]) and self.form.delimiter != ",":
+                        remedy = "name its decimal mark, --decimal , (decimal: \",\" in a valve file)"
+                    cause = f"{_quoted(row[place])} is not a number: {remedy}"
                     return ValueError(f"{self.path}: row {number}, column {name!r}: {cause}")
         return ValueError(f"{self.path}: the table cannot be read")
 
@@ -239,6 +253,13 @@ class OpenTable:
 
 def _unit_in(cell: str) -> str:
     return unit_named(cell.strip().strip("[]()").strip())
+
+
+def _unit_at_the_end(name: str, quantity: str) -> str:
+    """Return the unit that ends a header, as in ``stem_mm`` or ``Pressure [bar]``, or nothing."""
+    *words, last = re.split(r"[\s_()\[\]]+", name.rstrip(")] "))
+    known = {unit.lower(): unit for unit in KNOWN_UNITS[quantity]}
+    return known.get(unit_named(last).lower(), "") if any(words) else ""
 
 
 def _quantity_of(cell: str) -> bool:
