@@ -109,12 +109,49 @@ def test_what_is_open_is_asked_for(tmp_path):
     assert read_valve_file(path).valve.travel == pytest.approx(0.028575)
 
 
+def asked(answers):
+    return subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros", "describe-valve"],
+        check=False,
+        input=answers,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def test_a_wrong_answer_is_asked_for_again():
+    wrong = SINGLE | {"area": "690 ha\n690 cm2", "acting": "triple\nsingle"}
+    done = asked("".join(f"{answer}\n" for answer in wrong.values()))
+    assert done.returncode == 0
+    assert done.stderr.count("unknown unit 'ha'") == done.stderr.count("choose single or") == 1
+    assert "diaphragm_area: 0.069 " in done.stdout
+
+
+def test_after_the_last_wrong_answer_it_ends():
+    done = asked("FV-1\n690 cm2\n28 mm\ntriple\n")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("'triple': choose single or double") == 2
+
+
+def test_what_nobody_said_is_called_assumed(command):
+    given = {"area": "690cm2", "travel": "28mm", "acting": "double"}
+    lines = command("describe-valve", "--yes", *options(given))[1].splitlines()
+    found = {line.split(":")[0].strip() for line in lines if "assumed" in line.partition("#")[2]}
+    guesses = {"opposing_pressure_column", "opposing_area_ratio", "fixed.spring_constant"}
+    assert found == guesses
+    told = given | {"opposing_area": "600cm2", "opposing_pressure_column": "p2"}
+    told |= {"spring_range": "0.2..1 bar"}
+    assert "assumed:" not in command("describe-valve", "--yes", *options(told))[1]
+
+
 @pytest.mark.parametrize(
     ("answers", "cause"),
     [
         ({"area": "690"}, "--area: '690': there is no unit; known are m2, cm2, mm2, in2"),
         ({"area": "690 ha"}, "--area: '690 ha': unknown unit 'ha'"),
-        ({"area": "large"}, "--area: 'large' is no number with its unit"),
+        ({"area": "nan cm2"}, "--area: 'nan cm2' is no number with its unit, as 690 cm2\n"),
+        ({"travel": "long"}, "--travel: 'long' is no number with its unit, as 28.6 mm\n"),
         ({"area": "690 m2"}, "cm² or in² read as m²?"),
         ({"travel": "28 m"}, "mm read as m?"),
         ({"spring_range": "1..0.2 bar"}, "the range must rise"),

@@ -110,6 +110,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def _asked(question: _Question) -> Any:
     """Ask until there is an answer that can be read."""
     default = f" [{question.default or 'none'}]" if question.default is not None else ""
+    wrong: ValueError | None = None
     while True:
         print(
             f"{question.words} ({question.example}){default}: ",
@@ -120,6 +121,8 @@ def _asked(question: _Question) -> Any:
         line = sys.stdin.readline()
         if not line:
             print(file=sys.stderr)
+            if wrong is not None:
+                raise wrong
         text = line.strip() or question.default
         if text is None and not line:
             option = question.name.replace("_", "-")
@@ -130,9 +133,8 @@ def _asked(question: _Question) -> Any:
             if text is not None:
                 return None
         except ValueError as error:
-            if not line or not sys.stdin.isatty():
-                raise
             print(error, file=sys.stderr)
+            wrong = error
 
 
 def _answers(options: argparse.Namespace) -> dict[str, Any]:
@@ -171,6 +173,7 @@ def run(options: argparse.Namespace) -> int:
         is_air_to_close=answers["air_to"] == "close",
         position_is_opening=answers["position"] == "plug",
         opposing_area=(answers["opposing_area"] or answers["area"]) if is_double else None,
+        opposing_area_is_assumed=answers["opposing_area"] is None,
         mass=answers["mass"],
         tag=answers["tag"] or "",
         columns=given_columns(options),

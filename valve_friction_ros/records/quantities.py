@@ -18,6 +18,8 @@ AREA: Mapping[str, Unit] = {
 LENGTH, PRESSURE = POSITION_UNITS, PRESSURE_UNITS
 MASS: Mapping[str, Unit] = {"kg": Unit(1), "g": Unit(1, 1e3), "lb": Unit(0.45359237)}
 
+_EXAMPLES = ((AREA, "690 cm2"), (LENGTH, "28.6 mm"), (MASS, "1.6 kg"))
+
 _NUMBER = r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
 _SINGLE = re.compile(rf"\s*{_NUMBER}\s*(\D.*?)?\s*", re.ASCII)
 _SPAN = re.compile(rf"\s*{_NUMBER}\s*(?:\.\.|…|–|-|to)\s*{_NUMBER}\s*(\D.*?)?\s*", re.ASCII)
@@ -40,7 +42,8 @@ def quantity(text: str, units: Mapping[str, Unit]) -> float:
     """Read a number with its unit, as ``690 cm2``, in its SI unit; raises ValueError."""
     found = _SINGLE.fullmatch(text) if len(text) < 100 else None
     if found is None:
-        raise ValueError(f"{text[:60]!r} is no number with its unit, as 690 {next(iter(units))}")
+        example = next(each for known, each in _EXAMPLES if known is units)
+        raise ValueError(f"{text[:60]!r} is no number with its unit, as {example}")
     number, name = found.groups()
     return _si(number, _unit(text, name, units))
 

@@ -31,6 +31,8 @@ class ActuatorData:
         The position is that of the plug, 0 where it is closed; else it rises with the pressure.
     opposing_area : float, optional
         Area of the other side of a double-acting actuator, m².
+    opposing_area_is_assumed : bool
+        That area is a guess, which the file says.
     mass : float, optional
         Mass of the moving parts, kg.
     tag : str
@@ -47,6 +49,7 @@ class ActuatorData:
     is_air_to_close: bool = False
     position_is_opening: bool = True
     opposing_area: float | None = None
+    opposing_area_is_assumed: bool = False
     mass: float | None = None
     tag: str = ""
     columns: Mapping[str, Any] = field(default_factory=dict)
@@ -75,7 +78,7 @@ class ActuatorData:
             yield "spring_constant", self.area * (high - low) / self.travel, f"N/m, {words}"
             yield "spring_preload", self.area * low, f"N, {words}"
         elif self.opposing_area is not None:
-            yield "fixed.spring_constant", 0.0, "N/m: a double-acting actuator without a spring"
+            yield "fixed.spring_constant", 0.0, "N/m, assumed: no spring range was given"
 
     def _columns(self) -> dict[str, Any]:
         columns = dict(self.columns)
@@ -85,6 +88,15 @@ class ActuatorData:
             columns.setdefault("opposing_pressure_column", "opposing_pressure_pa")
             columns.setdefault("opposing_area_ratio", self.opposing_area / self.area)
         return columns
+
+    def _assumed(self) -> dict[str, str]:
+        """Return the comments on what nobody said."""
+        if self.opposing_area is None:
+            return {}
+        assumed = {"opposing_pressure_column": "assumed: the header of the other side's pressure"}
+        if self.opposing_area_is_assumed:
+            assumed["opposing_area_ratio"] = "assumed: both sides have the same area"
+        return {name: words for name, words in assumed.items() if name not in self.columns}
 
     def text(self) -> str:
         """Return the valve file."""
@@ -100,7 +112,10 @@ class ActuatorData:
             lines.append(_line(name, value, comment))
         if columns := self._columns():
             lines += ["", "    columns:  # how its tables are written"]
-            lines += [f"  {_line(name, value, '')}" for name, value in columns.items()]
+            assumed = self._assumed()
+            lines += [
+                f"  {_line(name, value, assumed.get(name, ''))}" for name, value in columns.items()
+            ]
         return "\n".join(lines) + "\n"
 
 
