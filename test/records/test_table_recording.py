@@ -318,6 +318,14 @@ class TestColumns:
             "name the delimiter of the file (--delimiter ';')"
         )
 
+    @pytest.mark.parametrize(("step", "what"), [(0, "repeats"), (-1, "goes back")])
+    def test_times_that_do_not_rise_end_the_reading(self, tmp_path, step, what):
+        """At the first block: a row beyond it, which cannot be read, is not looked at."""
+        lines = [HEADER, *(f"{100_000 + step * row},0,1e5" for row in range(20_000)), "x,x,x"]
+        path = tmp_path / "record.csv.gz"
+        path.write_bytes(gzip.compress("\n".join(lines).encode()))
+        assert refused(path).startswith(f"row 3, column 'time_s' {what} (")
+
     @pytest.mark.parametrize("entry", ["23,58", "-0,5", " 1,0"])
     def test_a_decimal_comma(self, write, entry):
         path = write(["time_s;position_m;pressure_pa", f"0;{entry};1e5", "1;0;1e5"])

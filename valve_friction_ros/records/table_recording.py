@@ -72,6 +72,13 @@ def _stamps(table: Table, name: str, unit: str) -> NDArray[np.int64]:
     return stamps
 
 
+def _require_rising(block: Table, form: Columns) -> None:
+    """Refuse times of a block that are finite and do not rise, before the rest is read."""
+    times = block.columns[form.time_column]
+    if times.size and np.isfinite(times).all():
+        _stamps(block, form.time_column, form.time_unit)
+
+
 def _position(table: Table, form: Columns, valve: Valve) -> NDArray[np.float64]:
     """Return the position in m, rising the way in which the pressure pushes the stem."""
     unit = form.position_unit
@@ -164,6 +171,8 @@ def _chosen(opened: OpenTable, names: Mapping[str, str], stretch: Stretch) -> Ta
             break
         if (since < stretch.begin * 1e9).all():
             continue
+        if stretch.last == math.inf:  # else it may yet be left out
+            _require_rising(block.where(stretch.select(times, start)), form)
         kept.append(block)
         newest = min(float(since[-1]), stretch.end * 1e9)
         while len(kept) > 1 and math.isfinite(newest):
