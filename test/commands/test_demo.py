@@ -255,7 +255,7 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("demo.xyz", "the ending is not a picture format; choose from ."),
+            ("demo.xyz", "the ending is not a picture format; choose .png, .pdf or .svg"),
             ("no/demo.png", "there is no folder"),
         ],
     )

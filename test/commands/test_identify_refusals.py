@@ -214,6 +214,11 @@ class TestBadOptions:
                 ["--fix", "weight=1"],
                 "'weight' is not a parameter that can be fixed; choose from mass",
             ),
+            (
+                ["--fix", "coulomb_fricton=400"],
+                "'coulomb_fricton' is not a parameter that can be fixed; "
+                "did you mean 'coulomb_friction'?",
+            ),
             (["--fix", "mass=1", "--fix", " mass =2"], "--fix mass is given twice"),
             (["--fix", "mass", "--fix", "mass"], "--fix mass is given twice"),
             (["--fix", "mass=-1"], "mass must be above zero, got -1"),

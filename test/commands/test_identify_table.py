@@ -115,7 +115,7 @@ class TestPlot:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("record.xyz", "the ending is not a picture format; choose from ."),
+            ("record.xyz", "the ending is not a picture format; choose .png, .pdf or .svg"),
             ("no/record.png", "there is no folder"),
         ],
     )

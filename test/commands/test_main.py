@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from valve_friction_ros import __version__
-from valve_friction_ros.commands.main import SUB_COMMANDS
+from valve_friction_ros.commands.main import SUB_COMMANDS, run
 
 EXTRA = Path(__file__).with_name("extra_sub_command.py")
 PROGRAM = ["-m", "valve_friction_ros"]
@@ -260,3 +260,10 @@ class TestRealSubCommands:
         code, _, err = ended(process)
         assert (code, err) == (141, "")
         assert picture.stat().st_size > 20_000
+
+
+def test_a_misspelled_service_gets_the_nearest_name(capsys):
+    with pytest.raises(SystemExit) as end:
+        run(["call", "fv_101", "idnetify"])
+    assert end.value.code == 2
+    assert "unknown service 'idnetify'; did you mean 'identify'?" in capsys.readouterr().err

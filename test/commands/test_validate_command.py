@@ -218,7 +218,7 @@ class TestRefusals:
         ("content", "cause"),
         [
             ("{", "not JSON"),
-            ("[" * 100_000, "not JSON: maximum recursion depth exceeded"),
+            ("[" * 100_000, "not JSON of an estimate: it is nested too deeply"),
             ("[]", "there are no parameters: give what `valve_friction identify --json` wrote"),
             ('{"valves": {}}', "is of several valves: identify the one by --valve-name"),
             ('{"parameters": {"mass": 1}}', "parameters.mass has no value"),

@@ -13,6 +13,7 @@ from valve_friction_ros.figures import (
     identification_figure,
     require_picture_file,
 )
+from valve_friction_ros.figures.page import titled_figure
 from valve_friction_ros.figures.panels import COLOURS
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.model import BENCH_VALVE, Drive, Recording, Valve
@@ -48,7 +49,7 @@ class TestPanels:
         assert labels == {
             "pressure": ("", "pressure [kPa]"),
             "stem": ("time [s]", "stem [mm]"),
-            "coulomb": ("", "coulomb friction $F_c$ [N]"),
+            "coulomb": ("", "Coulomb friction $F_c$ [N]"),
             "sigma": ("threshold δv [m/s]", "$\\sigma_s$ [N]"),
             "signature": ("pressure [kPa]", "stem [mm]"),
         }
@@ -192,6 +193,18 @@ class TestVerdict:
         assert len(told) == 5
         assert told[-1] == "and 2 more notes, which the command prints"
 
+    def test_one_warning_more_than_fits_is_told(self, known):
+        """A line that counts it would need as much room."""
+        told = identification_figure(dataclasses.replace(known, warnings=(*"abcd",)))
+        assert told._supxlabel.get_text().splitlines() == [f"note: {one}" for one in "abcd"]
+
+    def test_a_number_keeps_its_percent_sign(self):
+        """Wherever the line of a title breaks."""
+        for length in range(85, 100):
+            title = f"{'x' * length} 14 % of travel"
+            lines = titled_figure(title)._suptitle.get_text().splitlines()
+            assert not any(line.startswith("%") for line in lines)
+
     def test_the_friction_stands_clear_of_the_sweep(self, known):
         """No point of the curve lies below the words that name F_c."""
         figure = identification_figure(known)
@@ -296,10 +309,10 @@ class TestPictures:
     def test_formats(self, tmp_path, name):
         require_picture_file(tmp_path / name)
 
-    @pytest.mark.parametrize("name", ["figure", "figure.", "figure.csv", "png"])
+    @pytest.mark.parametrize("name", ["figure", "figure.", "figure.csv", "figure.gif", "png"])
     def test_no_format(self, tmp_path, name):
         with pytest.raises(
-            ValueError, match=r"the ending is not a picture format; choose from .*\.png"
+            ValueError, match=r"the ending is not a picture format; choose \.png, \.pdf or \.svg$"
         ):
             require_picture_file(tmp_path / name)
 

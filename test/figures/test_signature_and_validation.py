@@ -61,7 +61,7 @@ class TestSignature:
         assert points.get_xdata().size == 5
 
     def test_words(self, figure, found):
-        title = figure._suptitle.get_text().replace("\n", " ")
+        title = " ".join(figure._suptitle.get_text().split())
         assert f"$F_c$ {found.values['coulomb_friction']:.4g} N (weak)" in title
         assert f"fit {100 * found.fit:.2f} %" in title
         assert "dead zone 29.6" in panels(figure)["signature"].get_title()
@@ -88,7 +88,8 @@ class TestValidation:
 
     def test_title_and_file(self, validation, tmp_path):
         figure = validation_figure(validation, BENCH_VALVE)
-        assert figure._suptitle.get_text().startswith(f"fit {100 * validation.fit:.2f} %; rms ")
-        assert "of travel" in figure._suptitle.get_text()
+        title = " ".join(figure._suptitle.get_text().split())
+        assert title.startswith(f"fit {100 * validation.fit:.2f} %; rms ")
+        assert "of travel" in title
         figure.savefig(tmp_path / "validation.png")
         assert matplotlib.image.imread(tmp_path / "validation.png").shape[0] > 500

@@ -61,7 +61,7 @@ def days(line):
 
 def test_units_and_dates(axes):
     axes.figure.draw_without_rendering()
-    assert axes.get_ylabel() == "coulomb friction $F_c$ [N]"
+    assert axes.get_ylabel() == "Coulomb friction $F_c$ [N]"
     assert axes.get_xlabel() == "time [UTC]; identified from 2026-09-21 to 2027-02-01"
     assert axes.get_title(loc="left") == "FV-101 (/fv_101/identifier)"
     told = axes.get_title(loc="right")

@@ -37,8 +37,8 @@ def test_excess_friction_has_the_interval_of_both(with_friction):
     """Half widths of 3 and 4 N make one of 5 N."""
     told = rows(with_friction(150.0, 3.0, baseline=Baseline(100.0, 4.0)), FRICTION)
     assert told["friction of the healthy valve (baseline)"] == ("coulomb friction 100 ± 4 N",)
-    assert told["excess friction"] == ("+50 ± 5 N",)
-    assert told["friction over baseline"][0].startswith("coulomb friction: 1.5, 95 % interval ")
+    assert told["excess friction"] == ("+50 N ± 5 N",)
+    assert told["friction over baseline"][0].startswith("coulomb friction: 1.50, 95 % interval ")
     assert told["level"] == ("WARN, NE 107 status signal M",)
 
 
@@ -115,6 +115,23 @@ class TestUncertaintyBudget:
         )
         assert words.text.startswith("Where the intervals come from.")
 
+    def test_the_parts_add_up_to_the_interval(self, with_friction):
+        """Half a width of 10 is 5, of which 3 leave 4; k has nothing left."""
+        budget = {
+            "coulomb_friction": {"record": 2.4, "timing": 1.8},
+            "spring_constant": {"record": 0.5, "timing": 0.0},
+        }
+        record = with_friction(150.0, 10.0)
+        result = dataclasses.replace(record.result, evidence={"uncertainty_budget": budget})
+        (table, words) = section(
+            identification_report(dataclasses.replace(record, result=result)), "Uncertainty budget"
+        ).blocks
+        assert table.columns[-1].title == "by other models"
+        told = {row[0]: [float(cell) for cell in row[1:]] for row in table.rows}
+        assert told["Coulomb friction F_c [N]"] == [2.4, 1.8, 0.0, 4.0]
+        assert told["spring constant k [N/m]"] == [0.5, 0.0, 0.0, 0.0]
+        assert "By other models" in words.text
+
     def test_its_sources_are_those_of_the_method(self, with_budget):
         told = rows(with_budget({"coulomb_friction": {"weather": 2.0}}), "Uncertainty budget")
         assert told == {"Coulomb friction F_c [N]": ("2", "0")}
@@ -159,7 +176,7 @@ class TestUncertaintyBudget:
         settings = dataclasses.replace(record.result.settings, area_uncertainty=0.02)
         result = dataclasses.replace(record.result, settings=settings)
         wide = dataclasses.replace(record, result=result)
-        assert rows(wide, "Uncertainty budget")["Coulomb friction F_c [N]"] == ("1.5", "3")
+        assert rows(wide, "Uncertainty budget")["Coulomb friction F_c [N]"] == ("1.5", "3", "0")
         told = rows(wide, "Settings and versions")
         assert told["relative standard uncertainty of the diaphragm area"] == ("2 %",)
         assert not [name for name in told if "sensor" in name or name.startswith("timing")]

@@ -11,6 +11,7 @@ from valve_friction_ros.commands.folder.stop_signals import StopSignals
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.records.spelling import nearest
 
 __all__ = ["REFUSALS", "declare", "run"]
 
@@ -28,6 +29,14 @@ _DISCOVERY = 5.0
 """Time for which an identifier is looked for, s. Chosen: nodes of a network meet in 1 to 3 s."""
 
 
+def _service(name: str) -> str:
+    if name not in _SERVICES:
+        raise argparse.ArgumentTypeError(
+            f"unknown service {name[:60]!r}; {nearest(name, _SERVICES)}"
+        )
+    return name
+
+
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     listed = "\n".join(f"  {name:<17} {text}" for name, text in _SERVICES.items())
@@ -38,7 +47,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "3: the diagnosis reached --fail-on."
     )
     parser.add_argument("valve", metavar="VALVE", help="its namespace, such as /fv_101")
-    parser.add_argument("service", choices=[*_SERVICES], metavar="SERVICE", help="one of the above")
+    parser.add_argument("service", type=_service, metavar="SERVICE", help="one of the above")
     parser.add_argument(
         "--timeout",
         type=float,

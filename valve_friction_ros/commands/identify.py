@@ -58,8 +58,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.epilog = (
         "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
         "were refused, or a file could not be written; 1: some valves were refused; 3: a diagnosis "
-        "reached --fail-on. Without a baseline no friction is compared: a line on stderr says so, and "
-        "the exit code stays 0."
+        "reached --fail-on. Without a baseline no friction is compared: a line on stderr "
+        "says so, and the exit code stays 0 unless signals or model are in doubt."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)

@@ -25,13 +25,15 @@ def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
     The title is of this package; notes may hold text from outside, which is never read as maths.
     """
     figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
+    title = title.replace(" %", "\N{NO-BREAK SPACE}%")  # which textwrap leaves whole
     figure.suptitle(
         textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
     )
     if notes:
-        shown = [f"note: {note}" for note in notes[:_MOST_NOTES]]
-        if len(notes) > _MOST_NOTES:
-            shown.append(f"and {len(notes) - _MOST_NOTES} more notes, which the command prints")
+        shown = [f"note: {note}" for note in notes]
+        if len(notes) > _MOST_NOTES + 1:  # a line on one note would be as long as the note
+            hidden = len(notes) - _MOST_NOTES
+            shown[_MOST_NOTES:] = [f"and {hidden} more notes, which the command prints"]
         lines = "\n".join(textwrap.fill(one, _NOTE_WIDTH) for one in shown)
         text = figure.supxlabel(lines, fontsize=9, x=0.02, ha="left")
         text.set_parse_math(False)

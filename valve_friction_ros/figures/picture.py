@@ -24,9 +24,7 @@ def require_picture_file(path: Path) -> None:
     """
     endings = Figure().canvas.get_supported_filetypes()
     if _format(path) not in endings:
-        raise ValueError(
-            f"{path}: the ending is not a picture format; choose from .{', .'.join(endings)}"
-        )
+        raise ValueError(f"{path}: the ending is not a picture format; choose .png, .pdf or .svg")
     if not path.parent.is_dir():
         raise ValueError(f"{path}: there is no folder {path.parent}: create it, or name another")
 

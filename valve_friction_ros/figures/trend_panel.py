@@ -155,7 +155,7 @@ def _what(history: ValveHistory) -> str:
     """Return what is drawn, in words."""
     baseline = history.entries[-1].baseline
     if baseline is None or baseline.sliding is None:
-        return "coulomb friction $F_c$"
+        return "Coulomb friction $F_c$"
     return friction_words(SLIDING, baseline.sliding.speed)
 
 

@@ -72,11 +72,14 @@ def _stamps(table: Table, name: str, unit: str) -> NDArray[np.int64]:
     return stamps
 
 
-def _require_rising(block: Table, form: Columns) -> None:
+def _require_rising(block: Table, form: Columns, stretch: Stretch, start: float) -> None:
     """Refuse times of a block that are finite and do not rise, before the rest is read."""
-    times = block.columns[form.time_column]
-    if times.size and np.isfinite(times).all():
-        _stamps(block, form.time_column, form.time_unit)
+    if stretch.last < math.inf:
+        return  # the block may yet be left out
+    times = _on_clock(block.columns[form.time_column], form.time_unit)
+    chosen = block.where(stretch.select(times, start))
+    if chosen.rows.size and np.isfinite(times).all():
+        _stamps(chosen, form.time_column, form.time_unit)
 
 
 def _position(table: Table, form: Columns, valve: Valve) -> NDArray[np.float64]:
@@ -171,8 +174,7 @@ def _chosen(opened: OpenTable, names: Mapping[str, str], stretch: Stretch) -> Ta
             break
         if (since < stretch.begin * 1e9).all():
             continue
-        if stretch.last == math.inf:  # else it may yet be left out
-            _require_rising(block.where(stretch.select(times, start)), form)
+        _require_rising(block, form, stretch, start)
         kept.append(block)
         newest = min(float(since[-1]), stretch.end * 1e9)
         while len(kept) > 1 and math.isfinite(newest):

@@ -42,8 +42,9 @@ _FRICTION = "Friction against its baseline"
 _BUDGET = (
     "Where the intervals come from. By the record: its noise, what the model leaves of the motion, "
     "and the imperfections of the valve. By the timing: a lag between the signals. By the "
-    "calibration: the scales of diaphragm area and sensors. The 95 % interval is twice the root of "
-    "the sum of their squares, or wider where other models are nearly as probable."
+    "calibration: the scales of diaphragm area and sensors. By other models: what is left of the "
+    "interval, for laws of friction that are nearly as probable, or for what a law may leave out. "
+    "The 95 % interval is twice the root of the sum of the squares of a row."
 )
 _ALL_NOISE = 0.05
 """Share of a misfit, below which what is not noise is not told. Chosen: 0.1 % of its square."""

@@ -2,7 +2,7 @@
 
 import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import datetime, timezone
 from typing import Any
 
@@ -49,6 +49,8 @@ _WORDS = {
 _NOTHING = "–"
 _WHOLE = 1e4
 """Size from which numbers are written without decimals: five digits then remain."""
+_ROUNDED = 0.01
+"""Share of a variance that two digits of its root do not show. Chosen."""
 
 
 def written(value: float | None) -> str:
@@ -107,13 +109,26 @@ def budget_table(record: IdentifiedRecord) -> Table | None:
     if not budget:
         return None
     sources = [*next(iter(budget.values()))]
-    rows = tuple(
-        (_heading(name, parameters[name]), *(two_digits(one[source]) for source in sources))
+    parts = {
+        name: [*one.values(), _left(record.result.parameters[name].half_width / 2, one.values())]
         for name, one in budget.items()
         if _is_estimated(parameters[name])
+    }
+    headings = [f"by the {source}" for source in sources]
+    if any(values[-1] for values in parts.values()):
+        headings.append("by other models")
+    columns = (Column("standard uncertainty"), *(Column(one, is_number=True) for one in headings))
+    rows = (
+        (_heading(name, parameters[name]), *map(two_digits, values[: len(headings)]))
+        for name, values in parts.items()
     )
-    headings = tuple(Column(f"by the {source}", is_number=True) for source in sources)
-    return Table((Column("standard uncertainty"), *headings), rows)
+    return Table(columns, tuple(rows))
+
+
+def _left(whole: float, parts: Iterable[float]) -> float:
+    """Return what the squares of parts leave of a standard uncertainty, 0 where they make it up."""
+    left = whole**2 - sum(one**2 for one in parts)
+    return math.sqrt(left) if left > _ROUNDED * whole**2 else 0.0
 
 
 def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
@@ -138,11 +153,11 @@ def friction_table(record: IdentifiedRecord) -> Table:
                 )
             )
         rows += [
-            ("excess friction", f"{excess:+.4g} ± {width:.2g} N"),
+            ("excess friction", f"{excess:+.4g} N ± {two_digits(width)} N"),
             (
                 "friction over baseline",
-                f"{ratio.what}: {ratio.value:.3g}, "
-                f"95 % interval {ratio.low:.3g} to {ratio.high:.3g}",
+                f"{ratio.what}: {ratio.value:.2f}, "
+                f"95 % interval {ratio.low:.2f} to {ratio.high:.2f}",
             ),
             (
                 "limits of that ratio",

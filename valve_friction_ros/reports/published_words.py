@@ -27,7 +27,7 @@ def published_words(result: Result) -> str:
     )
     outside = [one for one in beside if _differs(one)]
     if not outside:
-        return f"{words} Here every published value lies within its interval."
+        return f"{words} Here every published value that has an interval lies within it."
     told = "; ".join(
         f"{words_of(one.name)}: {written(one.published)} against {written(one.value)} {one.unit}"
         for one in outside

@@ -44,8 +44,10 @@ def read_estimate(path: Path) -> dict[str, float]:
     except (OSError, UnicodeDecodeError) as error:
         cause = (isinstance(error, OSError) and error.strerror) or error
         raise ValueError(f"{path}: cannot be read: {cause}") from None
-    except (json.JSONDecodeError, RecursionError) as error:
+    except json.JSONDecodeError as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: not JSON of an estimate: it is nested too deeply") from None
     except ValueError as error:  # too large, as a whole or a number of thousands of digits
         raise ValueError(f"{path}: {error}") from None
     if isinstance(content, dict) and "valves" in content:

@@ -15,8 +15,8 @@ def add_fail_on(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fail-on",
         choices=[*_LEVELS],
-        help="exit code 3 if a diagnosis is as severe as this, or more; without a baseline no friction "
-        "is compared, which raises no alarm",
+        help="exit code 3 if a diagnosis is as severe as this, or more; without a baseline no "
+        "friction is compared, which raises no alarm",
     )
 
 

@@ -13,6 +13,7 @@ from valve_friction_ros.identification import (
     TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
+from valve_friction_ros.records.spelling import nearest, resembling
 
 __all__ = ["add_identification_arguments", "identification_settings", "method_name"]
 
@@ -78,6 +79,10 @@ def _fixed(entries: Sequence[str], known: Mapping[str, float]) -> dict[str, floa
         name = name.strip()
         if name in fixed:
             raise ValueError(f"--fix {name} is given twice")
+        if name not in FIXABLE and (close := resembling(name, FIXABLE)):
+            raise ValueError(
+                f"{name[:60]!r} is not a parameter that can be fixed; {nearest(name, close)}"
+            )
         if separator:
             try:
                 fixed[name] = float(text)

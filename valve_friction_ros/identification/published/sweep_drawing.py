@@ -29,7 +29,7 @@ def sweep_panels(
         Panel(
             "coulomb",
             _THRESHOLD,
-            "coulomb friction $F_c$ [N]",
+            "Coulomb friction $F_c$ [N]",
             (Curve(thresholds, coulomb_friction), marker),
             "δv sweep (● published choice, dashed: result, with 95 % band)",
             level=friction,

@@ -174,7 +174,7 @@ class OpenTable:
                 if convert == self._numbers and not self._is_number(row[place]):
                     remedy = "correct it or delete the row"
                     if _DECIMAL_COMMA.fullmatch(row[place]) and self.form.delimiter != ",":
-                        remedy = "name its decimal mark, --decimal , (decimal: \",\" in a valve file)"
+                        remedy = 'name its decimal mark, --decimal , (decimal: "," in a valve file)'
                     cause = f"{_quoted(row[place])} is not a number: {remedy}"
                     return ValueError(f"{self.path}: row {number}, column {name!r}: {cause}")
         return ValueError(f"{self.path}: the table cannot be read")
