@@ -8,7 +8,7 @@ SHARED = """/**:
     use_sim_time: false
     robot_description: of a node of another package
     mass: 1.6
-    columns: {time_column: Zeit, inverted_position: true}
+    columns: {time_column: Zeit, inverted_position: false, opposing_pressure_column: ""}
     qos_overrides./actuator_pressure.subscription.depth: 10
 /fv_101/identifier:
   ros__parameters:
@@ -68,6 +68,17 @@ def test_misspelled_in_a_file(refused, tmp_path):
 )
 def test_implausible(refused, parameter, question):
     assert refused("identifier", "-p", parameter).endswith(question)
+
+
+def test_columns_are_not_applied_to_topics(live, tmp_path):
+    path = tmp_path / "valve.yaml"
+    section = "columns: {inverted_position: true, opposing_pressure_column: p2}"
+    path.write_text(f"/**:\n  ros__parameters:\n    {section}\n")
+    process = live.start("identifier", arguments=["--params-file", str(path)])
+    live.client.parameters("/fv_101/identifier", "travel")
+    (line,) = [line for line in process.errors.splitlines() if "WARN" in line]
+    assert "columns.inverted_position and columns.opposing_pressure_column: " in line
+    assert "is not applied to topics" in line
 
 
 def test_a_file_that_nodes_of_several_packages_share(live, tmp_path):

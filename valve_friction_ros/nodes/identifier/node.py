@@ -36,6 +36,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     reject_invalid,
     values_of,
+    warn_of_columns,
 )
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.readiness import Readiness
@@ -67,6 +68,7 @@ class Identifier(PolledNode):
     def __init__(self, workers: Workers, namespace: str | None = None) -> None:
         super().__init__("identifier", namespace=namespace)
         declare_parameters(self, PARAMETERS)
+        warn_of_columns(self)
         values = values_of(self, CHANGEABLE)
         require_valid(values)
         reject_invalid(self, CHANGEABLE, require_valid)

@@ -20,7 +20,17 @@ from rclpy.parameter import Parameter
 from valve_friction_ros.records.spelling import nearest, resembling
 from valve_friction_ros.records.valve_keys import NODE_NAMES, is_known
 
-__all__ = ["ParameterSpec", "declare_parameters", "optional", "reject_invalid", "values_of"]
+__all__ = [
+    "ParameterSpec",
+    "declare_parameters",
+    "optional",
+    "reject_invalid",
+    "values_of",
+    "warn_of_columns",
+]
+
+_TURNS_SIGNALS = ("columns.inverted_position", "columns.opposing_pressure_column")
+"""Keys of a valve file that change the signals of a table, and which topics do not have."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +109,17 @@ def _require_known(node: Node, names: Collection[str]) -> None:
             raise ValueError(f"{node.get_name()} has no parameter {name!r}: {hint}")
         node.get_logger().warning(
             f"no node of this package has the parameter {name!r}: it is ignored"
+        )
+
+
+def warn_of_columns(node: Node) -> None:
+    """Warn, once, of what a valve file says of its tables and topics must have by themselves."""
+    overrides = getattr(node, "_parameter_overrides", {})
+    if found := [key for key in _TURNS_SIGNALS if key in overrides and overrides[key].value]:
+        node.get_logger().warning(
+            f"{' and '.join(found)}: the section columns is of tables and is not applied to "
+            "topics: publish the position as it rises with the pressure, and the pressure less "
+            "opposing_area_ratio times the opposing one"
         )
 
 
