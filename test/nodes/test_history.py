@@ -111,7 +111,7 @@ def test_what_was_answered_survives_a_kill(live, history):
 
 
 def test_retention(live, history):
-    for day in (1, 4000):
+    for day in (4000, 1):
         history.add(success(START - day * DAY))
     live.start_identifier({**PATIENT, "history_days": 3000.0})
     live.client.trigger("identify")
