@@ -132,10 +132,12 @@ def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_r
     assert [*table] == [WORDS[name] for name in estimated]
     for name, entry in estimated.items():
         by_source = budget[name]
-        assert tuple(map(float, table[WORDS[name]])) == pytest.approx(
+        shown = tuple(map(float, table[WORDS[name]]))
+        assert shown[:3] == pytest.approx(
             (by_source["record"], by_source["timing"], 0.0), rel=0.05, abs=1e-12
         )
         assert entry["half_width"] >= 1.95 * math.hypot(*by_source.values())
+        assert entry["half_width"] == pytest.approx(2 * math.hypot(*shown), rel=0.05)
     assert {"sliding friction [N]", WORDS["coulomb_friction"]} <= {*page.table("parameter")}
     settings = page.table("setting")
     assert "derivative window" not in settings
