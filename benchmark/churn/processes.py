@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmark.churn.places import Node
+from benchmark.process_usage import processor_seconds, resident_megabytes
 
 __all__ = ["CODES", "FROZEN", "PATIENCE", "NodeProcess", "Usage"]
 
@@ -20,7 +21,6 @@ FROZEN = 1
 """Exit code of a node that has ended itself because it was frozen."""
 PATIENCE = 20.0
 """Time, s, after which a process that was told to end is hung."""
-_TICKS, _PAGE = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
 _STACKS_PATIENCE = 60.0
 _EXECUTABLES = Path(sys.executable).parent
 
@@ -106,11 +106,10 @@ class NodeProcess:
 
     def usage(self) -> Usage:
         """Return what it has used so far, and what it holds."""
-        place = Path(f"/proc/{self._process.pid}")
-        fields = (place / "stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        process = self._process.pid
         return Usage(
             time.monotonic(),
-            (int(fields[11]) + int(fields[12])) / _TICKS,
-            int((place / "statm").read_text(encoding="ascii").split()[1]) * _PAGE / 1e6,
-            len(list((place / "task").iterdir())),
+            processor_seconds(process),
+            resident_megabytes(process),
+            len(list(Path(f"/proc/{process}/task").iterdir())),
         )

@@ -14,13 +14,14 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
 
+from benchmark.process_usage import processor_seconds, resident_megabytes
+
 __all__ = ["DOMAIN", "Observer", "Process"]
 
 DOMAIN = 77
 _PATIENCE = 60.0
 _SILENCE = 5.0
 """Time without new samples after which no more are expected, s."""
-_TICKS = os.sysconf("SC_CLK_TCK")
 _DEMO = Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "demo"
 _PROFILE = _DEMO / "fast_discovery.xml"
 
@@ -76,14 +77,11 @@ class Process:
 
     def cpu(self) -> float:
         """Processor time that all its threads have used, s."""
-        text = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii")
-        fields = text.rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / _TICKS
+        return processor_seconds(self._process.pid)
 
     def resident(self) -> float:
         """Memory in use, MB."""
-        text = Path(f"/proc/{self._process.pid}/statm").read_text(encoding="ascii")
-        return int(text.split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        return resident_megabytes(self._process.pid)
 
 
 class Observer:

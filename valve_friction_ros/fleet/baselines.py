@@ -11,6 +11,7 @@ from valve_friction_ros.health import Baseline, SlidingFriction
 from valve_friction_ros.health.baseline import LARGEST_SHARE
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.outside_text import as_read
+from valve_friction_ros.records.unreadable import cause_of
 
 __all__ = ["Baselines", "read_baselines"]
 
@@ -96,7 +97,7 @@ def read_baselines(path: Path) -> Baselines:
                     )
                 found[recording][valve] = baseline
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
+        cause = cause_of(error)
         raise ValueError(f"{path}: cannot be read: {cause}") from None
     if not found:
         raise ValueError(f"{path}: no friction in it is known well enough to be a baseline")

@@ -7,13 +7,12 @@ from datetime import datetime, timezone
 from typing import NamedTuple
 from urllib.parse import quote
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.picture import HEIGHT, WIDTH
 from valve_friction_ros.fleet.ranking import Status, ranked, status_of
 from valve_friction_ros.fleet.row import PICTURE, Cell
 from valve_friction_ros.health import percentage
+from valve_friction_ros.page_template import page_environment
 
 __all__ = ["page_text"]
 
@@ -91,19 +90,15 @@ def page_text(rows: Iterable[_Row], name: str) -> str:
     Its table is sorted by `ranked`, and by any of its columns at a click.
     """
     lines = [_line(row) for row in ranked(rows)]
-    environment = Environment(
-        loader=PackageLoader("valve_friction_ros.fleet", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("page.html").render(
-        name=name,
-        lines=lines,
-        counts=Counter(line.status for line in lines),
-        size=(WIDTH, HEIGHT),
-        made=f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
-        version=__version__,
+    return (
+        page_environment("valve_friction_ros.fleet")
+        .get_template("page.html")
+        .render(
+            name=name,
+            lines=lines,
+            counts=Counter(line.status for line in lines),
+            size=(WIDTH, HEIGHT),
+            made=f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
+            version=__version__,
+        )
     )

@@ -5,6 +5,8 @@ from typing import Any
 
 import yaml
 
+from valve_friction_ros.records.unreadable import cause_of
+
 __all__ = ["read_yaml"]
 
 _LARGEST = 1_000_000
@@ -40,5 +42,5 @@ def read_yaml(path: Path) -> Any:
     except RecursionError:
         raise ValueError(f"{path}: not YAML of a valve: it is nested too deeply") from None
     except (OSError, ValueError) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
+        cause = cause_of(error)
         raise ValueError(f"{path}: cannot be read: {cause}") from None

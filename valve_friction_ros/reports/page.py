@@ -7,10 +7,10 @@ from enum import Enum
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from valve_friction_ros.page_template import page_environment
 from valve_friction_ros.reports.typography import typeset
 
 __all__ = [
@@ -185,13 +185,6 @@ def render(page: Page) -> str:
 
     It reads on a screen of any width, and prints on A4.
     """
-    environment = Environment(
-        loader=PackageLoader("valve_friction_ros.reports", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = page_environment("valve_friction_ros.reports")
     environment.filters["typeset"] = typeset
     return environment.get_template("page.html").render(page=page)

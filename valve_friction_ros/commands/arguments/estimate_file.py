@@ -7,6 +7,7 @@ from typing import Any
 
 from valve_friction_ros.identification import PARAMETER_UNITS
 from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.unreadable import cause_of
 
 __all__ = ["read_estimate"]
 
@@ -42,7 +43,7 @@ def read_estimate(path: Path) -> dict[str, float]:
             raise ValueError(f"more than {_LARGEST // 1_000_000} MB: no estimate is so long")
         content = json.loads(text.decode("utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
+        cause = cause_of(error)
         raise ValueError(f"{path}: cannot be read: {cause}") from None
     except json.JSONDecodeError as error:
         raise ValueError(f"{path}: not JSON: {error}") from None

@@ -110,13 +110,8 @@ def reading_options(
 
     Raises ValueError if they do not go together.
     """
-    options = {each.name: getattr(arguments, each.name) for each in fields(Columns)}
-    given = {name: value for name, value in options.items() if value is not None}
     return ReadingOptions(
-        replace(
-            columns or Columns(),
-            **{name: value for name, value in given.items() if value is not None},
-        ),
+        replace(columns or Columns(), **given_columns(arguments)),
         TopicChoice(
             arguments.pressure_topic, arguments.stem_topic, arguments.joint, arguments.valve_name
         ),

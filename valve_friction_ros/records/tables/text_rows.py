@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.unreadable import cause_of
 
 __all__ = ["csv_rows", "repaired"]
 
@@ -124,7 +125,7 @@ def _explained(path: Path, columns: Columns, name: Path) -> Iterator[list[tuple[
     try:
         yield from _blocks(path, columns)
     except (OSError, EOFError, ValueError, csv.Error, zlib.error) as error:
-        cause = (isinstance(error, OSError) and error.strerror) or error
+        cause = cause_of(error)
         if isinstance(error, UnicodeError):
             cause = f"{error}: name its encoding (--encoding)"
         raise ValueError(f"{name}: cannot be read as CSV: {cause}") from None
