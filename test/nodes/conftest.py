@@ -6,7 +6,20 @@ from pathlib import Path
 import pytest
 from live_nodes import NAMESPACE, Client, Domain, NodeProcess
 
-_PROFILE = Path(__file__).with_name("fast_discovery.xml")
+_HERE = Path(__file__).parent
+_PROFILE = _HERE / "fast_discovery.xml"
+
+
+def pytest_collection_modifyitems(items):
+    """Let each test over the middleware run twice before it counts as failed.
+
+    Fast DDS 2.14.5 at times locks itself up when participants come and go (its issue 6502), and
+    loses an answer that comes before discovery has ended (rmw_fastrtps issue 842). The summary
+    names each test that ran twice.
+    """
+    for item in items:
+        if _HERE in item.path.parents:
+            item.add_marker(pytest.mark.flaky(reruns=1))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -43,7 +56,11 @@ class Live:
         return process
 
     def start_identifier(self, parameters=None, arguments=(), script=None):
-        """Start an identifier and connect the client's publishers to it."""
+        """Start an identifier and connect the client's publishers to it.
+
+        It does not mind silence, unless `parameters` say so: a slow machine would meet some.
+        """
+        parameters = {"input_timeout": 600.0} | (parameters or {})
         process = self.start("identifier", parameters, arguments, script)
         self.client.connect()
         return process

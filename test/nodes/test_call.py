@@ -37,7 +37,7 @@ def ended(process):
 @pytest.fixture(scope="module")
 def bench(shared):
     """Function of arguments: exit code, stdout and stderr of the command beside an identifier."""
-    shared.start_identifier({"input_timeout": 600.0})
+    shared.start_identifier()
     return shared.client, lambda *arguments: ended(start(shared.domain, *arguments))
 
 

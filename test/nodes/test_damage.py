@@ -14,7 +14,7 @@ DAMAGED = b"\x00\x01\x00\x00xx"
     ("kind", "topic"), [(JointState, "stem_state"), (FluidPressure, "actuator_pressure")]
 )
 def test_a_damaged_message_costs_only_itself(live, kind, topic):
-    process = live.start_identifier({"input_timeout": 600.0})
+    process = live.start_identifier()
     client = live.client
     stranger = client.node.create_publisher(kind, f"{NAMESPACE}/{topic}", 10)
     client.wait_until(lambda: stranger.get_subscription_count() > 0, "the identifier")

@@ -18,7 +18,7 @@ ONE_HOUR = 3600 * SECOND
 
 @pytest.fixture(scope="module")
 def identifier(shared):
-    shared.start_identifier({"input_timeout": 600.0})
+    shared.start_identifier()
     return shared.client
 
 

@@ -25,7 +25,7 @@ def signature_record():
 
 @pytest.fixture(scope="module")
 def client(shared):
-    shared.start_identifier({"method": "signature", "input_timeout": 600.0})
+    shared.start_identifier({"method": "signature"})
     return shared.client
 
 

@@ -45,7 +45,7 @@ BIAS = 1.13e-3
 @pytest.fixture(scope="module")
 def bench(shared):
     """Identify two periods of a square wave; return client, core's assessment, answers."""
-    shared.start_identifier({"position_bias": BIAS, "input_timeout": 600.0})
+    shared.start_identifier({"position_bias": BIAS})
     client = shared.client
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
     record = bench_record()

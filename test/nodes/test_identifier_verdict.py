@@ -19,7 +19,7 @@ LIMITS = {"warn_ratio": 1.5, "error_ratio": 2.0, "low_ratio": 0.5}
 @pytest.fixture(scope="module")
 def healthy(shared):
     """An identifier whose baseline is its own estimate of the healthy valve."""
-    shared.start_identifier({"input_timeout": 600.0})
+    shared.start_identifier()
     client = shared.client
     refused = client.trigger("set_baseline")
     client.identified(quick_record())
@@ -123,7 +123,7 @@ def test_published_values_and_their_warnings_stand_beside_the_refined(live):
 
 
 def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):
-    live.start_identifier({"input_timeout": 600.0})
+    live.start_identifier()
     client = live.client
     client.identified(quick_record())
     assert client.trigger("set_baseline").success
@@ -144,7 +144,7 @@ def test_parameter_shows_the_baseline_of_the_service_and_replaces_it(live):
 
 
 def test_refusal_keeps_the_verdict_and_says_so(live):
-    live.start_identifier({"baseline_coulomb_friction": 200.0, "input_timeout": 600.0})
+    live.start_identifier({"baseline_coulomb_friction": 200.0})
     client = live.client
     client.identified(quick_record(HIGH_FRICTION))
     assert client.trigger("clear").success
@@ -160,7 +160,7 @@ SQUARE = square_record()
 
 def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(live):
     """A square wave behind a lag: F_c is weak, and the sliding friction serves instead."""
-    live.start_identifier({"input_timeout": 600.0, "timing_uncertainty": 0.01})
+    live.start_identifier({"timing_uncertainty": 0.01})
     client = live.client
     client.identified(SQUARE)
     values = client.last_values()
@@ -188,7 +188,7 @@ def test_an_alarm_by_the_sliding_friction_where_the_coulomb_friction_is_vague(li
 
 
 def test_a_baseline_of_no_use_is_refused(live):
-    live.start_identifier({"input_timeout": 600.0, "timing_uncertainty": 0.1})
+    live.start_identifier({"timing_uncertainty": 0.1})
     live.client.identified(square_record(LOW_FRICTION))
     answer = live.client.trigger("set_baseline")
     assert not answer.success

@@ -10,15 +10,19 @@ def lines(process, words):
 
 def test_each_event_is_logged_once(live):
     process = live.start_identifier({"input_timeout": 1.0})
-    client = live.client
+    client, node = live.client, f"{NAMESPACE}/identifier"
     client.wait_until(lambda: lines(process, "ready"), "the ready line")
     client.wait_until(lambda: lines(process, "level OK → WARN"), "a change of level")
     refusal = client.trigger("identify").message
     assert f"no data on {NAMESPACE}/actuator_pressure for" in refusal
     assert "its publisher is silent" in refusal
     assert "no samples of actuator_pressure" in refusal
+    # A patient node is content with old samples, so that no slow machine adds changes of level.
+    assert client.set_together(node, {"input_timeout": 600.0}).successful
     answer = client.identified(quick_record())
+    client.wait_until(lambda: lines(process, "level WARN → OK"), "a content node")
     baseline = client.trigger("set_baseline").message
+    assert client.set_together(node, {"input_timeout": 1.0}).successful
     client.wait_until(lambda: len(lines(process, "level OK → WARN")) == 2, "silence again")
     (ready,) = lines(process, "ready")
     assert f"{NAMESPACE}/actuator_pressure and {NAMESPACE}/stem_state" in ready

@@ -93,7 +93,7 @@ def begin_identification(client):
 
 
 def test_ctrl_c_during_an_identification(live, tmp_path):
-    process = live.start_identifier({"input_timeout": 600.0}, script=SCRIPT)
+    process = live.start_identifier(script=SCRIPT)
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)
@@ -107,7 +107,7 @@ def test_ctrl_c_during_an_identification(live, tmp_path):
 
 def test_long_identification_loses_no_sample(live, tmp_path):
     """What arrives while an identification runs is taken at once, and identified by the next."""
-    live.start_identifier({"input_timeout": 600.0, "method": "refined"}, script=SCRIPT)
+    live.start_identifier({"method": "refined"}, script=SCRIPT)
     client = live.client
     whole = simulated(SineWave(period=5.0).sample(np.arange(1000) / 100), 0.01)
     begin, rest = slice(500), slice(500, 1000)
@@ -134,7 +134,7 @@ def test_long_identification_loses_no_sample(live, tmp_path):
 
 def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_path):
     history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-    process = live.start_identifier({"input_timeout": 600.0}, script=failing_identifier.SCRIPT)
+    process = live.start_identifier(script=failing_identifier.SCRIPT)
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)

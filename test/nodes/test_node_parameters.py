@@ -59,7 +59,7 @@ BAD_CHANGES = [  # changes, words of the reason
 
 @pytest.fixture(scope="module")
 def client(shared):
-    shared.start_identifier({"input_timeout": 600.0})
+    shared.start_identifier()
     return shared.client
 
 

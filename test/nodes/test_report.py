@@ -31,7 +31,7 @@ def report(client):
 def bench(shared, tmp_path_factory):
     """A node, its client, and the folder of its reports, which is not there yet."""
     folder = tmp_path_factory.mktemp("reported") / "plant" / "reports"
-    shared.start_identifier({"report_folder": str(folder), "input_timeout": 600.0})
+    shared.start_identifier({"report_folder": str(folder)})
     return shared.client, folder
 
 
@@ -117,7 +117,7 @@ def test_the_trend_and_the_signature_of_the_baseline_are_those_of_the_history(li
         friction = 150.0 + 2.0 * (35 - days)
         kept.add(success(now - days * DAY, friction, 2.0, valve=valve, method="robust"))
     places = {"report_folder": str(tmp_path), "history_file": str(kept.path)}
-    live.start_identifier({**places, "input_timeout": 600.0})
+    live.start_identifier({**places})
     client = live.client
     client.identified(quick_record(HIGH_FRICTION))
     _, page = report(client)

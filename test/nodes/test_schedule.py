@@ -28,7 +28,7 @@ def skipped(words):
 
 
 def test_it_identifies_without_being_asked(live, history):
-    node = live.start_identifier({"input_timeout": 600.0, "period": 0.2})
+    node = live.start_identifier({"period": 0.2})
     client = live.client
     status = client.next_status(skipped("no samples of actuator_pressure"), "a skip")
     assert status.message == "no estimate: nothing has been identified yet"
@@ -67,7 +67,7 @@ def test_it_identifies_without_being_asked(live, history):
 
 
 def test_the_period_is_changed_while_it_runs(live):
-    live.start_identifier({"input_timeout": 600.0})
+    live.start_identifier()
     client = live.client
     assert "scheduled_skip" not in client.status_values()
     assert client.set_together(NODE, {"period": 0.1}).successful
@@ -79,7 +79,7 @@ def test_the_period_is_changed_while_it_runs(live):
 
 def test_by_simulated_time(live):
     """The clock of a simulation or of a bag, not the wall's."""
-    live.start_identifier({"input_timeout": 600.0, "period": 100.0, "use_sim_time": True})
+    live.start_identifier({"period": 100.0, "use_sim_time": True})
     client = live.client
     clock = client.node.create_publisher(Clock, "/clock", 10)
     now = 1_000

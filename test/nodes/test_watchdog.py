@@ -117,9 +117,7 @@ def test_a_stuck_node_ends_all_the_same(live, stuck, number):
 
 
 def test_an_identification_that_does_not_return(live, tmp_path, systemd):
-    process = live.start_identifier(
-        {"input_timeout": 600.0, "identification_limit": 1.0}, script=SCRIPT
-    )
+    process = live.start_identifier({"identification_limit": 1.0}, script=SCRIPT)
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)
@@ -138,7 +136,7 @@ def test_an_identification_that_does_not_return(live, tmp_path, systemd):
 
 
 def test_ctrl_c_leaves_an_identification_that_does_not_return(live):
-    process = live.start_identifier({"input_timeout": 600.0}, script=SCRIPT)
+    process = live.start_identifier(script=SCRIPT)
     client = live.client
     client.send_record(quick_record())
     client.wait_for_buffered(1000)

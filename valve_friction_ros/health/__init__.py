@@ -12,8 +12,6 @@ from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
     FrictionLimits,
-    Level,
-    StatusSignal,
     dead_band,
     diagnose,
     diagnose_again,
@@ -25,12 +23,14 @@ from valve_friction_ros.health.friction_monitor import (
     MonitorSettings,
     identify_snapshot,
 )
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 
 __all__ = [
     "Baseline",
     "Comparison",
     "Diagnosis",
     "EarlierEstimate",
+    "Finding",
     "FrictionLimits",
     "FrictionMonitor",
     "IdentificationInput",
@@ -39,6 +39,7 @@ __all__ = [
     "Ratio",
     "SlidingFriction",
     "StatusSignal",
+    "by_severity",
     "carried",
     "compared",
     "dead_band",

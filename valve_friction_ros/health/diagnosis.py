@@ -3,11 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import Enum, IntEnum
 from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
@@ -17,8 +17,6 @@ __all__ = [
     "EarlierEstimate",
     "FrictionLimits",
     "Frictions",
-    "Level",
-    "StatusSignal",
     "dead_band",
     "diagnose",
     "diagnose_again",
@@ -26,24 +24,6 @@ __all__ = [
 ]
 
 _DOUBT = "the Karnopp model does not describe this valve"
-
-
-class Level(IntEnum):
-    """Severity, numbered as in diagnostic_msgs/DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-
-
-class StatusSignal(Enum):
-    """Status signals of NAMUR NE 107."""
-
-    GOOD = ""
-    FAILURE = "F"
-    CHECK_FUNCTION = "C"
-    OUT_OF_SPECIFICATION = "S"
-    MAINTENANCE_REQUIRED = "M"
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
     FrictionLimits,
-    Level,
-    StatusSignal,
     diagnose,
     diagnose_again,
 )
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     IdentificationSettings,

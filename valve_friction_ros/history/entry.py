@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from valve_friction_ros import __version__
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import carried
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Level
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
+from valve_friction_ros.health.levels import Level
 from valve_friction_ros.identification import (
     SLIDING,
     Parameter,

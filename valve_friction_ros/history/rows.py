@@ -12,7 +12,8 @@ import numpy as np
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, Level, StatusSignal
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.history.entry import (
     Fit,
     HistoryEntry,

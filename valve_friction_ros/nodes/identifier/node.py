@@ -30,6 +30,7 @@ from valve_friction_ros.nodes.identifier.results import ResultTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
 from valve_friction_ros.nodes.identifier.status import friction_status, stuck_status, trend_values
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
+from valve_friction_ros.nodes.identifier.watch import Watch
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError
 from valve_friction_ros.nodes.plumbing.parameters import (
@@ -84,6 +85,7 @@ class Identifier(PolledNode):
         self._level_log = LevelLog(self)
         results = ResultTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
+        self._watches: tuple[Watch, ...] = ()
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
@@ -144,6 +146,8 @@ class Identifier(PolledNode):
 
     def _take_samples(self, arrivals: Arrivals) -> None:
         rejected, cleared = self._monitor.buffer.add_arrivals(arrivals)
+        for watch in self._watches:
+            watch.take(arrivals)
         # Each call is throttled for itself, so bad samples do not hide that the buffer was cleared.
         if rejected is not None:
             self.get_logger().warning(rejected, throttle_duration_sec=_LOG_EVERY)
@@ -241,7 +245,9 @@ class Identifier(PolledNode):
             now.nanoseconds,
             [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
             self._history.problems,
+            [finding for watch in self._watches for finding in watch.findings()],
             {
+                **{key: value for one in self._watches for key, value in one.values().items()},
                 **self._history.values(),
                 **trend_values(self._history.trend),
                 **self._schedule.values(),

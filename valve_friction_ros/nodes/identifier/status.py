@@ -7,7 +7,15 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from valve_friction_ros.health import Baseline, FrictionMonitor, Level, StatusSignal, dead_band
+from valve_friction_ros.health import (
+    Baseline,
+    Finding,
+    FrictionMonitor,
+    Level,
+    StatusSignal,
+    by_severity,
+    dead_band,
+)
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING
 
@@ -95,15 +103,19 @@ def friction_status(
     now: int,
     input_problems: Sequence[str],
     upkeep_problems: Sequence[str],
+    findings: Sequence[Finding],
     more: Mapping[str, str],
 ) -> DiagnosticStatus:
     """Compose the status of a valve at the time `now`, ns; the unit of a number is in its key.
 
     Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
-    level to WARN at least. `more` holds further values.
+    level to WARN at least. What else is found on the valve follows the diagnosis of its friction;
+    the most severe of all sets the level. `more` holds further values.
     """
-    diagnosis = monitor.diagnosis(now)
+    diagnosis, findings = monitor.diagnosis(now), by_severity(findings)
     level, signal = diagnosis.level, diagnosis.status_signal
+    if findings and findings[0].level > level:
+        level, signal = findings[0].level, findings[0].status_signal
     if input_problems and level < Level.WARN:
         level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
     elif upkeep_problems and level < Level.WARN:
@@ -132,13 +144,9 @@ def friction_status(
         values["friction_ratio of"] = ratio.what
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
-    return _status(
-        level,
-        name,
-        hardware_id,
-        "; ".join([*input_problems, *upkeep_problems, diagnosis.message]),
-        values,
-    )
+    found = (one.message for one in findings)
+    message = "; ".join([*input_problems, *upkeep_problems, diagnosis.message, *found])
+    return _status(level, name, hardware_id, message, values)
 
 
 def stuck_status(name: str, hardware_id: str, problem: str) -> DiagnosticStatus:

@@ -1,0 +1,49 @@
+"""Severity of what is found on a valve."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+__all__ = ["Finding", "Level", "StatusSignal", "by_severity"]
+
+
+class Level(IntEnum):
+    """Severity, numbered as in diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+class StatusSignal(Enum):
+    """Status signals of NAMUR NE 107."""
+
+    GOOD = ""
+    FAILURE = "F"
+    CHECK_FUNCTION = "C"
+    OUT_OF_SPECIFICATION = "S"
+    MAINTENANCE_REQUIRED = "M"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found on a valve beside its friction.
+
+    Attributes
+    ----------
+    level : Level
+        Severity.
+    status_signal : StatusSignal
+        The severity as a status signal of NE 107.
+    message : str
+        One sentence that says what to check.
+    """
+
+    level: Level
+    status_signal: StatusSignal
+    message: str
+
+
+def by_severity(findings: Iterable[Finding]) -> list[Finding]:
+    """Return findings, the most severe first; those of one level keep their order."""
+    return sorted(findings, key=lambda finding: -finding.level)
