@@ -13,6 +13,7 @@ from valve_friction_ros.nodes.identifier.workers import running_workers
 from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
+from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import RecordBuffer
 
 
@@ -43,6 +44,14 @@ class TypedInputs:
         self._watches[1].arrived()
         stamp = stamp_of(message.header.stamp)
         self._buffer.add_position(stamp, position_of(message, self._joint))
+
+    @property
+    def names(self) -> StreamNames:
+        """The topics, fully resolved, and the joint."""
+        return StreamNames(*(watch.topic for watch in self._watches), self._joint)
+
+    def follow_publishers(self) -> None:
+        """Do nothing: the publishers of the benchmark are reliable."""
 
     def take(self) -> None:
         """Do nothing: every message has been taken."""

@@ -12,6 +12,7 @@ from valve_friction_ros.fleet.picture import HEIGHT, WIDTH
 from valve_friction_ros.fleet.ranking import Status, ranked, status_of
 from valve_friction_ros.fleet.row import PICTURE, Cell
 from valve_friction_ros.health import percentage
+from valve_friction_ros.identification import two_digits
 from valve_friction_ros.page_template import page_environment
 
 __all__ = ["page_text"]
@@ -46,7 +47,7 @@ def _with_width(row: _Row, name: str) -> _Number:
     value, width = row[f"{name}_n"], row[f"{name}_half_width_n"]
     if not isinstance(value, (int, float)):
         return _Number()
-    detail = f"± {width:.2g} N" if isinstance(width, (int, float)) else "N"
+    detail = f"± {two_digits(width)} N" if isinstance(width, (int, float)) else "N"
     return _Number(f"{value:.4g}", detail, value)
 
 

@@ -1,6 +1,7 @@
 """The history of a plant's valves: one file that several processes write at once."""
 
 import contextlib
+import os
 import sqlite3
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from valve_friction_ros.history.rows import (
     record_in,
     valve_id,
 )
-from valve_friction_ros.history.schema import HistoryError, reading, writing
+from valve_friction_ros.history.schema import HistoryError, is_current, reading, writing
 from valve_friction_ros.identification import FORMER_METHODS, SLIDING
 
 __all__ = ["HistoryError", "HistoryFile"]
@@ -57,7 +58,14 @@ class HistoryFile:
     path: Path
 
     def prepare(self) -> None:
-        """Create the file if it is missing, and check that it can be written."""
+        """Create the file if it is missing, and check that it can be written.
+
+        A file that another process is writing at the moment is not waited for, unless it is older.
+        """
+        if is_current(self.path) and all(
+            os.access(place, os.W_OK) for place in (self.path, self.path.parent)
+        ):
+            return
         with writing(self.path):
             pass
 

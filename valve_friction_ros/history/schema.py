@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 from urllib.parse import quote
 
-__all__ = ["SCHEMA_VERSION", "HistoryError", "reading", "writing"]
+__all__ = ["SCHEMA_VERSION", "HistoryError", "is_current", "reading", "writing"]
 
 SCHEMA_VERSION = 5
 """The database's user_version.
@@ -19,8 +19,9 @@ say what a baseline replaced."""
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
 
-_PATIENCE = 10.0
-"""Longest wait, s, for another process that writes. Chosen: one transaction takes milliseconds."""
+_PATIENCE = 3.0
+"""Longest wait, s, for another process that writes. Chosen: one transaction takes milliseconds, and
+who has called a service waits for it too."""
 
 _SCHEMA = """
 CREATE TABLE valve (
@@ -329,3 +330,12 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
             raise HistoryError(f"{path}: the file is empty: no identification has been stored")
         connection.execute("BEGIN")
         yield connection
+
+
+def is_current(path: Path) -> bool:
+    """Return whether a file is a readable history of this version of the schema."""
+    try:
+        with reading(path) as connection:
+            return _pragma(connection, "user_version") == SCHEMA_VERSION
+    except HistoryError:
+        return False

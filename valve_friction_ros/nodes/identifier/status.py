@@ -144,8 +144,8 @@ def friction_status(
         values["friction_ratio of"] = ratio.what
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
-    found = (one.message for one in findings)
-    message = "; ".join([*input_problems, *upkeep_problems, diagnosis.message, *found])
+    also = (one.message for one in findings)
+    message = "; ".join([*input_problems, *upkeep_problems, diagnosis.message, *also])
     return _status(level, name, hardware_id, message, values)
 
 
