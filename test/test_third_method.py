@@ -23,7 +23,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.identification.trust.verdict import not_identifiable, with_verdict
 from valve_friction_ros.model import BENCH_VALVE, Recording
-from valve_friction_ros.nodes.identifier.status import friction_status
+from valve_friction_ros.nodes.identifier.status import estimate_status
 from valve_friction_ros.reports import IdentifiedRecord, identification_report, render
 
 SECOND = 1_000_000_000
@@ -147,7 +147,7 @@ def test_its_rows_and_diagnostics(recording, tmp_path):
     assert (entry.method, entry.friction) == ("width", friction)
     assert entry.to_dict()["parameters"] == result.to_dict()["parameters"]
 
-    status = friction_status(monitor, "fv_1", "FV-1", SECOND, (), (), (), {})
+    status = estimate_status(monitor, "fv_1", "FV-1", ())
     values = {each.key: each.value for each in status.values}
     assert values["method"] == "width"
     assert float(values["coulomb_friction [N]"]) == pytest.approx(friction.value, rel=1e-8)

@@ -18,6 +18,9 @@ __all__ = ["PARAMETERS", "identifiers_of_valves", "main"]
 _VALVES = ParameterSpec(
     "valves", [""], "Namespaces of the valves, an identifier each [-]", read_only=True
 )
+_FEW = 4
+"""Valves up to which each number has a topic of its own. Chosen: some 100 topics, which joining
+programs meet within a second or two."""
 PARAMETERS = (_VALVES, *parameters.PARAMETERS)
 """Its own, and those of its identifiers."""
 
@@ -45,7 +48,7 @@ def identifiers_of_valves(workers: Workers) -> Iterator[Node]:
     for place in places:
         validate_namespace(place)
     for place in places:
-        identifier = Identifier(workers, place)
+        identifier = Identifier(workers, place, number_topics=len(places) <= _FEW)
         yield identifier
         if identifier.get_namespace() != place:
             raise ValueError(

@@ -4,7 +4,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.identifier.results import ResultTopics
+from valve_friction_ros.nodes.identifier.results import NumberTopics
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
 
@@ -19,7 +19,7 @@ class Identification:
     """
 
     def __init__(
-        self, node: Node, monitor: FrictionMonitor, results: ResultTopics, worker: Worker
+        self, node: Node, monitor: FrictionMonitor, results: NumberTopics, worker: Worker
     ) -> None:
         self._node, self._monitor, self._results, self._worker = node, monitor, results, worker
         self._is_running = False

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -20,15 +21,20 @@ from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
     IDENTIFICATION_LIMIT,
     INPUT_TIMEOUT,
+    NUMBER_TOPICS,
     PARAMETERS,
     VALVE_TAG,
     monitor_settings,
     require_valid,
 )
 from valve_friction_ros.nodes.identifier.report_service import written_report
-from valve_friction_ros.nodes.identifier.results import ResultTopics
+from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
-from valve_friction_ros.nodes.identifier.status import friction_status, stuck_status, trend_values
+from valve_friction_ros.nodes.identifier.status import (
+    estimate_status,
+    friction_status,
+    stuck_status,
+)
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.identifier.watch import Watch
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
@@ -64,11 +70,16 @@ class Identifier(PolledNode):
         Its threads, which identifiers of one process share.
     namespace : str, optional
         Namespace of the valve, where it is not given by a ROS argument.
+    number_topics : bool, optional
+        Default of the parameter of this name.
     """
 
-    def __init__(self, workers: Workers, namespace: str | None = None) -> None:
+    def __init__(
+        self, workers: Workers, namespace: str | None = None, number_topics: bool = True
+    ) -> None:
         super().__init__("identifier", namespace=namespace)
-        declare_parameters(self, PARAMETERS)
+        own = replace(NUMBER_TOPICS, default=number_topics)
+        declare_parameters(self, [own if one is NUMBER_TOPICS else one for one in PARAMETERS])
         warn_of_columns(self)
         values = values_of(self, CHANGEABLE)
         require_valid(values)
@@ -83,7 +94,8 @@ class Identifier(PolledNode):
         self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
         self._level_log = LevelLog(self)
-        results = ResultTopics(self)
+        self._estimate_topic = EstimateTopic(self)
+        results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
         self._watches: tuple[Watch, ...] = ()
         waiting = ReentrantCallbackGroup()
@@ -238,18 +250,24 @@ class Identifier(PolledNode):
         self._inputs.take()
         self._inputs.follow_publishers()
         now = self.get_clock().now()
-        status = friction_status(
+        findings = [finding for watch in self._watches for finding in watch.findings()]
+        estimate = estimate_status(
             self._monitor,
             self._status_name,
             self._history.valve.tag,
+            findings,
+            self._history.trend,
+        )
+        self._estimate_topic.publish(estimate)
+        status = friction_status(
+            estimate,
+            self._monitor,
             now.nanoseconds,
             [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
             self._history.problems,
-            [finding for watch in self._watches for finding in watch.findings()],
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
                 **self._history.values(),
-                **trend_values(self._history.trend),
                 **self._schedule.values(),
                 **self._readiness.values(),
             },

@@ -28,6 +28,7 @@ __all__ = [
     "HISTORY_FILE",
     "IDENTIFICATION_LIMIT",
     "INPUT_TIMEOUT",
+    "NUMBER_TOPICS",
     "PARAMETERS",
     "PERIOD",
     "REPORT_FOLDER",
@@ -87,6 +88,13 @@ REPORT_FOLDER = ParameterSpec(
     "",
     "Folder that ~/report writes pages into [-]; empty: valve_friction_ros/reports under ROS_HOME, "
     "or under ~/.ros",
+)
+NUMBER_TOPICS = ParameterSpec(
+    "number_topics",
+    True,
+    "Whether each number, and the sweep, has a latched topic of its own beside ~/estimate [-]; "
+    "`identifiers` of more than 4 valves have none unless told",
+    read_only=True,
 )
 PERIOD = ParameterSpec(
     "period",
@@ -176,7 +184,7 @@ CHANGEABLE = (
 )
 """Those that can be changed while the node runs."""
 
-PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, JOINT)
+PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, JOINT, NUMBER_TOPICS)
 
 
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:

@@ -1,15 +1,17 @@
-"""The latched topics of an identifier's results."""
+"""The latched topics of an identifier: what is known of its valve, and each number of it."""
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
 
 from valve_friction_ros.health import FrictionMonitor, dead_band
 from valve_friction_ros.history import HistoryEntry
 from valve_friction_ros.identification import SLIDING, UNITS, Result
+from valve_friction_ros.nodes.identifier.parameters import NUMBER_TOPICS
 from valve_friction_ros.nodes.plumbing.messages import sweep_message
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
-__all__ = ["ResultTopics"]
+__all__ = ["EstimateTopic", "NumberTopics"]
 
 _FIGURES = (
     "dead_band",
@@ -26,10 +28,30 @@ _FIGURES = (
 _FRICTIONS = (*UNITS, SLIDING)
 
 
-class ResultTopics:
-    """Publishes each number of a result on a topic of its own, and the sweep."""
+class EstimateTopic:
+    """Publishes what is known of the valve in one message, when it has changed."""
 
     def __init__(self, node: Node) -> None:
+        self._publisher = node.create_publisher(DiagnosticStatus, "~/estimate", LATCHED)
+        self._last: DiagnosticStatus | None = None
+
+    def publish(self, status: DiagnosticStatus) -> None:
+        """Publish a status, unless it is the one before."""
+        if status != self._last:
+            self._last = status
+            self._publisher.publish(status)
+
+
+class NumberTopics:
+    """Publishes each number of a result on a topic of its own, and the sweep.
+
+    Without the parameter ``number_topics`` it does nothing.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._is_used = bool(node.get_parameter(NUMBER_TOPICS.name).value)
+        if not self._is_used:
+            return
         self._friction = {
             name: node.create_publisher(Float64, f"~/friction/{name}", LATCHED)
             for name in (*_FRICTIONS, *_FIGURES)
@@ -42,6 +64,8 @@ class ResultTopics:
 
     def publish(self, result: Result | HistoryEntry, monitor: FrictionMonitor) -> None:
         """Publish a result that the monitor has accepted, or the numbers kept of an earlier one."""
+        if not self._is_used:
+            return
         ratio = monitor.diagnosis().ratio
         unknown = float("nan")
         if isinstance(result, Result):

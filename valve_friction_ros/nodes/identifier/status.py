@@ -19,7 +19,7 @@ from valve_friction_ros.health import (
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING
 
-__all__ = ["friction_status", "stuck_status", "trend_values"]
+__all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
 
 
 _EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
@@ -79,6 +79,11 @@ def _date(time: int) -> str:
     return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d}"
 
 
+def _time(time: int) -> str:
+    """Write a time, ns since 1970, by ISO 8601, as UTC."""
+    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%dT%H:%M:%S.%fZ}"
+
+
 def trend_values(trend: Trend | None) -> dict[str, str]:
     """Return the values of a drift, if it is significant."""
     if trend is None or not trend.is_significant:
@@ -96,30 +101,23 @@ def trend_values(trend: Trend | None) -> dict[str, str]:
     return values
 
 
-def friction_status(
+def estimate_status(
     monitor: FrictionMonitor,
     name: str,
     hardware_id: str,
-    now: int,
-    input_problems: Sequence[str],
-    upkeep_problems: Sequence[str],
     findings: Sequence[Finding],
-    more: Mapping[str, str],
+    trend: Trend | None = None,
 ) -> DiagnosticStatus:
-    """Compose the status of a valve at the time `now`, ns; the unit of a number is in its key.
+    """Compose what is known of a valve; the unit of a number is in its key.
 
-    Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
-    level to WARN at least. What else is found on the valve follows the diagnosis of its friction;
-    the most severe of all sets the level. `more` holds further values.
+    It changes only when that does: it has the time of the estimate in place of an age, and nothing
+    of the inputs. What else is found on the valve follows the diagnosis of its friction; the most
+    severe of all sets the level.
     """
-    diagnosis, findings = monitor.diagnosis(now), by_severity(findings)
+    diagnosis, findings = monitor.diagnosis(), by_severity(findings)
     level, signal = diagnosis.level, diagnosis.status_signal
     if findings and findings[0].level > level:
         level, signal = findings[0].level, findings[0].status_signal
-    if input_problems and level < Level.WARN:
-        level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
-    elif upkeep_problems and level < Level.WARN:
-        level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
     estimate = monitor.estimate
     found = {} if estimate is None else estimate.parameters
     frictions = [found[name] for name in (SLIDING, "coulomb_friction") if name in found]
@@ -132,7 +130,7 @@ def friction_status(
         "NE 107": signal.value,
     }
     if estimate is not None and monitor.stamp is not None:
-        values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
+        values["estimate_time"] = _time(monitor.stamp)
         values["estimate_from"] = "this run" if monitor.earlier is None else "before the restart"
         share = dead_band(estimate, monitor.settings.valve)
         values |= _result_values(estimate.to_dict(), share)
@@ -142,11 +140,39 @@ def friction_status(
         values["friction_ratio low"] = _number(ratio.low)
         values["friction_ratio high"] = _number(ratio.high)
         values["friction_ratio of"] = ratio.what
+    values |= trend_values(trend)
+    message = "; ".join([diagnosis.message, *(one.message for one in findings)])
+    return _status(level, name, hardware_id, message, values)
+
+
+def friction_status(
+    estimate: DiagnosticStatus,
+    monitor: FrictionMonitor,
+    now: int,
+    input_problems: Sequence[str],
+    upkeep_problems: Sequence[str],
+    more: Mapping[str, str],
+) -> DiagnosticStatus:
+    """Compose the status of a valve at the time `now`, ns, from what is known of it.
+
+    Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
+    level to WARN at least. An earlier estimate is shown with its age. `more` holds further values.
+    """
+    values = {one.key: one.value for one in estimate.values}
+    level, signal = Level(estimate.level[0]), StatusSignal(values["NE 107"])
+    if input_problems and level < Level.WARN:
+        level, signal = Level.WARN, StatusSignal.CHECK_FUNCTION
+    elif upkeep_problems and level < Level.WARN:
+        level, signal = Level.WARN, StatusSignal.MAINTENANCE_REQUIRED
+    values["NE 107"] = signal.value
+    if monitor.stamp is not None:
+        values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
-    also = (one.message for one in findings)
-    message = "; ".join([*input_problems, *upkeep_problems, diagnosis.message, *also])
-    return _status(level, name, hardware_id, message, values)
+    known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message
+    message = aged + estimate.message.removeprefix(known)
+    message = "; ".join([*input_problems, *upkeep_problems, message])
+    return _status(level, estimate.name, estimate.hardware_id, message, values)
 
 
 def stuck_status(name: str, hardware_id: str, problem: str) -> DiagnosticStatus:
