@@ -143,10 +143,11 @@ class HistoryWriter:
 
     async def keep(self, identified: IdentificationInput) -> None:
         """Keep the identification that the monitor has just accepted or refused."""
-        now = self._node.get_clock().now().nanoseconds
+        monitor, now = self._monitor, self._node.get_clock().now().nanoseconds
+        found = monitor.stamp if monitor.refusal is None else None
         days = self._node.get_parameter(HISTORY_DAYS.name).value
         with self._failures_remembered():
-            entry = entry_of(self._monitor, self._valve, *identified, time=now)
+            entry = entry_of(monitor, self._valve, *identified, time=found or now)
             await self._written(lambda file: file.add(entry, days))
 
     def kept_now(self, baseline: Baseline) -> KeptBaseline:
