@@ -25,6 +25,7 @@ from valve_friction_ros.identification.rendering import (
     plain,
 )
 from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.robust.expectation import expected_half_widths
 from valve_friction_ros.identification.robust.method import TIMING_UNCERTAINTY, identify_robust
 from valve_friction_ros.identification.settings import (
     CALIBRATION,
@@ -86,6 +87,7 @@ __all__ = [
     "Validation",
     "ValveSignature",
     "Verdict",
+    "expected_half_widths",
     "find_steps",
     "identified_model",
     "identify",

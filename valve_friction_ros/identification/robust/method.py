@@ -41,7 +41,15 @@ from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
-__all__ = ["METHOD", "TIMING_UNCERTAINTY", "has_no_place_for", "identify_robust"]
+__all__ = [
+    "METHOD",
+    "TIMING_UNCERTAINTY",
+    "has_no_place_for",
+    "identify_robust",
+    "prior_of",
+    "require_record",
+    "stamped_record",
+]
 
 METHOD = "robust"
 """Name of this method."""
@@ -88,9 +96,9 @@ def identify_robust(
     if unfit := has_no_place_for(settings):
         raise RefusalError(f"the method robust has no place for {unfit}: use the method refined")
     uniform = measured(recording)
-    _require_record(uniform, valve, settings)
-    record = _stamped(recording)
-    fits = search(fitted_record(record, valve), _prior(settings))
+    require_record(uniform, valve, settings)
+    record = stamped_record(recording)
+    fits = search(fitted_record(record, valve), prior_of(settings))
     fit, numbers = fits[0], estimated(fits)
     misfit = fit_misfit(fit, numbers)
     published, beside = published_beside(uniform, valve, settings)
@@ -147,7 +155,7 @@ def has_no_place_for(settings: IdentificationSettings) -> str:
     return "a known static friction" if "static_friction" in settings.fixed else ""
 
 
-def _require_record(record: MeasuredRecord, valve: Valve, settings: IdentificationSettings) -> None:
+def require_record(record: MeasuredRecord, valve: Valve, settings: IdentificationSettings) -> None:
     """Refuse a record without the motion that determines friction."""
     require_drive(record, valve)
     require_plausible_units(record, valve, settings)
@@ -159,7 +167,7 @@ def _require_record(record: MeasuredRecord, valve: Valve, settings: Identificati
     require_related_signals(record)
 
 
-def _stamped(recording: Recording) -> StampedRecord:
+def stamped_record(recording: Recording) -> StampedRecord:
     """Return the samples at their own stamps, or on the grid where there are no others."""
     if recording.stamped is not None:
         return recording.stamped
@@ -172,7 +180,8 @@ def _stamped(recording: Recording) -> StampedRecord:
     )
 
 
-def _prior(settings: IdentificationSettings) -> Prior:
+def prior_of(settings: IdentificationSettings) -> Prior:
+    """Return what is known before a record is seen."""
     known = {name: value for name, value in settings.fixed.items() if name in REGRESSED}
     timing = settings.timing_uncertainty
     return Prior(

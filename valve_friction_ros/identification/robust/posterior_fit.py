@@ -267,24 +267,22 @@ def fit(
     centre : mapping of str to float
         Their means; 0 where none is given.
     steps : int
-        Steps at most.
+        Steps at most; with 0 the posterior at `start` is told.
     """
-    at, readings = dict(start), model.readings(start)
-    stages = []
+    at = dict(start)
+    problem = _Problem(model, at, names, deviations, centre, model.readings(at))
+    stages = [problem.stage()]
     for _ in range(steps):
-        problem = _Problem(model, at, names, deviations, centre, readings)
-        stages.append(problem.stage())
         if problem.gain(problem.step(0.0)) < _WORTH:
             break
         found = _descended(problem)
         if found is None:
             break
         at, readings, fall = found
-        if fall < _WORTH:
-            break
-    if at is not problem.at:
         problem = _Problem(model, at, names, deviations, centre, readings)
         stages.append(problem.stage())
+        if fall < _WORTH:
+            break
     remaining = problem.jacobian @ problem.step(0.0)
     return PosteriorFit(
         model,

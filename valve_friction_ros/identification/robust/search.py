@@ -23,7 +23,7 @@ from valve_friction_ros.identification.robust.starts import (
     splits,
 )
 
-__all__ = ["Prior", "search"]
+__all__ = ["Prior", "posteriors_at", "search"]
 
 _SLIP_SHARES = (0.35, 0.55, 0.75, 0.9)
 _SLIPS = (0.15, 0.4, 0.8)
@@ -310,3 +310,30 @@ def search(record: FittedRecord, prior: Prior) -> list[PosteriorFit]:
         If the stem does not follow the force.
     """
     return _Search(record, prior).all_probable()
+
+
+def posteriors_at(
+    record: FittedRecord, prior: Prior, truth: Coordinates, with_competitors: bool
+) -> list[PosteriorFit]:
+    """Return what a record says of a model that is known to be the right one, without a search.
+
+    Parameters
+    ----------
+    record : FittedRecord
+        A simulated record.
+    prior : Prior
+        What an identification would know beforehand.
+    truth : mapping of str to float
+        Coordinates of the simulated valve; the others are absent.
+    with_competitors : bool
+        Whether the fits follow that trade viscous friction for lag, as those of `search` do.
+
+    Raises
+    ------
+    RefusalError
+        If the stem does not follow the force.
+    """
+    found = _Search(record, prior)
+    at = {**found.base, **truth}
+    best = fit(found.exact, {**at, **found.known}, found.all, found.spread, found.centre, 0)
+    return [best, *(found.traded(best) if with_competitors else ())]

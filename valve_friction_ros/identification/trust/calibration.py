@@ -9,7 +9,7 @@ from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import WEAK_SHARE, Parameter, Verdict
 from valve_friction_ros.model.drive import Drive
 
-__all__ = ["BUDGET", "calibrated", "calibration_share", "with_calibration"]
+__all__ = ["BUDGET", "COVERAGE", "calibrated", "calibration_share", "with_calibration"]
 
 BUDGET = "uncertainty_budget"
 """Name of the evidence that splits the standard uncertainty of each parameter by its sources."""
@@ -27,7 +27,7 @@ _EXPONENTS: Mapping[str, tuple[int, int]] = {
 }
 """Powers of the scales of force and length that a parameter grows with; of others none."""
 
-_COVERAGE = 2.0
+COVERAGE = 2.0
 """Half width of a 95 % interval over the standard uncertainty (GUM, k = 2)."""
 
 
@@ -60,7 +60,7 @@ def calibrated(one: Parameter, share: float) -> Parameter:
     is_estimate = one.half_width >= 0 and one.verdict is not Verdict.FIXED
     if not (error > 0 and is_estimate) or one.uncalibrated is not None:
         return one
-    width = math.hypot(one.half_width, _COVERAGE * error)
+    width = math.hypot(one.half_width, COVERAGE * error)
     wide = width / abs(one.value)
     verdict, reason = one.verdict, one.reason
     if wide > WEAK_SHARE:

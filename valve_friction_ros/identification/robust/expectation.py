@@ -1,0 +1,79 @@
+"""The intervals that the method robust would report of a record of a known valve."""
+
+import math
+from collections.abc import Mapping
+
+from valve_friction_ros.identification.robust.fitted_record import fitted_record
+from valve_friction_ros.identification.robust.intervals import estimated
+from valve_friction_ros.identification.robust.method import (
+    prior_of,
+    require_record,
+    stamped_record,
+)
+from valve_friction_ros.identification.robust.search import posteriors_at
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.calibration import COVERAGE, calibration_share
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals.measured_record import measured
+
+__all__ = ["expected_half_widths"]
+
+
+def expected_half_widths(
+    recording: Recording,
+    valve: Valve,
+    parameters: KarnoppParameters,
+    settings: IdentificationSettings | None = None,
+    *,
+    start: float,
+    with_competitors: bool = True,
+) -> Mapping[str, float]:
+    """Return half the widths of the 95 % intervals that a simulated record will get.
+
+    They are those of the posterior (HᵀW²H/κ + Λ)⁻¹ at the simulated valve itself: the sensitivities
+    H of the exact simulation, the noise W of both sensors, and the priors Λ of the imperfections
+    with which `identify_robust` fits, lags of the signals among them. No fit searches.
+
+    Parameters
+    ----------
+    recording : Recording
+        Simulated with the noise of the sensors.
+    valve : Valve
+        Geometry.
+    parameters : KarnoppParameters
+        What it was simulated with.
+    settings : IdentificationSettings, optional
+        Those of the identification to come.
+    start : float
+        Simulated position at the first sample, m.
+    with_competitors : bool
+        Whether the models count that explain the record by a lag in place of viscous friction; it
+        takes some ten times as long, and matters to F_v above all.
+
+    Raises
+    ------
+    RefusalError
+        If the method would refuse the record.
+    """
+    settings = settings or IdentificationSettings()
+    require_record(measured(recording), valve, settings)
+    truth = {
+        "coulomb_friction": parameters.coulomb_friction,
+        "viscous_friction": parameters.viscous_friction,
+        "spring_constant": parameters.spring_constant,
+        "spring_preload": parameters.spring_preload,
+        "slip_force": parameters.static_friction - parameters.coulomb_friction,
+        "mass": parameters.mass,
+        "start_position": start,
+    }
+    record = fitted_record(stamped_record(recording), valve)
+    fits = posteriors_at(record, prior_of(settings), truth, with_competitors)
+    return {
+        name: math.hypot(
+            one.half_width,
+            COVERAGE * calibration_share(name, settings, valve.driven_by) * one.value,
+        )
+        for name, one in estimated(fits).items()
+    }
