@@ -1,0 +1,23 @@
+"""The stroke test from which the friction of a valve will be known best; no ROS."""
+
+from valve_friction_ros.planning.conditions import Conditions, Limits
+from valve_friction_ros.planning.friction_range import (
+    FrictionRange,
+    known_friction,
+    unknown_friction,
+)
+from valve_friction_ros.planning.search import AIMS, StrokePlan, plan_test
+from valve_friction_ros.planning.stroke_test import Pattern, StrokeTest
+
+__all__ = [
+    "AIMS",
+    "Conditions",
+    "FrictionRange",
+    "Limits",
+    "Pattern",
+    "StrokePlan",
+    "StrokeTest",
+    "known_friction",
+    "plan_test",
+    "unknown_friction",
+]

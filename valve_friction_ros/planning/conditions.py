@@ -1,0 +1,107 @@
+"""What a stroke test may do to a valve, and what will measure it."""
+
+import math
+from dataclasses import dataclass
+
+from valve_friction_ros.model.checks import (
+    require_finite,
+    require_non_negative,
+    require_positive,
+)
+from valve_friction_ros.model.instruments import DEFAULT_LAG
+
+__all__ = ["Conditions", "Limits"]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a stroke test may do.
+
+    Attributes
+    ----------
+    lowest, highest : float
+        Part of the travel that the stem may move in, shares of the travel, 0 to 1.
+    speed : float
+        Largest speed of the sliding stem, m/s.
+    duration : float
+        Longest duration, s.
+    pressure_rate : float
+        Largest rate of the pressure, Pa/s.
+    pressure_minimum, pressure_maximum : float
+        Pressures that may be set, Pa.
+    stop_margin : float
+        Share of the travel that a stem without any friction would keep from either stop: for what
+        is not known of the spring.
+    allow_stops : bool
+        Whether the stem may reach seat and stop.
+
+    Raises
+    ------
+    ValueError
+        If a limit is impossible; the message names it.
+    """
+
+    lowest: float = 0.2
+    highest: float = 0.8
+    speed: float = 10e-3
+    duration: float = 60.0
+    pressure_rate: float = math.inf
+    pressure_minimum: float = -math.inf
+    pressure_maximum: float = math.inf
+    stop_margin: float = 0.05
+    allow_stops: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse impossible limits."""
+        if not 0 <= require_finite("lowest", self.lowest) < require_finite(
+            "highest", self.highest
+        ) <= 1:
+            raise ValueError(
+                f"the part of the travel must rise within 0 to 100 %, got {100 * self.lowest:g} % "
+                f"to {100 * self.highest:g} %"
+            )
+        require_positive("speed", self.speed)
+        require_positive("duration", self.duration)
+        if not self.pressure_rate > 0:
+            raise ValueError(f"pressure_rate must be above zero, got {self.pressure_rate:g}")
+        if not self.pressure_minimum < self.pressure_maximum:
+            raise ValueError(
+                f"pressure_minimum ({self.pressure_minimum:g}) must be below "
+                f"pressure_maximum ({self.pressure_maximum:g})"
+            )
+        if not 0 <= self.stop_margin < 0.5:
+            raise ValueError(f"stop_margin must be at least 0 and below 0.5: {self.stop_margin:g}")
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What will measure a stroke test.
+
+    Attributes
+    ----------
+    sample_rate : float
+        Samples per second of both signals, Hz.
+    position_noise : float
+        Standard deviation of the stem sensor, m.
+    pressure_noise : float
+        Standard deviation of the pressure sensor, Pa.
+    converter_lag : float
+        Time constant of the converter that sets the pressure, s.
+
+    Raises
+    ------
+    ValueError
+        If a value is impossible; the message names it.
+    """
+
+    sample_rate: float = 100.0
+    position_noise: float = 10e-6
+    pressure_noise: float = 100.0
+    converter_lag: float = DEFAULT_LAG
+
+    def __post_init__(self) -> None:
+        """Refuse impossible values."""
+        require_positive("sample_rate", self.sample_rate)
+        require_non_negative("position_noise", self.position_noise)
+        require_non_negative("pressure_noise", self.pressure_noise)
+        require_non_negative("converter_lag", self.converter_lag)
