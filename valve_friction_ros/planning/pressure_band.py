@@ -44,10 +44,11 @@ def _held(one: KarnoppParameters) -> float:
 def stroke(valve: Valve, one: KarnoppParameters, band: PressureBand) -> float:
     """Return the distance, m, between the rests at both ends of a band; negative: no motion.
 
-    A stroke S_a·ΔP − 2·F_c over k, if it breaks away: S_a·ΔP > F_c + F_s.
+    A stroke is S_a·ΔP − 2·F_c over k. A stem that stands in the middle breaks away if
+    S_a·ΔP/2 > F_s; it may do so where it stands elsewhere, but nobody knows where it stands.
     """
     span = valve.force_per_drive * (band.high - band.low)
-    if span <= one.coulomb_friction + one.static_friction:
+    if span <= 2 * one.static_friction:
         return -1.0
     return (span - 2 * one.coulomb_friction) / one.spring_constant
 
@@ -109,10 +110,11 @@ def _require_strokes(
     least = LEAST_STROKE * valve.travel
     if stroke(valve, likely, band) >= least:
         return
-    needed = (
-        max(likely.coulomb_friction + likely.static_friction, 2 * likely.coulomb_friction)
-        + likely.spring_constant * least
-    ) / valve.force_per_drive
+    force = max(
+        2 * likely.static_friction,
+        2 * likely.coulomb_friction + likely.spring_constant * least,
+    )
+    needed = force / valve.force_per_drive
     where = (
         f"between {100 * limits.lowest:g} and {100 * limits.highest:g} % of the travel, at "
         f"{band.low / 1e3:.4g} to {band.high / 1e3:.4g} kPa"
@@ -122,6 +124,6 @@ def _require_strokes(
         remedy += " or the range of the pressure"
     raise RefusalError(
         f"a reversal would not move the stem {where}: a friction of "
-        f"{likely.static_friction:.4g} N needs {needed / 1e3:.3g} kPa for a stroke of "
-        f"{100 * LEAST_STROKE:g} %, and there are {(band.high - band.low) / 1e3:.3g}: {remedy}"
+        f"{likely.static_friction:.4g} N needs {needed / 1e3:.4g} kPa to move the stem both "
+        f"ways, and there are {max(band.high - band.low, 0.0) / 1e3:.4g}: {remedy}"
     )

@@ -1,0 +1,219 @@
+"""Planned stroke tests on valves that the planner does not know: promises kept, and what is gained.
+
+Random valves with other physics (`benchmark.reality.plants`) play the test that was planned for a
+friction assumed 2 times too small, right, or 2 times too large. The default method identifies the
+record. Beside it the same valve plays the default square wave of equal band and duration.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from benchmark.reality.package import identification
+from benchmark.reality.plants import Body, Friction, Law, Plant, Trend, move
+from benchmark.reality.plants.kernel import GRID, Loop
+from benchmark.reality.records import Case, Nominal, Record
+from benchmark.reality.sensors import Instruments, measured
+from benchmark.reality.stamps import Stamping
+from benchmark.reality.suite import cases
+from benchmark.reality.truth import truth_of
+from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSettings, RefusalError
+from valve_friction_ros.model import Excitation, SquareWave, Valve
+from valve_friction_ros.planning import Conditions, Limits, StrokePlan, known_friction, plan_test
+
+__all__ = ["NUMBERS", "Trial", "main", "trials"]
+
+NUMBERS = ("coulomb_friction", "viscous_friction", "static_friction", "sliding_friction")
+_HELD_BACK = 90_000
+_RATE = 100.0
+_BOTTOM, _SPAN = 0.0, 1e6
+_CONDITIONS = Conditions(_RATE)
+_LIMITS = Limits(0.2, 0.8)
+_WRONG = (1.0, 0.5, 2.0)
+"""Friction assumed over the true one."""
+
+_LAWS: Mapping[str, Mapping[str, object]] = {
+    "ideal": {},
+    "stribeck": {"stribeck_velocity": 1.5e-3},
+    "lugre": {"law": Law.LUGRE, "presliding": 10e-6},
+    "uneven": {"asymmetry": 0.04, "along_travel": Trend(0.1, 0.2)},
+}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One valve, planned for and identified.
+
+    Attributes
+    ----------
+    law : str
+        Its physics.
+    wrong : float
+        Friction that was assumed, over the true one.
+    predicted, reported, square, errors : mapping of str to float
+        Half widths predicted, reported, and reported of the square wave, and real errors, shares of
+        the true values; by the name of the number.
+    refusal : str
+        Why there is no plan or no result; empty if there are both.
+    reach : tuple of float
+        Positions that were reached, shares of the travel.
+    """
+
+    law: str
+    wrong: float
+    predicted: Mapping[str, float] = field(default_factory=dict)
+    reported: Mapping[str, float] = field(default_factory=dict)
+    square: Mapping[str, float] = field(default_factory=dict)
+    errors: Mapping[str, float] = field(default_factory=dict)
+    refusal: str = ""
+    reach: tuple[float, float] = (0.0, 0.0)
+
+
+def _plant(law: str, random: np.random.Generator) -> Plant:
+    spring = 2.05e5 * random.uniform(0.8, 1.25)
+    dry = 150.0 * 5.0 ** random.random()
+    slip = 1.0 if law == "ideal" and random.random() < 0.5 else random.uniform(1.1, 1.5)
+    friction = Friction(
+        dry, slip * dry, spring * 0.03 * 10.0 ** random.random(), **_LAWS[law]
+    )
+    return Plant(Body(1.6, spring, random.uniform(200.0, 2500.0)), friction)
+
+
+def _record(
+    plant: Plant, excitation: Excitation, duration: float, seed: int
+) -> tuple[Record, tuple[float, float]]:
+    """Let a valve play a signal, and measure it."""
+    lag = _CONDITIONS.converter_lag
+    loop = Loop(False, False, 0.0, 1.0, 1000, 1.0, _BOTTOM, _SPAN, lag)
+    time = np.arange(round(duration / GRID) + 1) * GRID
+    signal = (excitation.sample(time) - _BOTTOM) / _SPAN
+    motion = move(plant, loop, signal, np.zeros(time.size // 1000 + 1), 0.0)
+    stamping = Stamping(rate=_RATE)
+    instruments = Instruments(pressure_stamping=stamping, position_stamping=stamping)
+    pressure, position = measured(motion, instruments, duration, seed)
+    body = plant.body
+    nominal = Nominal(body.area, body.pressure_reference, body.travel)
+    truth = truth_of(plant, motion, instruments, duration)
+    case: Case = replace(next(iter(cases(1, classes=("ideal",), grown=False))), plant=plant)
+    reach = motion.position / body.travel
+    return Record(case, nominal, pressure, position, truth), (float(reach.min()), float(reach.max()))
+
+
+def _told(record: Record) -> tuple[dict[str, float], dict[str, float], str]:
+    """Identify; return half widths and errors over the true values, and a refusal."""
+    answer = identification(DEFAULT_METHOD).identify(record)
+    if answer.refused:
+        return {}, {}, answer.sentences[0]
+    widths, errors = {}, {}
+    for name in NUMBERS:
+        one, truth = answer.numbers.get(name), getattr(record.truth, name)
+        if one is not None and one.half_width >= 0 and truth.value:
+            widths[name] = one.half_width / abs(truth.value)
+            errors[name] = truth.error(one.value) / abs(truth.value)
+    return widths, errors, ""
+
+
+def _plan(plant: Plant, wrong: float) -> tuple[StrokePlan, int]:
+    """Plan for a friction that is wrong; return the place of the true one among the forecasts."""
+    body, friction = plant.body, plant.friction
+    valve = Valve(body.area, body.pressure_reference, body.travel, -20e3, 270e3)
+    frictions = known_friction(
+        friction.coulomb * wrong,
+        (body.spring, body.preload),
+        body.mass,
+        static_friction=friction.static * wrong,
+        viscous_friction=friction.viscous * wrong,
+    )
+    settings = IdentificationSettings(assumed_mass=1.6)
+    plan = plan_test(valve, frictions, _LIMITS, _CONDITIONS, settings)
+    return plan, {1.0: 1, 0.5: 2, 2.0: 0}[wrong]
+
+
+def trials(count: int, first_seed: int = _HELD_BACK) -> Iterator[Trial]:
+    """Plan for `count` random valves, and try the plans."""
+    for seed in range(first_seed, first_seed + count):
+        random = np.random.default_rng(seed)
+        law = list(_LAWS)[seed % len(_LAWS)]
+        wrong = _WRONG[(seed // len(_LAWS)) % len(_WRONG)]
+        plant = _plant(law, random)
+        try:
+            plan, place = _plan(plant, wrong)
+        except RefusalError as refusal:
+            yield Trial(law, wrong, refusal=f"no plan: {refusal}")
+            continue
+        test, forecast = plan.test, plan.forecasts[place]
+        record, reach = _record(plant, test.excitation, test.duration, seed)
+        reported, errors, refusal = _told(record)
+        wave = SquareWave(plan.band.low, plan.band.high)
+        square, _, _ = _told(_record(plant, wave, test.duration, seed)[0])
+        predicted = {name: forecast.relative(name) for name in NUMBERS}
+        yield Trial(law, wrong, predicted, reported, square, errors, refusal, reach)
+
+
+def _quantiles(values: Sequence[float]) -> str:
+    if not values:
+        return "–"
+    low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return f"{middle:6.2f}  ({low:.2f} to {high:.2f}; {len(values)})"
+
+
+def _ratios(
+    found: Sequence[Trial], name: str, over: str, under: str, least: float = 0.0
+) -> list[float]:
+    pairs = [(getattr(one, over).get(name), getattr(one, under).get(name)) for one in found]
+    return [
+        above / below
+        for above, below in pairs
+        if above is not None and below is not None and least < below < 1.0
+    ]
+
+
+def report(found: Sequence[Trial]) -> str:
+    """Return the table: medians, with the 10 and 90 % quantiles and the count."""
+    lines = []
+    for law in (*_LAWS, "all"):
+        some = [one for one in found if law in (one.law, "all")]
+        refused = sum(bool(one.refusal) for one in some)
+        lines.append(f"{law}: {len(some)} valves, {refused} refused")
+        for name in NUMBERS:
+            inside = [
+                one.errors[name] <= one.reported[name] for one in some if name in one.reported
+            ]
+            lines.append(
+                f"  {name:<17} reported/predicted {_quantiles(_ratios(some, name, 'reported', 'predicted'))}"
+                f"  error/predicted {_quantiles(_ratios(some, name, 'errors', 'predicted'))}"
+                f"  square/plan {_quantiles(_ratios(some, name, 'square', 'reported'))}"
+                f"  in the interval {sum(inside)} of {len(inside)}"
+            )
+    for wrong in _WRONG:
+        some = [one for one in found if one.wrong == wrong]
+        widths = [one.reported["coulomb_friction"] for one in some if "coulomb_friction" in one.reported]
+        lines.append(f"assumed {wrong:g} times the friction: F_c to ± {_quantiles(widths)} of itself")
+    reach = [one.reach for one in found if one.reach != (0.0, 0.0)]
+    lines.append(
+        f"positions from {100 * min(low for low, _ in reach):.1f} to "
+        f"{100 * max(high for _, high in reach):.1f} % of the travel"
+    )
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--valves", type=int, default=48, metavar="N", help="valves (%(default)s)")
+    parser.add_argument("--seed", type=int, default=_HELD_BACK, metavar="N", help="first seed")
+    options = parser.parse_args(arguments)
+    found = []
+    for one in trials(options.valves, options.seed):
+        found.append(one)
+        widths = {name: f"{100 * one.reported.get(name, np.nan):.2g}" for name in NUMBERS}
+        print(len(found), one.law, one.wrong, widths, one.refusal, file=sys.stderr)
+    print(report(found))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
