@@ -35,6 +35,8 @@ _LIMITS = Limits(0.2, 0.8)
 _WRONG = (1.0, 0.5, 2.0)
 """Friction assumed over the true one."""
 
+_COMPARED = (("reported", "predicted"), ("errors", "predicted"), ("square", "reported"))
+
 _LAWS: Mapping[str, Mapping[str, object]] = {
     "ideal": {},
     "stribeck": {"stribeck_velocity": 1.5e-3},
@@ -76,9 +78,7 @@ def _plant(law: str, random: np.random.Generator) -> Plant:
     spring = 2.05e5 * random.uniform(0.8, 1.25)
     dry = 150.0 * 5.0 ** random.random()
     slip = 1.0 if law == "ideal" and random.random() < 0.5 else random.uniform(1.1, 1.5)
-    friction = Friction(
-        dry, slip * dry, spring * 0.03 * 10.0 ** random.random(), **_LAWS[law]
-    )
+    friction = Friction(dry, slip * dry, spring * 0.03 * 10.0 ** random.random(), **_LAWS[law])
     return Plant(Body(1.6, spring, random.uniform(200.0, 2500.0)), friction)
 
 
@@ -99,7 +99,10 @@ def _record(
     truth = truth_of(plant, motion, instruments, duration)
     case: Case = replace(next(iter(cases(1, classes=("ideal",), grown=False))), plant=plant)
     reach = motion.position / body.travel
-    return Record(case, nominal, pressure, position, truth), (float(reach.min()), float(reach.max()))
+    return Record(case, nominal, pressure, position, truth), (
+        float(reach.min()),
+        float(reach.max()),
+    )
 
 
 def _told(record: Record) -> tuple[dict[str, float], dict[str, float], str]:
@@ -160,14 +163,13 @@ def _quantiles(values: Sequence[float]) -> str:
     return f"{middle:6.2f}  ({low:.2f} to {high:.2f}; {len(values)})"
 
 
-def _ratios(
-    found: Sequence[Trial], name: str, over: str, under: str, least: float = 0.0
-) -> list[float]:
+def _ratios(found: Sequence[Trial], name: str, over: str, under: str) -> list[float]:
+    """Return the ratios of shares that are known, of numbers that are not unknown anyway."""
     pairs = [(getattr(one, over).get(name), getattr(one, under).get(name)) for one in found]
     return [
         above / below
         for above, below in pairs
-        if above is not None and below is not None and least < below < 1.0
+        if above is not None and below is not None and 0.0 < below < 1.0
     ]
 
 
@@ -182,16 +184,19 @@ def report(found: Sequence[Trial]) -> str:
             inside = [
                 one.errors[name] <= one.reported[name] for one in some if name in one.reported
             ]
-            lines.append(
-                f"  {name:<17} reported/predicted {_quantiles(_ratios(some, name, 'reported', 'predicted'))}"
-                f"  error/predicted {_quantiles(_ratios(some, name, 'errors', 'predicted'))}"
-                f"  square/plan {_quantiles(_ratios(some, name, 'square', 'reported'))}"
-                f"  in the interval {sum(inside)} of {len(inside)}"
+            ratios = "  ".join(
+                f"{over}/{under} {_quantiles(_ratios(some, name, over, under))}"
+                for over, under in _COMPARED
             )
+            lines.append(f"  {name:<17} {ratios}  in the interval {sum(inside)} of {len(inside)}")
     for wrong in _WRONG:
         some = [one for one in found if one.wrong == wrong]
-        widths = [one.reported["coulomb_friction"] for one in some if "coulomb_friction" in one.reported]
-        lines.append(f"assumed {wrong:g} times the friction: F_c to ± {_quantiles(widths)} of itself")
+        widths = [
+            one.reported["coulomb_friction"] for one in some if "coulomb_friction" in one.reported
+        ]
+        lines.append(
+            f"assumed {wrong:g} times the friction: F_c to ± {_quantiles(widths)} of itself"
+        )
     reach = [one.reach for one in found if one.reach != (0.0, 0.0)]
     lines.append(
         f"positions from {100 * min(low for low, _ in reach):.1f} to "
@@ -210,8 +215,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for one in trials(options.valves, options.seed):
         found.append(one)
         widths = {name: f"{100 * one.reported.get(name, np.nan):.2g}" for name in NUMBERS}
-        print(len(found), one.law, one.wrong, widths, one.refusal, file=sys.stderr)
-    print(report(found))
+        sys.stderr.write(f"{len(found)} {one.law} {one.wrong:g} {widths} {one.refusal}\n")
+    sys.stdout.write(f"{report(found)}\n")
     return 0
 
 

@@ -18,18 +18,20 @@ _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
 _VALVES = {*_CORE, "streams", "health"}
 _PAGES = {*_VALVES, "history", "records"}
+_PICTURES = {*_PAGES, "planning"}
 MAY_IMPORT = {
     "model": set(),
     "signals": {"model"},
     "identification": {"model", "signals"},
     "streams": _CORE,
+    "planning": _CORE,
     "records": {*_CORE, "streams"},
     "health": {*_CORE, "streams"},
     "history": _VALVES,
-    "figures": _PAGES,
-    "reports": {*_PAGES, "figures"},
-    "fleet": {*_PAGES, "figures", "reports"},
-    "reproduction": {*_PAGES, "figures", "reports"},
+    "figures": _PICTURES,
+    "reports": {*_PICTURES, "figures"},
+    "fleet": {*_PICTURES, "figures", "reports"},
+    "reproduction": {*_PICTURES, "figures", "reports"},
     "nodes": {*_FILES, *_PAGES, "reports"},
 }
 # What each inner room may import of its siblings. The files beside inner rooms hold their shared
@@ -56,7 +58,17 @@ ROS_ROOMS = ("nodes", "commands/demo")
 
 # The one arrow up: a result draws itself, and loads the figures when it is asked to.
 UPWARD = {"identification/result.py": {"figures"}}
-CORE = ["model", "signals", "identification", "streams", "records", "health", "history", "fleet"]
+CORE = [
+    "model",
+    "signals",
+    "identification",
+    "planning",
+    "streams",
+    "records",
+    "health",
+    "history",
+    "fleet",
+]
 
 
 def rooms():

@@ -3,17 +3,16 @@
 import argparse
 import json
 import time
-from collections.abc import Sequence
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
+from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
-    KeptValve,
     ValveHistory,
     valve_histories,
 )
@@ -88,21 +87,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
-def _is_called(valve: KeptValve, name: str) -> bool:
-    namespace = valve.name.rpartition("/")[0]
-    return name == valve.tag or f"/{name.strip('/')}" in (valve.name, namespace)
-
-
-def _chosen(valves: Sequence[KeptValve], names: Sequence[str] | None) -> tuple[KeptValve, ...]:
-    if names is None:
-        return tuple(valves)
-    for name in names:
-        if not any(_is_called(valve, name) for valve in valves):
-            known = ", ".join(valve.name for valve in valves) or "none"
-            raise ValueError(f"--valve {name}: there is no such valve; there are {known}")
-    return tuple(valve for valve in valves if any(_is_called(valve, name) for name in names))
-
-
 def _require_files(options: argparse.Namespace) -> None:
     """Refuse files that cannot be written, before long work is done for them."""
     if options.csv is not None and not options.csv.parent.is_dir():
@@ -118,7 +102,7 @@ def _histories(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
     file = HistoryFile(options.file)
     histories = valve_histories(
         file,
-        _chosen(file.valves(), options.valve),
+        chosen_valves(file.valves(), options.valve, "--valve"),
         *(nanoseconds((time - _FIRST).total_seconds()) for time in (options.since, options.until)),
     )
     if not histories:

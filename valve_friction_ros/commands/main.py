@@ -27,6 +27,7 @@ SUB_COMMANDS = {
     "identify": "identify the friction of a valve from a CSV file or a bag",
     "identify-folder": "identify all recordings of a folder, on all cores",
     "describe-valve": "ask for an actuator's data and write its valve file",
+    "plan-test": "plan the stroke test that tells the friction best, as a file to play",
     "validate": "simulate a recording with an identified model",
     "call": "have a running identifier identify, set its baseline, save, report or clear",
     "history": "list, export and draw what the nodes have identified",

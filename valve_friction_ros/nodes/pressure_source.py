@@ -2,8 +2,9 @@
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import FluidPressure
@@ -63,6 +64,11 @@ PARAMETERS = (
         "CSV file with the columns time_s and pressure_pa, for the excitation file [-]",
         read_only=True,
     ),
+    ParameterSpec("file_minimum", -1e9, "Lowest pressure in the file [Pa]", (-1e9, 1e9), True),
+    ParameterSpec("file_maximum", 1e9, "Highest pressure in the file [Pa]", (-1e9, 1e9), True),
+    ParameterSpec(
+        "file_rate", 1e12, "Largest rate of the pressure in the file [Pa/s]", (0.0, 1e12), True
+    ),
     ParameterSpec("sample_rate", 1000.0, "Samples per second of signal [Hz]", (0.1, 1e5), True),
     ParameterSpec(
         "speed", 1.0, "Seconds of signal published in a second of real time [-]", (1e-3, 1e3), True
@@ -81,17 +87,37 @@ PARAMETERS = (
 )
 
 
-def _from_file(path: str) -> SampledPressure:
+def _from_file(values: Mapping[str, Any]) -> SampledPressure:
+    """Read a pressure, linear between its rows; raises ValueError where it breaks a limit."""
+    path = values["file"]
     if not path:
         raise ValueError("excitation is 'file' but the parameter file is empty")
     columns = read_columns(Path(path), ("time_s", "pressure_pa"))
-    return SampledPressure(columns["time_s"], columns["pressure_pa"])
+    signal = SampledPressure(columns["time_s"], columns["pressure_pa"])
+    lowest, highest = float(signal.pressures.min()), float(signal.pressures.max())
+    for name, breaks, found, unit in (
+        ("file_minimum", lowest < values["file_minimum"], lowest, "Pa"),
+        ("file_maximum", highest > values["file_maximum"], highest, "Pa"),
+        ("file_rate", (rate := _largest_rate(signal)) > values["file_rate"], rate, "Pa/s"),
+    ):
+        if breaks:
+            raise ValueError(
+                f"{path}: {found:.6g} {unit} breaks {name} ({values[name]:.6g} {unit}): nothing is "
+                "played; plan it again, or change the limit"
+            )
+    return signal
 
 
-def _excitation(kind: str, low: float, high: float, period: float, path: str) -> Excitation:
+def _largest_rate(signal: SampledPressure) -> float:
+    rates = np.abs(np.diff(signal.pressures) / np.diff(signal.times))
+    return float(np.max(rates, initial=0.0))
+
+
+def _excitation(values: Mapping[str, Any]) -> Excitation:
     """Build the signal; raises ValueError for an unknown kind or impossible numbers."""
+    kind, low, high, period = (values[name] for name in ("excitation", "low", "high", "period"))
     if kind == "file":
-        return _from_file(path)
+        return _from_file(values)
     if kind == "isa_steps":
         return IsaSteps((low + high) / 2, high - low, hold=period)
     waves: dict[str, Callable[[float, float, float], Excitation]] = {
@@ -112,9 +138,7 @@ class PressureSource(PolledNode):
         super().__init__("pressure_source")
         declare_parameters(self, PARAMETERS)
         values = values_of(self, PARAMETERS)
-        self._excitation = _excitation(
-            values["excitation"], values["low"], values["high"], values["period"], values["file"]
-        )
+        self._excitation = _excitation(values)
         self._period = 1.0 / values["sample_rate"]
         self._speed = values["speed"]
         self._lag = values["converter_lag"]

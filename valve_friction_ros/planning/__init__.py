@@ -6,6 +6,7 @@ from valve_friction_ros.planning.friction_range import (
     known_friction,
     unknown_friction,
 )
+from valve_friction_ros.planning.remarks import plan_remarks
 from valve_friction_ros.planning.search import AIMS, StrokePlan, plan_test
 from valve_friction_ros.planning.stroke_test import Pattern, StrokeTest
 
@@ -18,6 +19,7 @@ __all__ = [
     "StrokePlan",
     "StrokeTest",
     "known_friction",
+    "plan_remarks",
     "plan_test",
     "unknown_friction",
 ]

@@ -53,9 +53,12 @@ class Limits:
 
     def __post_init__(self) -> None:
         """Refuse impossible limits."""
-        if not 0 <= require_finite("lowest", self.lowest) < require_finite(
-            "highest", self.highest
-        ) <= 1:
+        if (
+            not 0
+            <= require_finite("lowest", self.lowest)
+            < require_finite("highest", self.highest)
+            <= 1
+        ):
             raise ValueError(
                 f"the part of the travel must rise within 0 to 100 %, got {100 * self.lowest:g} % "
                 f"to {100 * self.highest:g} %"

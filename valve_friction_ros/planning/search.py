@@ -176,6 +176,10 @@ class _Search:
         return best
 
 
+def _told_nobody(share: float) -> None:
+    """Take a share of the work that nobody asked for."""
+
+
 def plan_test(
     valve: Valve,
     frictions: FrictionRange,
@@ -183,7 +187,7 @@ def plan_test(
     conditions: Conditions | None = None,
     settings: IdentificationSettings | None = None,
     aim: str = "friction",
-    progress: Callable[[float], object] = lambda share: None,
+    progress: Callable[[float], object] | None = None,
 ) -> StrokePlan:
     """Find the stroke test with the smallest predicted intervals.
 
@@ -206,7 +210,7 @@ def plan_test(
         Those of the identification to come.
     aim : str
         What the test is for, of `AIMS`.
-    progress : callable
+    progress : callable, optional
         Takes the share of the work that is done.
 
     Returns
@@ -238,13 +242,14 @@ def plan_test(
     limits, conditions = limits or Limits(), conditions or Conditions()
     settings = settings or IdentificationSettings()
     found = _Search(valve, frictions, limits, conditions, settings, AIMS[aim])
-    best = found.best(progress)
+    told = progress or _told_nobody
+    best = found.best(told)
     test = found.test(best)
     assert test is not None  # noqa: S101 - it was simulated
     forecasts = []
     for place in range(len(frictions.draws)):
         forecasts.append(found.forecast(test, place, is_final=True))
-        progress(0.9 + 0.1 * (place + 1) / len(frictions.draws))
+        told(0.9 + 0.1 * (place + 1) / len(frictions.draws))
     plan = StrokePlan(
         test,
         valve,

@@ -1,0 +1,246 @@
+"""Arguments of `plan-test`: what is known of a valve, and what may be done to it."""
+
+import argparse
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from valve_friction_ros.commands.arguments.estimate_file import read_estimate
+from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
+from valve_friction_ros.history import HistoryFile
+from valve_friction_ros.identification import (
+    CALIBRATION,
+    TIMING_UNCERTAINTY,
+    IdentificationSettings,
+)
+from valve_friction_ros.planning import (
+    AIMS,
+    Conditions,
+    FrictionRange,
+    Limits,
+    known_friction,
+    unknown_friction,
+)
+from valve_friction_ros.records.valve_file import ValveFile
+
+__all__ = [
+    "add_planning_arguments",
+    "frictions_from",
+    "planned_conditions",
+    "planned_limits",
+    "planned_settings",
+]
+
+_KNOWN = {
+    "coulomb_friction": "N",
+    "static_friction": "N",
+    "viscous_friction": "N·s/m",
+    "spring_constant": "N/m",
+    "spring_preload": "N",
+    "mass": "kg",
+}
+
+
+def _percent(text: str) -> float:
+    """Read a percentage from 0 to 100; return the share."""
+    try:
+        share = float(text.rstrip(" %")) / 100
+    except ValueError:
+        share = math.nan
+    if not 0 <= share <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no percentage of the travel, such as 40")
+    return share
+
+
+def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what is known, the limits, the sensors and the aim."""
+    known = parser.add_argument_group(
+        "known",
+        "of friction and spring: an option goes before an earlier result, and that before the "
+        "valve file; without any friction a range from light to heavy packings is planned for",
+    )
+    source = known.add_mutually_exclusive_group()
+    source.add_argument(
+        "--estimate",
+        type=Path,
+        metavar="ESTIMATE.json",
+        help="an earlier result, as `valve_friction identify --json` prints it",
+    )
+    source.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE.sqlite",
+        help="the last identification in the identifiers' history_file; of several valves that of "
+        "--valve-name",
+    )
+    for name, unit in _KNOWN.items():
+        known.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=float,
+            metavar=unit.upper().replace("·", "*"),
+            help=f"{name}, {unit}",
+        )
+    known.add_argument(
+        "--friction-factor",
+        type=float,
+        default=2.0,
+        metavar="FACTOR",
+        help="friction may be so many times smaller or larger than what is known (%(default)g)",
+    )
+    limits, default = parser.add_argument_group("limits", "of what the test may do"), Limits()
+    limits.add_argument(
+        "--from",
+        dest="lowest",
+        type=_percent,
+        default=default.lowest,
+        metavar="PERCENT",
+        help=f"lowest position, of the travel ({100 * default.lowest:g})",
+    )
+    limits.add_argument(
+        "--to",
+        dest="highest",
+        type=_percent,
+        default=default.highest,
+        metavar="PERCENT",
+        help=f"highest position ({100 * default.highest:g})",
+    )
+    limits.add_argument(
+        "--allow-stops",
+        action="store_true",
+        help="the stem may reach seat and stop; else a stem without friction stays "
+        f"{100 * default.stop_margin:g} %% of the travel away from them",
+    )
+    for name, unit, text in (
+        ("speed", "M/S", "largest speed of the sliding stem, m/s"),
+        ("duration", "S", "longest duration, s"),
+        ("pressure_rate", "PA/S", "largest rate of the pressure, Pa/s"),
+        ("pressure_minimum", "PA", "lowest pressure, Pa; the valve file's holds too"),
+        ("pressure_maximum", "PA", "highest pressure, Pa; the valve file's holds too"),
+    ):
+        value = getattr(default, name)
+        shown = f" ({value:g})" if math.isfinite(value) else ""
+        limits.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=float,
+            default=value,
+            metavar=unit,
+            help=f"{text}{shown}",
+        )
+    sensors, usual = parser.add_argument_group("sensors"), Conditions()
+    for name, unit, value, text in (
+        ("sample-rate", "HZ", usual.sample_rate, "samples per second of both signals"),
+        ("position-noise-um", "UM", 1e6 * usual.position_noise, "noise of the stem sensor, µm"),
+        ("pressure-noise-pa", "PA", usual.pressure_noise, "noise of the pressure sensor, Pa"),
+        ("converter-lag", "S", usual.converter_lag, "time constant of what sets the pressure, s"),
+    ):
+        sensors.add_argument(
+            f"--{name}", type=float, default=value, metavar=unit, help=f"{text} (%(default)g)"
+        )
+    sensors.add_argument(
+        "--timing-uncertainty",
+        type=float,
+        metavar="S",
+        help="standard deviation of the whole lag between the signals, as of `identify` (valve "
+        f"file, or {TIMING_UNCERTAINTY:g})",
+    )
+    parser.add_argument(
+        "--for",
+        dest="aim",
+        choices=[*AIMS],
+        default="friction",
+        help="what shall be known best; friction: F_c, F_v and F_s alike (%(default)s)",
+    )
+
+
+def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
+    """Return the values of the earlier result, if one is named."""
+    if options.estimate is not None:
+        return read_estimate(options.estimate)
+    if options.history is None:
+        return {}
+    file = HistoryFile(options.history)
+    names = None if options.valve_name is None else [options.valve_name]
+    valves = chosen_valves(file.valves(), names, "--valve-name")
+    if len(valves) != 1:
+        told = ", ".join(valve.name for valve in valves) or "none"
+        raise ValueError(f"{options.history}: holds {told}: choose one valve by --valve-name")
+    entry = file.last_success(valves[0].name)
+    if entry is None:
+        raise ValueError(f"{options.history}: no identification of {valves[0].name} succeeded")
+    return entry.values
+
+
+def frictions_from(options: argparse.Namespace, described: ValveFile) -> FrictionRange:
+    """Return the valves to plan for.
+
+    Raises ValueError if the spring is unknown, or a number is impossible.
+    """
+    found = dict(described.known)
+    found |= {name: one for name, one in _earlier(options).items() if math.isfinite(one)}
+    given = {name: getattr(options, name) for name in _KNOWN}
+    found |= {name: one for name, one in given.items() if one is not None}
+    for name in ("spring_constant", "spring_preload"):
+        if name not in found:
+            option = name.replace("_", "-")
+            raise ValueError(
+                f"the {name} is unknown, and pressures cannot be planned without it: give "
+                f"--estimate, --history or --{option}, or name it in the valve file, as "
+                "`describe-valve --spring-range` does"
+            )
+    if not found["spring_constant"] > 0:
+        raise ValueError("a machine without a spring has no stroke test: pressure holds no place")
+    spring = found["spring_constant"], found["spring_preload"]
+    mass = found.get("mass", IdentificationSettings().assumed_mass)
+    if "coulomb_friction" not in found:
+        return unknown_friction(described.valve, spring, mass)
+    coulomb, static = found["coulomb_friction"], found.get("static_friction")
+    if static is not None and given["static_friction"] is None:
+        static = max(static, coulomb)
+    viscous = found.get("viscous_friction")
+    if viscous is not None and viscous < 0 and given["viscous_friction"] is None:
+        viscous = None
+    return known_friction(
+        coulomb,
+        spring,
+        mass,
+        static_friction=static,
+        viscous_friction=viscous,
+        factor=options.friction_factor,
+    )
+
+
+def planned_limits(options: argparse.Namespace) -> Limits:
+    """Return the limits that the options state."""
+    return Limits(
+        lowest=options.lowest,
+        highest=options.highest,
+        speed=options.speed,
+        duration=options.duration,
+        pressure_rate=options.pressure_rate,
+        pressure_minimum=options.pressure_minimum,
+        pressure_maximum=options.pressure_maximum,
+        allow_stops=options.allow_stops,
+    )
+
+
+def planned_conditions(options: argparse.Namespace) -> Conditions:
+    """Return the sensors that the options state."""
+    return Conditions(
+        options.sample_rate,
+        1e-6 * options.position_noise_um,
+        options.pressure_noise_pa,
+        options.converter_lag,
+    )
+
+
+def planned_settings(options: argparse.Namespace, described: ValveFile) -> IdentificationSettings:
+    """Return how the test will be identified, with timing and calibration of the valve file."""
+    timing = options.timing_uncertainty
+    if timing is None:
+        timing = described.settings.get("timing_uncertainty")
+    mass = described.known.get("mass") if options.mass is None else options.mass
+    return IdentificationSettings(
+        timing_uncertainty=timing,
+        assumed_mass=IdentificationSettings().assumed_mass if mass is None else mass,
+        **{name: described.settings.get(name, 0.0) for name in CALIBRATION},
+    )

@@ -1,0 +1,150 @@
+"""How a stroke plan is shown: as the file to play, as text, and as an object of JSON."""
+
+import io
+import math
+import shlex
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from valve_friction_ros.commands.output.formatting import plain_console
+from valve_friction_ros.identification import SLIDING, UNITS, percentage, plain
+from valve_friction_ros.planning import StrokePlan, plan_remarks
+from valve_friction_ros.planning.forecast import Forecast
+from valve_friction_ros.records.whole_file import write_whole
+
+__all__ = ["as_json", "print_plan", "write_test"]
+
+_NAMES = (
+    "coulomb_friction",
+    "viscous_friction",
+    "static_friction",
+    SLIDING,
+    "spring_constant",
+    "spring_preload",
+)
+_ROUND = 10.0
+"""Pa to which limits for the player are rounded outwards."""
+
+
+def write_test(path: Path, plan: StrokePlan) -> None:
+    """Write the corners of the pressure, time_s and pressure_pa, linear between them.
+
+    Raises OSError, which names `path`; no part of the file stays.
+    """
+    text = io.StringIO()
+    text.write("time_s,pressure_pa\n")
+    for time, pressure in zip(plan.test.times, plan.test.pressures, strict=True):
+        text.write(f"{time:.6f},{pressure:.2f}\n")
+    write_whole(path, text.getvalue().encode())
+
+
+def player(plan: StrokePlan, path: Path) -> dict[str, Any]:
+    """Return the parameters of `pressure_source` that play the file and hold its limits."""
+    return {
+        "excitation": "file",
+        "file": str(path.resolve()),
+        "file_minimum": math.floor(plan.band.low / _ROUND) * _ROUND,
+        "file_maximum": math.ceil(plan.band.high / _ROUND) * _ROUND,
+        "file_rate": math.ceil(1.001 * plan.test.largest_rate / _ROUND) * _ROUND,
+        "converter_lag": plan.conditions.converter_lag,
+    }
+
+
+def _forecast_json(name: str, one: Forecast, travel: float) -> dict[str, Any]:
+    return {
+        "friction": name,
+        "parameters": {
+            each: {
+                "value": value,
+                "half_width": one.half_widths[each],
+                "unit": UNITS.get(each, "N"),
+            }
+            for each, value in one.values.items()
+            if each in _NAMES
+        },
+        "position_range": [*one.reach],
+        "travel_range": [reach / travel for reach in one.reach],
+        "top_speed": one.top_speed,
+        "breakaways": one.breakaways,
+        "refusal": one.refusal or None,
+    }
+
+
+def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
+    """Build the object that JSON shows; SI units."""
+    pattern = plan.test.pattern
+    return {
+        "file": str(path),
+        "aim": plan.aim,
+        "duration": plan.test.duration,
+        "cycles": plan.test.cycles,
+        "pattern": {
+            "shapes": [*pattern.shapes],
+            "speeds": [*pattern.speeds],
+            "hold": pattern.hold,
+        },
+        "start_pressure": float(plan.test.pressures[0]),
+        "pressure_range": [plan.band.low, plan.band.high],
+        "pressure_rate": plan.test.largest_rate,
+        "likely": plan.frictions.names[plan.frictions.middle],
+        "forecasts": [
+            _forecast_json(name, one, plan.valve.travel)
+            for name, one in zip(plan.frictions.names, plan.forecasts, strict=True)
+        ],
+        "tried": plan.tried,
+        "warnings": [*plan_remarks(plan)],
+        "play": {
+            name: plain(v) if isinstance(v, float) else v for name, v in player(plan, path).items()
+        },
+    }
+
+
+def _cell(one: Forecast, name: str) -> str:
+    share = one.relative(name)
+    if not math.isfinite(share):
+        return "–"
+    return f"{one.values[name]:.4g} ± {percentage(share)}" if share < 1 else "unknown"
+
+
+def print_plan(plan: StrokePlan, path: Path) -> None:
+    """Print what to expect, what to watch and how to play it."""
+    test, travel = plan.test, plan.valve.travel
+    console = plain_console()
+    speeds = " and ".join(f"{100 * one:.0f} %" for one in test.pattern.speeds)
+    shapes = ", ".join(test.pattern.shapes)
+    console.print(
+        f"{test.duration:.4g} s, {test.cycles} times up and down ({shapes}) between "
+        f"{plan.band.low / 1e3:.4g} and {plan.band.high / 1e3:.4g} kPa, at {speeds} of "
+        f"{plan.band.rate / 1e3:.3g} kPa/s; the best of {plan.tried} tests for {plan.aim}"
+    )
+    table = Table("predicted", *(f"friction {name}" for name in plan.frictions.names), box=None)
+    for name in _NAMES:
+        table.add_row(
+            f"{name} [{UNITS.get(name, 'N')}]", *(_cell(one, name) for one in plan.forecasts)
+        )
+    table.add_row(
+        "position [% of travel]",
+        *(
+            f"{100 * one.reach[0] / travel:.0f} to {100 * one.reach[1] / travel:.0f}"
+            for one in plan.forecasts
+        ),
+    )
+    table.add_row("top speed [mm/s]", *(f"{one.top_speed * 1e3:.2g}" for one in plan.forecasts))
+    console.print(table)
+    for remark in plan_remarks(plan):
+        console.print(f"note: {remark}")
+    low, high = plan.limits.lowest, plan.limits.highest
+    console.print(
+        "Nothing has been moved. Before: agree with operations, put the loop in manual, keep "
+        f"people off the stem, and bring the pressure slowly to {test.pressures[0] / 1e3:.4g} kPa. "
+        f"Meanwhile: watch that the stem stays between {100 * low:g} and {100 * high:g} % of the "
+        "travel; if it does not, or the process moves too far, stop the player, which leaves the "
+        "pressure where it is, and restore it by hand. After: identify the record before the loop "
+        "goes back to automatic."
+    )
+    values = " ".join(
+        f"-p {name}:={shlex.quote(str(value))}" for name, value in player(plan, path).items()
+    )
+    print(f"ros2 run valve_friction_ros pressure_source --ros-args {values}")

@@ -1,0 +1,113 @@
+"""Sub-command `plan-test`: the stroke test that tells the friction of a valve best, as a file."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from valve_friction_ros.commands.arguments.planning import (
+    add_planning_arguments,
+    frictions_from,
+    planned_conditions,
+    planned_limits,
+    planned_settings,
+)
+from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.output.formatting import OutputConsole
+from valve_friction_ros.commands.output.plan_output import as_json, print_plan, write_test
+from valve_friction_ros.history import HistoryError
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.planning import StrokePlan, plan_test
+from valve_friction_ros.records.valve_file import read_valve_file
+
+__all__ = ["REFUSALS", "declare", "run"]
+
+REFUSALS = (RefusalError, HistoryError)
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments, and what the help says around them."""
+    parser.description = (
+        "Plan the stroke test with the smallest predicted intervals, by the Fisher information of "
+        "simulated tests, and write it as a file that `pressure_source` plays. No valve is moved."
+    )
+    parser.epilog = (
+        "All values are in SI units unless an option says otherwise. Exit code 2: a file or an "
+        "option was refused, no test within the limits tells the friction, or a file could not be "
+        "written."
+    )
+    parser.add_argument(
+        "--valve", type=Path, required=True, metavar="VALVE.yaml", help="the valve file"
+    )
+    parser.add_argument(
+        "--valve-name", metavar="NAME", help="one of several valves, of the valve file or --history"
+    )
+    add_planning_arguments(parser)
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("stroke_test.csv"),
+        metavar="FILE.csv",
+        help="corners of the pressure: time_s and pressure_pa (%(default)s)",
+    )
+    parser.add_argument("--replace", action="store_true", help="replace a file that is there")
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE.png", help="draw pressure and expected stem"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _require_files(options: argparse.Namespace) -> None:
+    """Refuse files that cannot be written, before the work begins."""
+    output: Path = options.output
+    if output.exists() and not options.replace:
+        raise ValueError(f"{output}: it is there: give another name, or --replace")
+    if not output.parent.is_dir():
+        raise ValueError(f"{output}: there is no folder {output.parent}")
+    if options.figure is not None:
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
+        figures.require_picture_file(options.figure)
+
+
+def _planned(options: argparse.Namespace) -> StrokePlan:
+    """Read the files, and search with a bar on a terminal."""
+    described = read_valve_file(options.valve, options.valve_name)
+    frictions = frictions_from(options, described)
+    with Progress(
+        TextColumn("comparing stroke tests"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        console=OutputConsole(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    ) as bar:
+        task = bar.add_task("", total=1.0)
+        return plan_test(
+            described.valve,
+            frictions,
+            planned_limits(options),
+            planned_conditions(options),
+            planned_settings(options, described),
+            options.aim,
+            lambda share: bar.update(task, completed=share),
+        )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Plan, write the files, and print what to expect."""
+    _require_files(options)
+    plan = _planned(options)
+    write_test(options.output, plan)
+    if options.figure is not None:
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
+        figures.save_picture(figures.plan_figure(plan), options.figure)
+    if options.json:
+        print(json.dumps(as_json(plan, options.output), ensure_ascii=False, allow_nan=False))
+    else:
+        print_plan(plan, options.output)
+    return ExitCode.DONE
