@@ -3,7 +3,7 @@
 import failing_identifier
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, Domain, NodeProcess, buffered, stamps_of, values_of
+from live_nodes import NAMESPACE, PROJECT, Domain, NodeProcess, buffered, stamps_of, values_of
 from records import quick_record, simulated
 from slow_identifier import FINISH, SCRIPT
 from std_srvs.srv import Trigger
@@ -15,6 +15,7 @@ from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
 IDENTIFY = f"{NAMESPACE}/identifier/identify"
 OK, WARN = b"\x00", b"\x01"
 NODES = ("identifier", "simulator", "pressure_source")
+PLAYED = str(PROJECT / "test/nodes/played_pressure.csv")
 BAD_STARTS = {  # node, parameters, words of the only line
     "even window": ("identifier", {"derivative_window": 30}, "window must be odd"),
     "limits": ("identifier", {"warn_ratio": 3.0}, "warn_ratio < error_ratio"),
@@ -33,6 +34,16 @@ BAD_STARTS = {  # node, parameters, words of the only line
     "one namespace": ("identifiers", {"valves": "[fv_1, fv_2]"}, "/fv_1 is remapped to /fv_101"),
     "no namespace": ("identifiers", {"valves": "[fv-1]"}, "fv-1"),
     "no file": ("pressure_source", {"excitation": "file", "file": "no.csv"}, "no.csv"),
+    "file pressure": (
+        "pressure_source",
+        {"excitation": "file", "file": PLAYED, "file_maximum": 1e5},
+        "150000 Pa breaks file_maximum (100000 Pa)",
+    ),
+    "file rate": (
+        "pressure_source",
+        {"excitation": "file", "file": PLAYED, "file_rate": 2e4},
+        "25000 Pa/s breaks file_rate (20000 Pa/s)",
+    ),
     "no file name": ("pressure_source", {"excitation": "file"}, "file"),
 }
 

@@ -42,6 +42,6 @@ def plan_figure(plan: StrokePlan) -> Figure:
         stem.axhline(100 * share, color="0.5", lw=0.8, ls="--")
     stem.set_ylabel("expected stem [% of travel]")
     stem.set_xlabel("time [s]")
-    stem.legend(frameon=False, ncols=3, loc="upper right")
+    stem.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     dress((pressure, stem))
     return figure

@@ -55,7 +55,7 @@ class Forecast:
     parameters : KarnoppParameters
         The valve.
     values, half_widths : mapping of str to float
-        True values, and half the widths of their 95 % intervals; SI units. Empty if refused.
+        True values, and half the widths of their 95 % intervals; SI units. No widths if refused.
     reach : tuple of float
         Lowest and highest position, m.
     top_speed : float
@@ -132,9 +132,7 @@ def forecast(
         )
     except RefusalError as error:
         refusal = str(error)
-    values = {name: value for name, value in vars(parameters).items() if name in widths}
-    if widths:
-        values[SLIDING] = mean_sliding_friction(parameters, stem.velocity)
+    values = {**vars(parameters), SLIDING: mean_sliding_friction(parameters, stem.velocity)}
     return Forecast(
         parameters,
         values,

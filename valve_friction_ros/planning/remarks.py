@@ -65,7 +65,8 @@ def _speeds(plan: StrokePlan) -> Iterator[str]:
     if plan.likely.top_speed < FALL_SPEED:
         yield (
             f"the stem moves at {plan.likely.top_speed * 1e3:.2g} mm/s at most: what friction is "
-            f"above that, up to {FALL_SPEED * 1e3:.2g} mm/s, remains unknown; allow more speed or travel"
+            f"above that, up to {FALL_SPEED * 1e3:.2g} mm/s, remains unknown; allow more speed or "
+            "travel"
         )
 
 

@@ -40,6 +40,9 @@ _ROUNDS = 3
 
 _LONGEST_HOLD = 5.0
 
+_REFUSED = 3.0
+"""Loss of a refused record: as of one whose intervals are e³ times wider than those of another."""
+
 
 @dataclass(frozen=True)
 class StrokePlan:
@@ -127,14 +130,16 @@ class _Search:
     def loss(self, pattern: Pattern, place: int) -> float:
         """Mean logarithm of w/(1 + w), with w the half widths over their values.
 
-        It is that of w where w is small, and no number counts that nobody will know anyway.
+        It is that of w where w is small, and no number counts that nobody will know anyway. A test
+        that tells nothing of a valve is worse than one that tells little.
         """
         if (pattern, place) not in self.known:
-            test, found = self.test(pattern), 0.0
+            test, found = self.test(pattern), _REFUSED
             if test is not None:
                 expected = self.forecast(test, place)
                 shares = [expected.relative(name) for name in self.names]
                 found = sum(-math.log1p(1 / one) for one in shares if one > 0) / len(shares)
+                found += _REFUSED * bool(expected.refusal)
             self.known[pattern, place] = found
         return self.known[pattern, place]
 

@@ -30,6 +30,9 @@ _MIDDLE = 0.5
 _BEFORE = 1.0
 """Level, share of the band, and time, s, for which a test holds it before the first stroke."""
 
+_SHORTEST_HOLD = 1e-3
+"""Holds up to this, s, are left out: their corners would not differ in the file."""
+
 
 @dataclass(frozen=True)
 class Pattern:
@@ -123,7 +126,7 @@ def stroke_test(pattern: Pattern, band: PressureBand, duration: float) -> Stroke
     It begins and ends at rest in the middle of the band. Each of its kinds of cycles is there.
     """
     span_time = (band.high - band.low) / band.rate
-    ends = _BEFORE + 2 * (_MIDDLE * span_time + pattern.hold) + pattern.hold
+    ends = _BEFORE + 2 * (_MIDDLE * span_time + pattern.hold)
     left = duration - ends
     steps = [(0.0, 1.0)]
     count = 0
@@ -141,7 +144,7 @@ def stroke_test(pattern: Pattern, band: PressureBand, duration: float) -> Stroke
     for level, speed in steps:
         times.append(times[-1] + abs(level - shares[-1]) * span_time / speed)
         shares.append(level)
-        if pattern.hold > 0:
+        if pattern.hold > _SHORTEST_HOLD:
             times.append(times[-1] + pattern.hold)
             shares.append(level)
     pressures = band.low + (band.high - band.low) * np.array(shares)

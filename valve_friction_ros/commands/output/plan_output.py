@@ -58,7 +58,7 @@ def _forecast_json(name: str, one: Forecast, travel: float) -> dict[str, Any]:
         "parameters": {
             each: {
                 "value": value,
-                "half_width": one.half_widths[each],
+                "half_width": one.half_widths.get(each),
                 "unit": UNITS.get(each, "N"),
             }
             for each, value in one.values.items()
@@ -103,7 +103,7 @@ def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
 
 def _cell(one: Forecast, name: str) -> str:
     share = one.relative(name)
-    if not math.isfinite(share):
+    if one.refusal:
         return "–"
     return f"{one.values[name]:.4g} ± {percentage(share)}" if share < 1 else "unknown"
 

@@ -1,0 +1,146 @@
+"""The sub-command `plan-test`: what it knows, what it writes, what it refuses."""
+
+import csv
+import json
+
+import matplotlib.image
+import numpy as np
+import pytest
+from histories import VALVE, success
+
+from valve_friction_ros.history import HistoryFile
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
+
+SPRING = ("--spring-constant", "205000", "--spring-preload", "231.65")
+KNOWN = (*SPRING, "--coulomb-friction", "152.7", "--viscous-friction", "4865")
+QUICK = ("--duration", "15", "--from", "40 %", "--to", "60", "--sample-rate", "50")
+
+
+@pytest.fixture
+def plan(command, bench_yaml, tmp_path):
+    """Function of options: exit code, stdout, stderr; the file is `test.csv`."""
+
+    def plan(*options):
+        output = ("--output", tmp_path / "test.csv")
+        return command("plan-test", "--valve", bench_yaml, *output, *options)
+
+    return plan
+
+
+@pytest.fixture
+def refusal(plan, tmp_path):
+    """Function of options: the one line on stderr; nothing is written."""
+
+    def refusal(*options):
+        code, out, err = plan(*options)
+        assert (code, out) == (2, "")
+        assert not (tmp_path / "test.csv").exists()
+        (line,) = err.splitlines()
+        return line.removeprefix("valve_friction plan-test: ")
+
+    return refusal
+
+
+def test_the_file_moves_the_stem_as_it_was_told(plan, tmp_path):
+    picture = tmp_path / "plan.png"
+    code, out, err = plan(*KNOWN, *QUICK, "--converter-lag", "0", "--figure", picture, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out, parse_constant=pytest.fail)
+    with (tmp_path / "test.csv").open() as stream:
+        rows = [(float(row["time_s"]), float(row["pressure_pa"])) for row in csv.DictReader(stream)]
+    times, pressures = np.array(rows).T
+    assert times[0] == 0.0
+    assert times[-1] == pytest.approx(told["duration"], abs=1e-6)
+    assert times[-1] <= 15.0
+    time = np.arange(0.0, times[-1], 0.02)
+    stem = simulate(BENCH_VALVE, LOW_FRICTION, np.interp(time, times, pressures), 0.02)
+    likely = told["forecasts"][1]
+    assert likely["friction"] == told["likely"] == "as assumed"
+    reach = [stem.position.min(), stem.position.max()]
+    assert reach == pytest.approx(likely["position_range"], abs=2e-5)
+    assert 0.4 < reach[0] / BENCH_VALVE.travel < reach[1] / BENCH_VALVE.travel < 0.6
+    friction = likely["parameters"]["coulomb_friction"]
+    assert friction["value"] == 152.7
+    assert 0 < friction["half_width"] < 50
+    play = told["play"]
+    assert play["file_minimum"] <= pressures.min() < pressures.max() <= play["file_maximum"]
+    rate = np.max(np.abs(np.diff(pressures) / np.diff(times)))
+    assert rate < play["file_rate"] < 1.01 * rate
+    assert matplotlib.image.imread(picture).shape[0] > 500
+
+
+def test_the_text_says_that_nothing_moves_and_how_to_play_it(plan, tmp_path):
+    code, out, err = plan(*KNOWN, *QUICK)
+    assert (code, err) == (0, "")
+    words = " ".join(out.split())
+    assert "Nothing has been moved." in words
+    assert "put the loop in manual" in words
+    assert "between 40 and 60 % of the travel" in words
+    last = out.splitlines()[-1]
+    assert last.startswith("ros2 run valve_friction_ros pressure_source --ros-args")
+    assert f"-p file:={tmp_path / 'test.csv'}" in last
+    assert "coulomb_friction [N]" in out
+
+
+def friction(out):
+    return [one["parameters"]["coulomb_friction"]["value"] for one in json.loads(out)["forecasts"]]
+
+
+def test_an_earlier_result_and_the_history_know_the_friction(plan, tmp_path):
+    parameters = {
+        name: {"value": value}
+        for name, value in (
+            ("coulomb_friction", 200.0),
+            ("static_friction", None),
+            ("viscous_friction", 5e3),
+            ("spring_constant", 2.05e5),
+            ("spring_preload", 231.65),
+        )
+    }
+    estimate = tmp_path / "estimate.json"
+    estimate.write_text(json.dumps({"parameters": parameters}))
+    code, out, _ = plan("--estimate", estimate, *QUICK, "--json")
+    assert code == 0
+    assert friction(out) == [100.0, 200.0, 400.0]
+    history = tmp_path / "history.sqlite"
+    HistoryFile(history).add(success(friction=180.0))
+    known = ("--history", history, "--valve-name", VALVE.tag, "--friction-factor", "1")
+    code, out, _ = plan(*known, *SPRING, *QUICK, "--json", "--replace")
+    assert code == 0
+    assert friction(out) == [180.0]
+
+
+def test_without_any_friction_a_range_is_planned_for(plan):
+    code, out, _ = plan(*SPRING, "--duration", "40", "--sample-rate", "50", "--json")
+    assert code == 0
+    names = [one["friction"] for one in json.loads(out)["forecasts"]]
+    assert names == ["light", "medium", "heavy"]
+
+
+def test_refusals(refusal, tmp_path):
+    assert refusal().startswith("the spring_constant is unknown")
+    narrow = refusal(*SPRING, "--coulomb-friction", "900", "--from", "49", "--to", "51")
+    assert narrow.startswith("a reversal would not move the stem between 49 and 51 %")
+    assert narrow.endswith("widen the part of the travel")
+    assert refusal(*KNOWN, "--duration", "3").startswith("3 s have no room")
+    assert refusal(*KNOWN, "--from", "70", "--to", "30").startswith("the part of the travel")
+    assert "2 spring" not in refusal(*KNOWN, "--friction-factor", "0.5")
+    assert refusal(*SPRING, "--spring-constant", "0").startswith("a machine without a spring")
+    assert "no.json" in refusal("--estimate", tmp_path / "no.json")
+    assert "no.sqlite" in refusal("--history", tmp_path / "no.sqlite")
+    assert "there is no folder" in refusal(*KNOWN, "--figure", tmp_path / "none" / "a.png")
+
+
+def test_a_file_that_is_there_stays(plan, tmp_path):
+    (tmp_path / "test.csv").write_text("mine")
+    code, out, err = plan(*KNOWN, *QUICK)
+    assert (code, out) == (2, "")
+    assert "--replace" in err
+    assert (tmp_path / "test.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("text", ["half", "-1", "101", "nan"])
+def test_percentages(plan, capsys, text):
+    with pytest.raises(SystemExit):
+        plan(*KNOWN, f"--from={text}")
+    assert "no percentage of the travel" in capsys.readouterr().err
