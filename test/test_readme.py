@@ -72,7 +72,7 @@ def test_the_offline_commands_run_as_they_are_pasted(tmp_path, monkeypatch, caps
         (tmp_path / folder).symlink_to(PROJECT / folder)
     monkeypatch.chdir(tmp_path)
     offline = offline_commands()
-    assert len(offline) == 7
+    assert len(offline) == 8
     for each in offline:
         line, _, output = each.partition(" > ")
         with contextlib.ExitStack() as stack:
@@ -82,7 +82,13 @@ def test_the_offline_commands_run_as_they_are_pasted(tmp_path, monkeypatch, caps
             assert run(shlex.split(line, comments=True)) == 0, each
     assert "coulomb_friction   400" in capsys.readouterr().out
     written = {path.name for path in tmp_path.iterdir()}
-    assert {"one_minute.png", "one_minute.html", "five_seconds.png", "fv_102.yaml"} <= written
+    assert {
+        "one_minute.png",
+        "one_minute.html",
+        "five_seconds.png",
+        "fv_102.yaml",
+        "stroke_test.csv",
+    } <= written
     assert (tmp_path / "friction.csv").read_text().count("\n") == 3
 
 
