@@ -49,8 +49,14 @@ def test_limits_hold_for_every_pattern(shapes, speeds, hold, duration):
 
 @pytest.mark.parametrize(
     ("shapes", "speeds", "hold"),
-    [((), (1.0,), 0.0), (("round",), (1.0,), 0.0), (("full",), (0.0,), 0.0)]
-    + [(("full",), (1.1,), 0.0), (("full",), (), 0.0), (("full",), (1.0,), -1.0)],
+    [
+        ((), (1.0,), 0.0),
+        (("round",), (1.0,), 0.0),
+        (("full",), (0.0,), 0.0),
+        (("full",), (1.1,), 0.0),
+        (("full",), (), 0.0),
+        (("full",), (1.0,), -1.0),
+    ],
 )
 def test_what_is_no_pattern(shapes, speeds, hold):
     with pytest.raises(ValueError, match=r"shapes|speeds|hold"):
