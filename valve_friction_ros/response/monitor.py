@@ -38,6 +38,9 @@ time."""
 _HUNTING_WINDOW, _HUNTING_PERIOD = 300.0, 5.0
 """Time that hunting is looked for in, and how often, s."""
 
+_MOST_AHEAD = 10_000
+"""Samples of the command that wait for the stem's; then the oldest are dropped."""
+
 _RECENT = 200
 """Moves that count."""
 
@@ -65,6 +68,7 @@ class ResponseMonitor:
     def forget(self) -> None:
         """Drop the samples, as when a clock goes back; moves are kept."""
         self._holds = CommandHolds(self._travel)
+        self._ahead: deque[tuple[int, float]] = deque(maxlen=_MOST_AHEAD)
         self._fast = {kind: SampleBuffer(_LONGEST + 5.0) for kind in _SIGNALS}
         self._slow = {kind: SampleBuffer(_HUNTING_WINDOW) for kind in _SIGNALS}
         self._command = math.nan
@@ -109,19 +113,30 @@ class ResponseMonitor:
             self.forget()
         for kind in _SIGNALS:
             self._keep(kind, arrivals.samples(kind))
-        inside = np.clip(command.values, 0.0, self._travel)
-        changes = self._holds.take(Samples(command.stamps, inside))
         newest = self._fast[Kind.POSITION].last_stamp
-        if newest is not None and newest < 2**63 - 1:
-            changes += self._holds.advance(newest)
-        if inside.size:
-            self._command = float(inside[-1])
-            if self._steady_since is None:
-                self._steady_since = int(command.stamps[0])
+        self._ahead.extend(zip(*(part.tolist() for part in command), strict=True))
+        changes = self._taken_command(newest)
         for change in changes:
             self._follow(change)
         if newest is not None and self.has_command:
             self._look(newest)
+
+    def _taken_command(self, newest: int | None) -> list[Change]:
+        """Take the command up to the newest sample of the stem; what is ahead of it waits."""
+        due: list[tuple[int, float]] = []
+        while newest is not None and self._ahead and self._ahead[0][0] <= newest:
+            due.append(self._ahead.popleft())
+        changes: list[Change] = []
+        if due:
+            stamps, values = (np.array(part) for part in zip(*due, strict=True))
+            inside = np.clip(values, 0.0, self._travel)
+            changes += self._holds.take(Samples(stamps, inside))
+            self._command = float(inside[-1])
+            if self._steady_since is None:
+                self._steady_since = int(stamps[0])
+        if newest is not None:
+            changes += self._holds.advance(newest)
+        return changes
 
     def _goes_back(self, command: Samples, arrivals: Arrivals) -> bool:
         stem = arrivals.samples(Kind.POSITION)

@@ -45,6 +45,7 @@ class ResponseWatch:
         self._arrivals: list[Arrivals] = []
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
+        self._problem = ""
 
     def take(self, arrivals: Arrivals) -> None:
         """Take commands, and samples of pressure and stem."""
@@ -67,10 +68,16 @@ class ResponseWatch:
             kept = readable(messages, JointState)
             found_in = positions_in([one.message for one in kept], "")
         given = found_in.samples(Kind.POSITION)
-        good = np.isfinite(given.values)
-        unit = self._value(COMMAND_UNIT.name)
-        scale = self._value(TRAVEL) / 100 if unit == "%" else 1.0
-        self._commands.append(Samples(given.stamps[good], scale * given.values[good]))
+        travel, unit = self._value(TRAVEL), self._value(COMMAND_UNIT.name)
+        metres = given.values * (travel / 100 if unit == "%" else 1.0)
+        # Positioners take a little more than 0 to 100 %.
+        good = np.abs(metres - travel / 2) <= travel
+        self._problem = ""
+        if not good.all():
+            wrong = float(given.values[~good][0])
+            self._problem = f"{wrong:g} {unit} is no place of the stem: check command_unit"
+        if good.any():
+            self._commands.append(Samples(given.stamps[good], metres[good]))
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(name).value
@@ -113,9 +120,14 @@ class ResponseWatch:
     def values(self) -> Mapping[str, str]:
         """Return the figures of the latest moves."""
         monitor = self._monitor
+        problem = {"stem_command problem": self._problem} if self._problem else {}
         if monitor is None:
-            return {}
-        return {**_deviation_values(monitor), **_move_values(monitor.summary, monitor.left_out)}
+            return problem
+        return {
+            **problem,
+            **_deviation_values(monitor),
+            **_move_values(monitor.summary, monitor.left_out),
+        }
 
 
 def _number(value: float) -> str:
