@@ -27,12 +27,14 @@ MAY_IMPORT = {
     "planning": _CORE,
     "records": {*_CORE, "streams"},
     "health": {*_CORE, "streams"},
+    "alerts": {*_CORE, "health"},
+    "response": _VALVES,
     "history": _VALVES,
     "figures": _PICTURES,
     "reports": {*_PICTURES, "figures"},
     "fleet": {*_PICTURES, "figures", "reports"},
     "reproduction": {*_PICTURES, "figures", "reports"},
-    "nodes": {*_FILES, *_PAGES, "reports"},
+    "nodes": {*_FILES, *_PAGES, "reports", "alerts", "response"},
 }
 # What each inner room may import of its siblings. The files beside inner rooms hold their shared
 # words and what joins them, so both may import each other; no two files do, directly or around.
@@ -67,6 +69,7 @@ CORE = [
     "records",
     "health",
     "history",
+    "alerts",
     "fleet",
 ]
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from valve_friction_ros.alerts import Secrets, Webhook
 from valve_friction_ros.health import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.identification import (
     CALIBRATION,
@@ -19,11 +20,13 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT, VALVE_PARAMETERS, valve_from
 from valve_friction_ros.records.data_folder import history_file
+from valve_friction_ros.response import ResponseLimits
 
 __all__ = [
     "BASELINE",
     "BASELINE_IN_ALARM",
     "CHANGEABLE",
+    "COMMAND_UNIT",
     "HISTORY_DAYS",
     "HISTORY_FILE",
     "IDENTIFICATION_LIMIT",
@@ -32,11 +35,17 @@ __all__ = [
     "PARAMETERS",
     "PERIOD",
     "REPORT_FOLDER",
+    "RESPONSE_LIMITS",
     "SAVE_FOLDER",
+    "TRAVEL",
     "VALVE_TAG",
+    "WEBHOOK_PERIOD",
+    "WEBHOOK_URL",
     "baseline_from",
     "monitor_settings",
     "require_valid",
+    "response_limits",
+    "webhook_from",
 ]
 
 _DEFAULTS = IdentificationSettings()
@@ -101,6 +110,47 @@ PERIOD = ParameterSpec(
     0.0,
     "Time from one scheduled identification to the next [s]; 0: only on demand",
     (0.0, 31_557_600.0),
+)
+TRAVEL = "travel"
+"""Name of a parameter of `VALVE_PARAMETERS`."""
+COMMAND_UNIT = ParameterSpec(
+    "command_unit",
+    "m",
+    "Unit of stem_command [-]: m, or % of the travel",
+    choices=("m", "%"),
+)
+RESPONSE_LIMITS = (
+    ParameterSpec(
+        "deviation_limit",
+        0.0,
+        "Median distance of the resting stem from its command that warns [% of the travel]; "
+        "0: none",
+        (0.0, 100.0),
+    ),
+    ParameterSpec(
+        "dead_time_limit",
+        0.0,
+        "Median time from a step of the command to the first movement that warns [s]; 0: none",
+        (0.0, 3600.0),
+    ),
+    ParameterSpec(
+        "t86_limit",
+        0.0,
+        "Median time from a step of the command to 86.5 % of the move that warns [s]; 0: none",
+        (0.0, 3600.0),
+    ),
+)
+WEBHOOK_URL = ParameterSpec(
+    "webhook_url",
+    "",
+    "Address that each change of the level is posted to [-], https, or http to this machine; "
+    "empty: nowhere. No secret belongs into it: everybody on the ROS graph can read it",
+)
+WEBHOOK_PERIOD = ParameterSpec(
+    "webhook_period",
+    60.0,
+    "Least time from one posted change of the level to the next [s]; then the newest level counts",
+    (0.0, 86400.0),
 )
 
 CHANGEABLE = (
@@ -181,6 +231,10 @@ CHANGEABLE = (
     REPORT_FOLDER,
     HISTORY_DAYS,
     PERIOD,
+    COMMAND_UNIT,
+    *RESPONSE_LIMITS,
+    WEBHOOK_URL,
+    WEBHOOK_PERIOD,
 )
 """Those that can be changed while the node runs."""
 
@@ -216,8 +270,26 @@ def baseline_from(values: Mapping[str, Any]) -> Baseline | None:
     return None if value is None else Baseline(value)
 
 
+def response_limits(values: Mapping[str, Any]) -> ResponseLimits:
+    """Build the limits of the answer to the command."""
+    deviation, dead_time, t86 = (values[spec.name] for spec in RESPONSE_LIMITS)
+    return ResponseLimits(deviation / 100, dead_time, t86)
+
+
+def webhook_from(values: Mapping[str, Any]) -> Webhook | None:
+    """Return the webhook of parameter values, None for none.
+
+    Raises ValueError if its address, or the token in the environment, cannot be used.
+    """
+    if not (url := values[WEBHOOK_URL.name]):
+        return None
+    Secrets.from_environment()
+    return Webhook.at(url)
+
+
 def require_valid(values: Mapping[str, Any]) -> None:
     """Raise ValueError, which names the broken rule, if parameter values break one."""
     settings = monitor_settings(values)
     require_valve_units(settings.valve, settings.identification.fixed)
     baseline_from(values)
+    webhook_from(values)
