@@ -16,13 +16,14 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # What each room may import of the others; each holds what the rooms below it may import too.
 _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
-_VALVES = {*_CORE, "streams", "health"}
+_VALVES = {*_CORE, "streams", "usage", "health"}
 _PAGES = {*_VALVES, "history", "records"}
 MAY_IMPORT = {
     "model": set(),
     "signals": {"model"},
     "identification": {"model", "signals"},
     "streams": _CORE,
+    "usage": {*_CORE, "streams"},
     "records": {*_CORE, "streams"},
     "health": {*_CORE, "streams"},
     "history": _VALVES,
@@ -56,7 +57,17 @@ ROS_ROOMS = ("nodes", "commands/demo")
 
 # The one arrow up: a result draws itself, and loads the figures when it is asked to.
 UPWARD = {"identification/result.py": {"figures"}}
-CORE = ["model", "signals", "identification", "streams", "records", "health", "history", "fleet"]
+CORE = [
+    "model",
+    "signals",
+    "identification",
+    "streams",
+    "usage",
+    "records",
+    "health",
+    "history",
+    "fleet",
+]
 
 
 def rooms():
