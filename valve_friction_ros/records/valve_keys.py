@@ -41,6 +41,15 @@ _IDENTIFIER_ONLY = (
     "report_folder",
     "history_file",
     "history_days",
+    "counting_dead_band",
+    "air_to",
+    "travel_limit",
+    "reversal_limit",
+    "alarm_recording",
+    "alarm_folder",
+    "alarm_recordings",
+    "alarm_megabytes",
+    "alarm_pause",
 )
 _OTHER_NODES = (
     "valves",

@@ -6,7 +6,8 @@ from datetime import datetime, timezone
 from typing import NamedTuple
 
 from valve_friction_ros.model.checks import require_non_negative
-from valve_friction_ros.usage.valve_usage import DAY, ValveUsage
+from valve_friction_ros.usage.usage import Usage
+from valve_friction_ros.usage.valve_usage import DAY, Pace
 
 __all__ = ["LEAD", "LimitState", "UsageLimits", "limit_states"]
 
@@ -85,9 +86,10 @@ class LimitState(NamedTuple):
         return f"packing life: {figures} {state}: renew the packing, then call ~/reset_usage"
 
 
-def limit_states(usage: ValveUsage, limits: UsageLimits, now: int) -> tuple[LimitState, ...]:
+def limit_states(
+    used: Usage, pace: Pace | None, limits: UsageLimits, now: int
+) -> tuple[LimitState, ...]:
     """Compare the usage since the renewal with each limit that is given, at the time `now`, ns."""
-    used, pace = usage.since_renewal, usage.pace()
     found = []
     for name, value, limit, daily in (
         ("travel_limit", used.distance, limits.travel, pace and pace.distance),

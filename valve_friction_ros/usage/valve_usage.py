@@ -13,6 +13,7 @@ DAY = 86_400_000_000_000
 
 _PACE_DAYS = 14
 """Last days with samples from which the pace is taken. Chosen: two weeks of work and rest."""
+_KEPT_DAYS = 31
 _LEAST_WATCHED = DAY
 """Least time watched, ns, for a pace. Chosen: a day holds what recurs in a day."""
 
@@ -87,6 +88,16 @@ class ValveUsage:
             return None
         share = DAY / recent.time_watched
         return Pace(recent.distance * share, recent.reversals * share)
+
+    def condensed(self) -> "ValveUsage":
+        """Return the same usage with at most 31 single days, of this packing; the rest as sums."""
+        recent = set(self._of_this_packing()[-_KEPT_DAYS:])
+        sums: dict[int, UsedDay] = {}
+        for one in self.days:
+            if one not in recent:
+                before = sums.get(one.renewal, UsedDay(one.day, one.renewal, Usage()))
+                sums[one.renewal] = UsedDay(one.day, one.renewal, before.usage + one.usage)
+        return ValveUsage.of((*sums.values(), *recent), self.renewal)
 
     def _of_this_packing(self) -> tuple[UsedDay, ...]:
         return tuple(one for one in self.days if one.renewal == self.renewal)
