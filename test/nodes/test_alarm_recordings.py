@@ -42,6 +42,13 @@ def alarmed(client, before=None):
     return recorded(client, before)
 
 
+def paged(client, path):
+    """Wait for the page of a recording; its text."""
+    page = Path(path) / "report.html"
+    client.wait_until(page.exists, f"{page}", timeout=100)
+    return page.read_text(encoding="utf-8")
+
+
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
@@ -61,8 +68,7 @@ def test_an_alarm_is_recorded(live, tmp_path):
     values = client.last_values()
     assert values["alarm_recording level"] == "ERROR"
     assert values["alarm_recording [time]"][:10].count("-") == 2
-    page = (path / "report.html").read_text(encoding="utf-8")
-    assert "Excess friction" in page
+    assert "Excess friction" in paged(client, path)
 
     # The whole bag has both records; the first alone gives what the node has said.
     baseline = float(values["baseline_coulomb_friction [N]"])
@@ -118,6 +124,7 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     client, path, paths = live.client, None, []
     for _ in range(4):
         path = str(alarmed(client, path))
+        paged(client, path)
         paths.append(Path(path).name)
     assert len(set(paths)) == 4
     assert names(folder) == sorted([*others, *paths[-2:]])
@@ -126,15 +133,17 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     (done,) = client.set_parameters(NODE, {"alarm_megabytes": 1.5 * size / 1e6})
     assert done.successful
     path = str(alarmed(client, path))
-    assert names(folder) == sorted([*others, Path(path).name])
-    (done,) = client.set_parameters(NODE, {"alarm_megabytes": 0.5 * size / 1e6})
+    expected = sorted([*others, Path(path).name])
+    client.wait_until(lambda: names(folder) == expected, "one recording", timeout=100)
+    assert "Excess friction" in paged(client, path)
+    (done,) = client.set_parameters(NODE, {"alarm_megabytes": 0.001})
     assert done.successful
     client.identified(HEALTHY)
     client.identified(TIGHT)
     told = client.status_values(lambda one: "alarm_recording problem" in values_of(one), "no room")[
         "alarm_recording problem"
     ]
-    assert "has no room in alarm_megabytes" in told
+    assert "MB has no room in alarm_megabytes (0.001): raise it" in told
     assert names(folder) == sorted(others)
 
 

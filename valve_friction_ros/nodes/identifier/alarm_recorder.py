@@ -1,7 +1,6 @@
 """A bag, and the page of the report, of the time before and after a rise of the level."""
 
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
 from datetime import datetime, timezone
 from functools import partial
@@ -56,13 +55,6 @@ class _Rise(NamedTuple):
     clock: float
 
 
-class _Saved(NamedTuple):
-    """A recording, and why its page is missing."""
-
-    recording: AlarmRecording
-    problem: str | None
-
-
 class AlarmRecorder:
     """Saves the buffer from before and after a rise of the level, one at a time.
 
@@ -85,7 +77,8 @@ class AlarmRecorder:
         self._level: Level | None = None
         self._rise: _Rise | None = None
         self._last_rise: _Rise | None = None
-        self._writing: Future[_Saved] | None = None
+        self._bag: Future[AlarmRecording] | None = None
+        self._page: Future[str | None] | None = None
         self._latest = history.last_alarm()
         self._problem: str | None = None
 
@@ -96,8 +89,9 @@ class AlarmRecorder:
         self._settle()
         if before is not None and level > before:
             self._risen(level, status.message)
-        if self._rise is not None and self._writing is None and self._is_over(self._rise):
-            self._write(self._rise, names)
+        is_writing = self._bag is not None or self._page is not None
+        if self._rise is not None and not is_writing and self._is_over(self._rise):
+            self._write_bag(self._rise, names)
             self._rise = None
 
     def values(self) -> dict[str, str]:
@@ -139,57 +133,77 @@ class AlarmRecorder:
             return True
         return time.monotonic() - rise.clock >= after + _LATE
 
-    def _write(self, rise: _Rise, names: StreamNames) -> None:
-        node, monitor = self._node, self._monitor
-        after, settings = monitor.input()
+    def _write_bag(self, rise: _Rise, names: StreamNames) -> None:
+        node = self._node
+        after, settings = self._monitor.input()
         given = node.get_parameter(ALARM_FOLDER.name).value
-        most = int(self._parameter(ALARM_RECORDINGS.name))
-        room = 1e6 * self._parameter(ALARM_MEGABYTES.name)
+        most, room = self._bounds()
         valve, samples = valve_name(node), _joined(rise.before, after)
         name = recording_name(valve, rise.time, rise.level)
-        write_bag = bag_writer(node, settings.valve, names)
-        write_page: Callable[[Path], None] | None = None
-        if monitor.result is not None:
-            write_page = report_writer(node, monitor, self._history, self._usage.usage())
+        write = bag_writer(node, settings.valve, names)
 
-        def write() -> _Saved:
+        def write_bag() -> AlarmRecording:
             with output_folder(given, "alarms", "an alarm's recording") as folder:
                 remove_oldest(folder, valve, most - 1, room)
-                path, problem = write_bag(folder, name, samples), None
-                try:
-                    with bugs_reported(node, OSError):
-                        if write_page is not None:
-                            write_page(path / PAGE)
-                except (InternalError, OSError) as error:
-                    problem = f"{path / PAGE} is missing: {error}"
+                path = write(folder, name, samples)
                 size = size_of(path)
                 if size > room:
                     remove_recording(path)
                     raise RefusalError(
-                        f"a recording of {size / 1e6:.1f} MB has no room in "
-                        f"{ALARM_MEGABYTES.name} ({room / 1e6:g}): raise it"
+                        f"a bag of {size / 1e6:.3g} MB has no room in {ALARM_MEGABYTES.name} "
+                        f"({room / 1e6:g}): raise it"
                     )
                 remove_oldest(folder, valve, most, room, new=path)
-            return _Saved(AlarmRecording(rise.time, rise.level, path, rise.message), problem)
+            return AlarmRecording(rise.time, rise.level, path, rise.message)
 
-        self._writing = self._worker.submit(write)
+        self._bag = self._worker.submit(write_bag)
+
+    def _write_page(self, path: Path) -> None:
+        """Write the page into the folder of the bag; it may take its time, and the bag is there."""
+        try:
+            write = report_writer(self._node, self._monitor, self._history, self._usage.usage())
+        except RefusalError:
+            return  # an alarm from before a restart has no result
+        valve, (most, room), page = valve_name(self._node), self._bounds(), path / PAGE
+
+        def write_page() -> str | None:
+            try:
+                write(page)
+                if size_of(path) > room:
+                    page.unlink()
+                    return f"{page} has no room in {ALARM_MEGABYTES.name}: raise it"
+                remove_oldest(path.parent, valve, most, room, new=path)
+            except OSError as error:
+                return f"{page} was not written: {error.strerror or error}"
+            return None
+
+        self._page = self._worker.submit(write_page)
+
+    def _bounds(self) -> tuple[int, float]:
+        """Return how many recordings stay, and their room, bytes."""
+        most = int(self._parameter(ALARM_RECORDINGS.name))
+        return most, 1e6 * self._parameter(ALARM_MEGABYTES.name)
 
     def _settle(self) -> None:
-        """Take the outcome of the writing, if it has ended."""
-        if self._writing is None or not self._writing.done():
-            return
-        writing, self._writing = self._writing, None
+        """Take the outcome of what was written, if it has ended."""
         try:
             with bugs_reported(self._node, known=self._problem):
-                saved = writing.result()
+                if self._page is not None and self._page.done():
+                    page, self._page = self._page, None
+                    self._problem = page.result()
+                if self._bag is not None and self._bag.done():
+                    bag, self._bag = self._bag, None
+                    self._saved(bag.result())
         except (RefusalError, InternalError) as error:
             self._problem = f"the alarm was not recorded: {error}"
             self._node.get_logger().warning(self._problem)
-            return
-        self._latest, self._problem = saved.recording, saved.problem
-        self._node.get_logger().info(f"the alarm is recorded: {saved.recording.path}")
+
+    def _saved(self, recording: AlarmRecording) -> None:
+        self._latest, self._problem = recording, None
+        self._node.get_logger().info(f"the alarm is recorded: {recording.path}")
         valve = self._history.valve
-        self._history.keep_soon(partial(keep_alarm_recording, valve=valve, one=saved.recording))
+        self._history.keep_soon(partial(keep_alarm_recording, valve=valve, one=recording))
+        self._write_page(recording.path)
 
 
 _EMPTY = Samples(np.empty(0, np.int64), np.empty(0))

@@ -66,7 +66,7 @@ class HistoryWriter:
         self._trend: Trend | None = None
         self._baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
-        self._under_way: Future[None] | None = None
+        self._under_way: list[Future[None]] = []
 
     @property
     def valve(self) -> KeptValve:
@@ -210,16 +210,15 @@ class HistoryWriter:
             return
         if change not in self._waiting:
             self._waiting.append(change)
-        if self._under_way is None or self._under_way.done():
-            self.settle()
-            self._under_way = self._writer.submit(self._write_waiting, self._file)
+        # A job that has begun may have looked for the last time.
+        if all(one.running() or one.done() for one in self._under_way):
+            self._under_way.append(self._writer.submit(self._write_waiting, self._file))
 
     def settle(self) -> None:
-        """Take the outcome of `keep_soon`, if it is there."""
-        if self._under_way is not None and self._under_way.done():
+        """Take the outcomes of `keep_soon` that are there."""
+        while self._under_way and self._under_way[0].done():
             with self._failures_remembered():
-                self._under_way.result()
-            self._under_way = None
+                self._under_way.pop(0).result()
 
     def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
         """Return what computes the trend with the baseline and settings of now, in any thread."""
