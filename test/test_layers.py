@@ -16,7 +16,7 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # What each room may import of the others; each holds what the rooms below it may import too.
 _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
-_VALVES = {*_CORE, "streams", "health"}
+_VALVES = {*_CORE, "streams", "usage", "health"}
 _PAGES = {*_VALVES, "history", "records"}
 _PICTURES = {*_PAGES, "planning"}
 MAY_IMPORT = {
@@ -25,6 +25,7 @@ MAY_IMPORT = {
     "identification": {"model", "signals"},
     "streams": _CORE,
     "planning": _CORE,
+    "usage": {*_CORE, "streams"},
     "records": {*_CORE, "streams"},
     "health": {*_CORE, "streams"},
     "alerts": {*_CORE, "health"},
@@ -66,6 +67,7 @@ CORE = [
     "identification",
     "planning",
     "streams",
+    "usage",
     "records",
     "health",
     "history",

@@ -1,44 +1,162 @@
-"""``--help`` of the nodes: how to run them, and their parameters, without starting ROS."""
+"""The usage of a valve over DDS: counted, shown, kept through a kill, limited and reset."""
 
-import subprocess
-import sys
-
+import numpy as np
 import pytest
-import yaml
-from live_nodes import PROJECT
+from live_nodes import NAMESPACE, SECOND, START, values_of
 
-_START = """
-import sys
-import rclpy
-def refuse(*_, **__):
-    raise AssertionError("ROS was started")
-rclpy.init = refuse
-from valve_friction_ros.nodes import start
-sys.exit(getattr(start, sys.argv[1])())
-"""
+from valve_friction_ros.history import HistoryFile, read_usage
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.usage import DAY
+
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN = b"\x00", b"\x01"
+TRAVEL = BENCH_VALVE.travel
+PERIOD = 10 * SECOND
+DISTANCE = "travelled_distance [m]"
 
 
-@pytest.mark.parametrize("option", ["-h", "--help"])
-@pytest.mark.parametrize(
-    ("node", "parameter", "default"),
-    [
-        ("identifier", "window", 60.0),
-        ("identifiers", "valves", [""]),
-        ("simulator", "joint", "stem"),
-        ("pressure_source", "excitation", "square"),
-    ],
-)
-def test_help_ends_well_and_names_the_parameters(node, parameter, default, option):
-    done = subprocess.run(
-        [sys.executable, "-c", _START, node, option],
-        cwd=PROJECT,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
+@pytest.fixture
+def history(tmp_path):
+    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
+    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+
+
+def strokes(count, samples=64):
+    """Full strokes, a stroke in `samples` samples, and the stem ends where it began."""
+    one = np.linspace(0.0, TRAVEL, samples, endpoint=False)
+    return np.concatenate([one if n % 2 == 0 else TRAVEL - one for n in range(count)])
+
+
+def send(client, position, start=START):
+    client.send(position=(start + PERIOD * np.arange(position.size), position))
+    return start + PERIOD * position.size
+
+
+def shown(client, key, value):
+    """Wait until a value of the diagnostics is there; the values."""
+    return client.status_values(
+        lambda status: values_of(status).get(key) == value, f"{key} = {value}"
     )
-    assert (done.returncode, done.stderr) == (0, "")
-    first, *rest = done.stdout.splitlines()
-    assert first.startswith(f"usage: {node} [--ros-args ")
-    listed = yaml.safe_load("\n".join(line for line in rest if line.startswith("  ")))
-    assert listed[parameter] == default
+
+
+def killed(live, node):
+    live.client.watched.clear()
+    node.kill()
+    live.nodes.remove(node)
+    live.client.statuses.clear()
+
+
+def test_usage_is_shown_kept_and_goes_on(live, history):
+    node = live.start_identifier()
+    client = live.client
+    after = send(client, strokes(16))  # 1024 samples: four blocks
+    values = shown(client, "reversals", "15")
+    far = 15 * TRAVEL + TRAVEL * 63 / 64
+    assert float(values[DISTANCE]) == pytest.approx(far, rel=1e-6)
+    assert float(values["strokes"]) == pytest.approx(far / TRAVEL, rel=1e-6)
+    assert float(values["time_watched [s]"]) == 10230
+    histogram = [float(one) for one in values["travel_histogram [s]"].split(",")]
+    assert sum(histogram) == 10230
+    assert float(values["time_near_seat [s]"]) == histogram[0] > 0
+    assert float(values["counting_dead_band [mm]"]) >= 0.28
+    assert values["packing_renewed [date]"] == "not known"
+    assert client.set_together(NODE, {"air_to": "close"}).successful
+    assert client.status_values()["time_near_seat [s]"] == f"{histogram[-1]:g}"
+    client.wait_until(
+        lambda: history.path.exists() and read_usage(history, NODE).days, "rows of the usage"
+    )
+    send(client, strokes(4), after)
+    shown(client, "reversals", "19")
+    client.wait_until(lambda: read_usage(history, NODE).total.reversals == 19, "the last rows")
+    kept = read_usage(history, NODE)
+    killed(live, node)
+    assert read_usage(history, NODE) == kept
+
+    live.start_identifier()  # the same stamps once more are as good as new ones
+    values = shown(client, "reversals", "19")
+    assert float(values[DISTANCE]) == pytest.approx(kept.total.distance)
+    send(client, strokes(16))
+    values = shown(client, "reversals", "34")
+    assert float(values[DISTANCE]) == pytest.approx(kept.total.distance + far, rel=1e-6)
+
+
+def test_a_renewed_packing_counts_anew(live, history):
+    live.start_identifier()
+    client = live.client
+    after = send(client, strokes(8))
+    shown(client, "reversals", "7")
+    answer = client.trigger("reset_usage")
+    assert answer.success
+    assert "the one before, of unknown age: 0.228" in answer.message
+    assert "7 reversals" in answer.message
+    values = client.last_values()
+    assert (values["reversals"], values["reversals in all"]) == ("0", "7")
+    assert values["packing_renewed [date]"] != "not known"
+    assert read_usage(history, NODE).renewal > 0
+    assert read_usage(history, NODE).total.reversals == 7
+    assert read_usage(history, NODE).since_renewal.reversals == 0
+    send(client, strokes(8), after)
+    values = shown(client, "reversals in all", "15")
+    assert values["reversals"] == "8"
+
+
+def test_a_node_that_is_stopped_keeps_all(live, history):
+    node = live.start_identifier()
+    client = live.client
+    send(client, strokes(4, samples=16), START)  # less than a block
+    client.wait_for_buffered(7)  # of 64 samples the last window
+    live.client.watched.clear()
+    node.stop()
+    assert read_usage(history, NODE).total.reversals == 3
+
+
+def test_limits_of_a_packing(live):
+    """Two days of strokes; the limit is expected within a month, and then it is reached."""
+    node = live.start_identifier({"reversal_limit": 400.0})
+    client = live.client
+    samples = 2 * DAY // PERIOD + 256
+    many = np.tile(strokes(2, samples=512), -(-samples // 1024))[:samples]
+    send(client, many)
+    status = client.next_status(lambda one: "packing life" in one.message, "a warning")
+    assert status.level == WARN
+    values = values_of(status)
+    assert values["NE 107"] == "M"
+    pace = float(values["reversals pace [1/day]"])
+    assert pace == pytest.approx(DAY / (512 * PERIOD), rel=0.05)
+    assert values["reversal_limit_expected [date]"] in status.message
+    assert "renew the packing, then call ~/reset_usage" in status.message
+    assert client.set_together(NODE, {"reversal_limit": 20.0}).successful
+    status = client.next_status(lambda one: "reached" in one.message, "a limit that is reached")
+    assert status.level == WARN
+    assert client.set_together(NODE, {"reversal_limit": 0.0, "travel_limit": 1e6}).successful
+    status = client.next_status(lambda one: "packing life" not in one.message, "no warning")
+    assert status.level == OK
+    assert node.is_running()
+
+
+def test_a_machine_without_stops(live):
+    live.start_identifier({"travel": ".inf"})
+    values = live.client.status_values()
+    assert values["usage"] == "not counted, as the travel is not finite: set travel"
+    assert DISTANCE not in values
+
+
+def test_earlier_runs_that_cannot_be_read_at_first(live, tmp_path):
+    """The totals are those of this run and say so, until the file can be read."""
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    history = HistoryFile(blocked / "history.sqlite")
+    live.start_identifier({"history_file": history.path})
+    client = live.client
+    after = send(client, strokes(8))
+    values = shown(client, "reversals", "7")
+    assert values["usage"] == "of this run only, as the history cannot be read"
+    blocked.unlink()
+    after = send(client, strokes(8), after)
+    after = send(client, strokes(8), after)
+    client.next_status(lambda one: "usage" not in values_of(one), "all of the usage")
+    send(client, strokes(8), after)
+    client.wait_until(
+        lambda: history.path.exists() and read_usage(history, NODE).total.reversals == 31,
+        "all rows",
+    )

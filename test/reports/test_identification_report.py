@@ -15,6 +15,7 @@ from valve_friction_ros.reports import (
     require_report_file,
     write_report,
 )
+from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
 
 FRICTION = "Friction against its baseline"
 
@@ -72,6 +73,23 @@ def test_the_time_of_a_record_is_told_where_its_clock_is_that_of_the_world(ident
     assert "began" not in rows(identified, "Record")
     mistaken = dataclasses.replace(identified.recording, start_time=1.7e18)
     assert "began" not in of(mistaken)
+
+
+def test_what_the_valve_has_done(identified):
+    """Since the packing was renewed, and in all; nothing for a valve that was not watched."""
+    day = 86_400 * 10**9
+    times = (day, *[0] * (BINS - 1))
+    days = [UsedDay(n, day * n, Usage(1.5, 10 + n, 4, times)) for n in (1, 2)]
+    used = dataclasses.replace(identified, usage=ValveUsage.of(days, renewal=2 * day))
+    told = rows(used, "Use")
+    assert told["travelled distance [m]"] == ("1.5", "3")
+    assert told["reversals"] == ("12", "23")
+    assert told["time watched [h]"] == ("24", "48")
+    blocks = section(identification_report(used), "Use").blocks
+    assert [block.kind for block in blocks] == ["table", "picture", "paragraph"]
+    assert "1.5 m and 12 reversals in a day of watching" in blocks[-1].text
+    assert blocks[0].columns[1].title == "since the packing was renewed, 1970-01-03"
+    assert "Use" not in [one.title for one in identification_report(identified).sections]
 
 
 class TestUncertaintyBudget:

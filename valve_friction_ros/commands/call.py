@@ -23,6 +23,7 @@ _SERVICES = {
     "save": "save the buffered samples as a bag",
     "report": "write a page about the last result",
     "clear": "empty the buffer",
+    "reset_usage": "count the usage anew, as the packing is renewed",
 }
 _TIMEOUT = 300.0
 _DISCOVERY = 5.0

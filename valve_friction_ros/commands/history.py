@@ -10,14 +10,22 @@ from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_faile
 from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
+from valve_friction_ros.commands.output.usage_output import (
+    print_usage,
+    usage_as_json,
+    write_usage,
+)
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
+    KeptValve,
     ValveHistory,
+    read_usage,
     valve_histories,
 )
 from valve_friction_ros.records.data_folder import history_file
 from valve_friction_ros.streams import nanoseconds
+from valve_friction_ros.usage import DAY, ValveUsage
 
 __all__ = ["REFUSALS", "declare", "run"]
 
@@ -50,7 +58,8 @@ def _until(text: str) -> datetime:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
-        "List what the identifiers have kept: identifications, refusals, baselines and trend."
+        "List what the identifiers have kept: identifications, refusals, baselines, trend, "
+        "usage and recorded alarms."
     )
     parser.epilog = (
         "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
@@ -83,6 +92,11 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
+    parser.add_argument(
+        "--usage",
+        action="store_true",
+        help="in place of the identifications: distance, reversals, breakaways and times, by days",
+    )
     add_fail_on(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
@@ -97,13 +111,51 @@ def _require_files(options: argparse.Namespace) -> None:
         figures.require_picture_file(options.plot)
 
 
+def _usages(options: argparse.Namespace) -> list[tuple[KeptValve, ValveUsage]]:
+    """Read the usage of the chosen valves, on the chosen days."""
+    if options.plot is not None or options.fail_on is not None:
+        raise ValueError("--usage: neither --plot nor --fail-on belong to it")
+    file, found = HistoryFile(options.file), []
+    since, until = _span(options)
+    for valve in chosen_valves(file.valves(), options.valve, "--valve"):
+        usage = read_usage(file, valve.name)
+        days = [one for one in usage.days if since < (one.day + 1) * DAY and one.day * DAY < until]
+        if days:
+            found.append((valve, ValveUsage.of(days, usage.renewal)))
+    if not found:
+        raise ValueError(f"{options.file}: no usage of these valves within these times")
+    return found
+
+
+def _print_usages(options: argparse.Namespace) -> int:
+    usages = _usages(options)
+    try:
+        if options.json:
+            valves = [
+                {"name": valve.name, "tag": valve.tag, "usage": usage_as_json(usage)}
+                for valve, usage in usages
+            ]
+            print(json.dumps({"valves": valves}, ensure_ascii=False, allow_nan=False))
+        else:
+            print_usage(usages)
+    finally:
+        if options.csv is not None:
+            write_usage(options.csv, usages)
+    return ExitCode.DONE
+
+
+def _span(options: argparse.Namespace) -> tuple[int, int]:
+    since, until = options.since - _FIRST, options.until - _FIRST
+    return nanoseconds(since.total_seconds()), nanoseconds(until.total_seconds())
+
+
 def _histories(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
     """Read the chosen valves within the chosen times."""
     file = HistoryFile(options.file)
     histories = valve_histories(
         file,
         chosen_valves(file.valves(), options.valve, "--valve"),
-        *(nanoseconds((time - _FIRST).total_seconds()) for time in (options.since, options.until)),
+        *_span(options),
     )
     if not histories:
         raise ValueError(f"{options.file}: no identification of these valves within these times")
@@ -113,6 +165,8 @@ def _histories(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
 def run(options: argparse.Namespace) -> int:
     """Print what was kept of the chosen valves, and write the files asked for."""
     _require_files(options)
+    if options.usage:
+        return _print_usages(options)
     histories = _histories(options)
     figure = None
     if options.plot is not None:

@@ -1,5 +1,10 @@
 """The history of a valve: its database, and the trend of its friction; no ROS."""
 
+from valve_friction_ros.history.alarm_rows import (
+    AlarmRecording,
+    alarm_recordings,
+    keep_alarm_recording,
+)
 from valve_friction_ros.history.entry import (
     FrictionPoint,
     HistoryEntry,
@@ -10,10 +15,12 @@ from valve_friction_ros.history.entry import (
 )
 from valve_friction_ros.history.file import HistoryError, HistoryFile
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
+from valve_friction_ros.history.usage_rows import keep_renewal, keep_usage, read_usage
 from valve_friction_ros.history.valve_history import ValveHistory, current_trend, valve_histories
 
 __all__ = [
     "MONTH",
+    "AlarmRecording",
     "Crossing",
     "FrictionPoint",
     "HistoryEntry",
@@ -24,8 +31,13 @@ __all__ = [
     "Limit",
     "Trend",
     "ValveHistory",
+    "alarm_recordings",
     "current_trend",
     "entry_of",
+    "keep_alarm_recording",
+    "keep_renewal",
+    "keep_usage",
+    "read_usage",
     "trend_of",
     "trended",
     "valve_histories",

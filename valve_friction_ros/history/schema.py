@@ -7,14 +7,23 @@ from itertools import chain
 from pathlib import Path
 from urllib.parse import quote
 
-__all__ = ["SCHEMA_VERSION", "HistoryError", "is_current", "reading", "writing"]
+from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, USAGE
 
-SCHEMA_VERSION = 5
+__all__ = [
+    "SCHEMA_VERSION",
+    "HistoryError",
+    "has_table",
+    "is_current",
+    "reading",
+    "writing",
+]
+
+SCHEMA_VERSION = 6
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
 and no half widths without calibration; version 3 has no records of baselines; version 4 does not
-say what a baseline replaced."""
+say what a baseline replaced; version 5 knows nothing of the valve in service."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -150,6 +159,9 @@ UPDATE baseline SET
 """
 """Who set a baseline, at which level, and what it replaced: in an older file the row before it."""
 
+_SERVICE = ";".join((USAGE, ALARM_RECORDINGS))
+"""The tables of the valve in service."""
+
 _ADDED = {
     "ratio_of": "TEXT",
     "ratio_speed": "REAL",
@@ -175,6 +187,7 @@ _STEPS = {
     ),
     3: (_RECORD,),
     4: tuple(_REPLACED.split(";")),
+    5: tuple(_SERVICE.split(";")),
 }
 """What leads from a version to the next one."""
 
@@ -248,6 +261,12 @@ def _is_new(path: Path, connection: sqlite3.Connection) -> bool:
     return False
 
 
+def has_table(connection: sqlite3.Connection, name: str) -> bool:
+    """Return whether a file has a table, which one of an older version may lack."""
+    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?"
+    return connection.execute(query, (name,)).fetchone() is not None
+
+
 def _set_journal(connection: sqlite3.Connection) -> None:
     """Use the write-ahead journal where the file system allows it, else the older, slower journal.
 
@@ -262,9 +281,8 @@ def _make_tables(connection: sqlite3.Connection) -> None:
     """Create the tables of a new file, and add to those of an older one what they lack."""
     version = _pragma(connection, "user_version")
     steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
-    statements = (
-        chain(*steps) if version else f"{_SCHEMA};{_BASELINE};{_RECORD};{_REPLACED}".split(";")
-    )
+    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, _SERVICE)
+    statements = chain(*steps) if version else ";".join(tables).split(";")
     for statement in filter(str.strip, statements):
         connection.execute(statement)
     connection.execute(f"PRAGMA application_id = {_APPLICATION}")

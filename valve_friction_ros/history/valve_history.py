@@ -1,12 +1,15 @@
 """The history of one valve: its identifications, its baseline, its trend."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.friction_monitor import MonitorSettings
+from valve_friction_ros.history.alarm_rows import AlarmRecording, alarm_recordings
 from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.trend import Trend, trend_of
+from valve_friction_ros.history.usage_rows import read_usage
+from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["ValveHistory", "current_trend", "valve_histories"]
 
@@ -28,6 +31,10 @@ class ValveHistory:
         may differ by themselves, so a trend uses the results of one method.
     baselines : tuple of KeptBaseline
         Each change of its baseline, oldest first, without records.
+    usage : ValveUsage
+        What the valve has done, at any time.
+    alarms : tuple of AlarmRecording
+        The recordings of its alarms, oldest first.
     """
 
     valve: KeptValve
@@ -35,6 +42,8 @@ class ValveHistory:
     set_baseline: KeptBaseline | None
     trend: Trend | None
     baselines: tuple[KeptBaseline, ...] = ()
+    usage: ValveUsage = field(default_factory=ValveUsage)
+    alarms: tuple[AlarmRecording, ...] = ()
 
 
 def valve_histories(
@@ -56,7 +65,10 @@ def valve_histories(
         same = (one for one in entries if one.time >= begin and one.method == last.method)
         points = [point for one in same if (point := one.point(last.baseline)) is not None]
         trend = trend_of(points, last.baseline, last.limits)
-        found.append(ValveHistory(valve, entries, kept, trend, baselines))
+        usage = read_usage(history, valve.name)
+        recorded = alarm_recordings(history, valve.name)
+        alarms = tuple(one for one in recorded if since <= one.time < until)
+        found.append(ValveHistory(valve, entries, kept, trend, baselines, usage, alarms))
     return tuple(found)
 
 

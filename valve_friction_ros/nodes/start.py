@@ -19,8 +19,8 @@ def _start(node: str) -> int:
         signal.signal(request, _end)
     module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
     if {"-h", "--help"} & set(sys.argv[1:]):
-        usage = importlib.import_module("valve_friction_ros.nodes.plumbing.usage")
-        print(usage.usage(node.split(".", maxsplit=1)[0], module.__doc__, module.PARAMETERS))  # noqa: T201
+        words = importlib.import_module("valve_friction_ros.nodes.plumbing.help_text")
+        print(words.help_text(node.split(".", maxsplit=1)[0], module.__doc__, module.PARAMETERS))  # noqa: T201
         return 0
     exit_code: int = module.main()
     # All is closed: Python would take a second more to take its modules apart.

@@ -47,6 +47,15 @@ _IDENTIFIER_ONLY = (
     "t86_limit",
     "webhook_url",
     "webhook_period",
+    "counting_dead_band",
+    "air_to",
+    "travel_limit",
+    "reversal_limit",
+    "alarm_recording",
+    "alarm_folder",
+    "alarm_recordings",
+    "alarm_megabytes",
+    "alarm_pause",
 )
 _OTHER_NODES = (
     "valves",

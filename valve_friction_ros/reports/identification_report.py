@@ -29,6 +29,7 @@ from valve_friction_ros.reports.identification_tables import (
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
 from valve_friction_ros.reports.published_words import published_words
+from valve_friction_ros.reports.usage_section import usage_section
 from valve_friction_ros.reports.valve_status import date_line, valve_status
 
 __all__ = ["identification_report"]
@@ -59,7 +60,7 @@ def identification_report(record: IdentifiedRecord) -> Page:
     """Return the page on an identified record: its parameters and the evidence for them.
 
     The status, the diagnosis in one sentence and the date, then parameters, uncertainty budget,
-    friction against its baseline, trend, the record, the valve signature, the evidence of the
+    friction against its baseline, trend, use, the record, the valve signature, the evidence of the
     method, the measured against the simulated position, the residual, notes, settings and versions.
     Parts that a method does not have are left out.
     """
@@ -81,6 +82,8 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     yield _friction(record)
     if record.history is not None:
         yield _trend(record.history)
+    if (use := usage_section(record.usage, record.valve)) is not None:
+        yield use
     yield _record(record)
     yield _signature(record)
     drawing = result.drawing

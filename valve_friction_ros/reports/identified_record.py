@@ -6,6 +6,7 @@ from valve_friction_ros.health import Baseline, Diagnosis, FrictionLimits, diagn
 from valve_friction_ros.history import ValveHistory
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["IdentifiedRecord"]
 
@@ -34,6 +35,8 @@ class IdentifiedRecord:
         Record of the baseline, to be drawn beside this one.
     history : ValveHistory or None
         What was identified of this valve before.
+    usage : ValveUsage
+        What the valve has done.
     """
 
     name: str
@@ -45,6 +48,7 @@ class IdentifiedRecord:
     dated: str = ""
     healthy: Recording | None = field(default=None, repr=False)
     history: ValveHistory | None = field(default=None, repr=False)
+    usage: ValveUsage = field(default_factory=ValveUsage, repr=False)
 
     @property
     def recording(self) -> Recording:

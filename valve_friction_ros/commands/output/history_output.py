@@ -11,6 +11,11 @@ from typing import Any
 from rich.table import Table
 
 from valve_friction_ros.commands.output.formatting import plain_console
+from valve_friction_ros.commands.output.usage_output import (
+    alarms_as_json,
+    service_lines,
+    usage_as_json,
+)
 from valve_friction_ros.history import HistoryEntry, KeptBaseline, Trend, ValveHistory
 from valve_friction_ros.identification import (
     parameter_cells,
@@ -72,7 +77,7 @@ def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
 
 
 def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
-    """Build the object that JSON shows: valves, each with trend, baselines and entries."""
+    """Build the object that JSON shows: valves, each with what was kept of it."""
     return {
         "valves": [
             {
@@ -80,6 +85,8 @@ def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
                 "tag": history.valve.tag,
                 "trend": _trend_as_json(history.trend),
                 "baselines": [_shown(kept) for kept in history.baselines],
+                "usage": usage_as_json(history.usage),
+                "alarm_recordings": alarms_as_json(history.alarms),
                 "entries": [_shown(entry) for entry in history.entries],
             }
             for history in histories
@@ -186,6 +193,8 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             table.add_row(time, *_cells(row))
         console.print(table)
         for line in _trend_lines(history.trend):
+            console.print(line)
+        for line in service_lines(history.usage, history.alarms):
             console.print(line)
         console.print()
 

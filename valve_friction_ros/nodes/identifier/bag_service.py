@@ -1,5 +1,6 @@
 """``~/save``: the identifier's buffer as a bag."""
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -7,14 +8,16 @@ from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.model import Valve
 from valve_friction_ros.nodes.identifier.parameters import SAVE_FOLDER
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
 from valve_friction_ros.records.bags.libraries import bag_libraries
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.records.valve_keys import SETTINGS
+from valve_friction_ros.streams import Snapshot
 
-__all__ = ["saved_bag"]
+__all__ = ["bag_writer", "saved_bag"]
 
 
 async def saved_bag(
@@ -27,9 +30,26 @@ async def saved_bag(
     given = node.get_parameter(SAVE_FOLDER.name).value
     name = file_name(node, node.get_clock().now().nanoseconds)
     snapshot, settings = monitor.input()
-    described = {name: node.get_parameter(name).value for name in SETTINGS}
+    write_into = bag_writer(node, settings.valve, names)
 
     def write() -> Path:
+        with output_folder(given, "saved", "a bag") as folder:
+            return write_into(folder, name, snapshot)
+
+    return await done_in(worker, write)
+
+
+def bag_writer(
+    node: Node, valve: Valve, names: StreamNames
+) -> Callable[[Path, str, Snapshot], Path]:
+    """Return what writes a snapshot as a bag into a folder, by a name, in any thread.
+
+    It returns the path of the bag, and raises RefusalError if the libraries that bags need are not
+    there or the snapshot is empty, and OSError.
+    """
+    described = {name: node.get_parameter(name).value for name in SETTINGS}
+
+    def write(folder: Path, name: str, snapshot: Snapshot) -> Path:
         # Costs memory and time at the start, and most nodes never save.
         try:
             with bag_libraries():
@@ -37,7 +57,6 @@ async def saved_bag(
         except ValueError as error:
             raise RefusalError(str(error)) from None
 
-        with output_folder(given, "saved", "a bag") as folder:
-            return write_bag(folder, name, snapshot, names, settings.valve, described)
+        return write_bag(folder, name, snapshot, names, valve, described)
 
-    return await done_in(worker, write)
+    return write

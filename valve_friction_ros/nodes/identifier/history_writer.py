@@ -3,6 +3,7 @@
 import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput
 from valve_friction_ros.history import (
+    AlarmRecording,
     HistoryEntry,
     HistoryError,
     HistoryFile,
@@ -19,13 +21,16 @@ from valve_friction_ros.history import (
     KeptValve,
     Trend,
     ValveHistory,
+    alarm_recordings,
     current_trend,
     entry_of,
+    read_usage,
     valve_histories,
 )
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["HistoryWriter"]
 
@@ -61,6 +66,7 @@ class HistoryWriter:
         self._trend: Trend | None = None
         self._baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
+        self._under_way: list[Future[None]] = []
 
     @property
     def valve(self) -> KeptValve:
@@ -181,6 +187,39 @@ class HistoryWriter:
         with self._failures_remembered():
             await self._written(lambda file: file.set_baseline(self._valve, kept))
 
+    def usage(self) -> ValveUsage | None:
+        """Read what the valve has done; None without a file, or where it cannot be read."""
+        return self._tried(lambda file: read_usage(file, self._valve.name))
+
+    def last_alarm(self) -> AlarmRecording | None:
+        """Read the latest recording of an alarm, if any."""
+        found = self._tried(lambda file: alarm_recordings(file, self._valve.name))
+        return found[-1] if found else None
+
+    async def keep_change(self, change: Callable[[HistoryFile], None]) -> None:
+        """Make a change in the writer's thread, and wait until it is written."""
+        with self._failures_remembered():
+            await self._written(change)
+
+    def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
+        """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
+
+        A change that waits already is not made twice.
+        """
+        if self._file is None:
+            return
+        if change not in self._waiting:
+            self._waiting.append(change)
+        # A job that has begun may have looked for the last time.
+        if all(one.running() or one.done() for one in self._under_way):
+            self._under_way.append(self._writer.submit(self._write_waiting, self._file))
+
+    def settle(self) -> None:
+        """Take the outcomes of `keep_soon` that are there."""
+        while self._under_way and self._under_way[0].done():
+            with self._failures_remembered():
+                self._under_way.pop(0).result()
+
     def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
         """Return what computes the trend with the baseline and settings of now, in any thread."""
         monitor, name = self._monitor, self._valve.name
@@ -208,12 +247,15 @@ class HistoryWriter:
         self, file: HistoryFile, trend: Callable[[HistoryFile], Trend | None]
     ) -> Trend | None:
         """Write, in the writer's thread, all that waits."""
+        self._write_waiting(file)
+        return trend(file)
+
+    def _write_waiting(self, file: HistoryFile) -> None:
         while self._waiting:
             change = self._waiting[0]
             change(file)
             with contextlib.suppress(ValueError):  # given up meanwhile
                 self._waiting.remove(change)
-        return trend(file)
 
     def _complain(self, error: HistoryError | InternalError) -> None:
         if str(error) != self._problem:

@@ -12,6 +12,7 @@ from rclpy.parameter import Parameter
 
 from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
@@ -37,6 +38,7 @@ from valve_friction_ros.nodes.identifier.status import (
     friction_status,
     stuck_status,
 )
+from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.identifier.watch import Watch
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
@@ -99,7 +101,6 @@ class Identifier(PolledNode):
         self._estimate_topic = EstimateTopic(self)
         results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
-        self._watches: tuple[Watch, ...] = (ResponseWatch(self),)
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
@@ -111,6 +112,9 @@ class Identifier(PolledNode):
             results.publish(earlier, self._monitor)
         self._history.read_trend()
         self._alerts = Alerts(self, workers.alerts, tag, self._monitor.diagnosis().level)
+        self._usage = UsageWatch(self, self._monitor, self._history)
+        self._alarm = AlarmRecorder(self, self._monitor, self._history, self._usage, workers.files)
+        self._watches: tuple[Watch, ...] = (self._usage, ResponseWatch(self))
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
@@ -119,6 +123,7 @@ class Identifier(PolledNode):
             ("set_baseline", self._set_baseline, ""),
             ("restore_baseline", self._restore_baseline, ""),
             ("clear", self._clear, ""),
+            ("reset_usage", self._reset_usage, ""),
         ):
             create_trigger_service(self, f"~/{name}", work, waiting, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
@@ -131,8 +136,9 @@ class Identifier(PolledNode):
         )
 
     def destroy_node(self) -> None:
-        """Stop the clock's callback, then the node."""
+        """Stop the clock's callback, write what was counted, then stop the node."""
         self._jump_handle.unregister()
+        self._usage.close()
         super().destroy_node()
 
     def poll(self) -> None:
@@ -172,6 +178,7 @@ class Identifier(PolledNode):
     def _take_parameters(self, changes: list[Parameter]) -> None:
         self._inputs.take()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
+        self._usage.follow_parameters()
         self._baseline.follow_parameter(changes)
         self._schedule.follow()
 
@@ -226,7 +233,8 @@ class Identifier(PolledNode):
 
     async def _report(self) -> str:
         files = self._workers.files
-        return str(await written_report(self, self._monitor, self._history, files))
+        usage = self._usage.usage()
+        return str(await written_report(self, self._monitor, self._history, usage, files))
 
     async def _set_baseline(self) -> str:
         answer = await self._baseline.set()
@@ -242,6 +250,12 @@ class Identifier(PolledNode):
         self._inputs.take()
         self._monitor.buffer.clear("on request")
         return "the buffer is empty; estimate and baseline are kept"
+
+    async def _reset_usage(self) -> str:
+        self._inputs.take()
+        answer = await self._usage.reset()
+        self._publish_diagnostics()
+        return answer
 
     def _input_problems(self) -> list[str]:
         clock = self.get_clock()
@@ -262,6 +276,7 @@ class Identifier(PolledNode):
             self._history.trend,
         )
         self._estimate_topic.publish(estimate)
+        self._alarm.follow(estimate, self._inputs.names)
         status = friction_status(
             estimate,
             self._monitor,
@@ -270,6 +285,7 @@ class Identifier(PolledNode):
             self._history.problems,
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
+                **self._alarm.values(),
                 **self._history.values(),
                 **self._schedule.values(),
                 **self._readiness.values(),

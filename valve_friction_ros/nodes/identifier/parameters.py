@@ -21,12 +21,20 @@ from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT, VALVE_PARAMETERS, valve_from
 from valve_friction_ros.records.data_folder import history_file
 from valve_friction_ros.response import ResponseLimits
+from valve_friction_ros.usage import DEFAULT_BAND
 
 __all__ = [
+    "AIR_TO",
+    "ALARM_FOLDER",
+    "ALARM_MEGABYTES",
+    "ALARM_PAUSE",
+    "ALARM_RECORDING",
+    "ALARM_RECORDINGS",
     "BASELINE",
     "BASELINE_IN_ALARM",
     "CHANGEABLE",
     "COMMAND_UNIT",
+    "COUNTING_DEAD_BAND",
     "HISTORY_DAYS",
     "HISTORY_FILE",
     "IDENTIFICATION_LIMIT",
@@ -36,8 +44,10 @@ __all__ = [
     "PERIOD",
     "REPORT_FOLDER",
     "RESPONSE_LIMITS",
+    "REVERSAL_LIMIT",
     "SAVE_FOLDER",
     "TRAVEL",
+    "TRAVEL_LIMIT",
     "VALVE_TAG",
     "WEBHOOK_PERIOD",
     "WEBHOOK_URL",
@@ -152,6 +162,58 @@ WEBHOOK_PERIOD = ParameterSpec(
     "Least time from one posted change of the level to the next [s]; then the newest level counts",
     (0.0, 86400.0),
 )
+COUNTING_DEAD_BAND = ParameterSpec(
+    "counting_dead_band",
+    DEFAULT_BAND,
+    "Dead band of travelled distance, reversals and breakaways, as a share of the travel [-]; "
+    "raised where the sensor's noise or resolution demands more",
+    (1e-6, 0.5),
+)
+AIR_TO = ParameterSpec(
+    "air_to",
+    "open",
+    "Where the seat is [-]: open, air opens the valve, at position 0; close, at the travel",
+    choices=("open", "close"),
+)
+TRAVEL_LIMIT = ParameterSpec(
+    "travel_limit", 0.0, "Travelled distance of the life of a packing [m]; 0: no limit", (0.0, 1e9)
+)
+REVERSAL_LIMIT = ParameterSpec(
+    "reversal_limit", 0.0, "Reversals of the life of a packing [-]; 0: no limit", (0.0, 1e12)
+)
+USAGE_PARAMETERS = (COUNTING_DEAD_BAND, AIR_TO, TRAVEL_LIMIT, REVERSAL_LIMIT)
+
+ALARM_RECORDING = ParameterSpec(
+    "alarm_recording",
+    10.0,
+    "Time from a rise of the level until the buffer before and after it is saved [s]; 0: never",
+    (0.0, 600.0),
+)
+ALARM_FOLDER = ParameterSpec(
+    "alarm_folder",
+    "",
+    "Folder of these recordings [-]; empty: valve_friction_ros/alarms under ROS_HOME, or under "
+    "~/.ros",
+)
+ALARM_RECORDINGS = ParameterSpec(
+    "alarm_recordings", 20, "Recordings of a valve that are kept, the latest [-]", (1, 100_000)
+)
+ALARM_MEGABYTES = ParameterSpec(
+    "alarm_megabytes", 200.0, "Room that the recordings of a valve may take [MB]", (0.001, 1e6)
+)
+ALARM_PAUSE = ParameterSpec(
+    "alarm_pause",
+    600.0,
+    "Time after a recording in which only a higher level is recorded [s]",
+    (0.0, 31_557_600.0),
+)
+ALARM_PARAMETERS = (
+    ALARM_RECORDING,
+    ALARM_FOLDER,
+    ALARM_RECORDINGS,
+    ALARM_MEGABYTES,
+    ALARM_PAUSE,
+)
 
 CHANGEABLE = (
     *VALVE_PARAMETERS,
@@ -235,6 +297,8 @@ CHANGEABLE = (
     *RESPONSE_LIMITS,
     WEBHOOK_URL,
     WEBHOOK_PERIOD,
+    *USAGE_PARAMETERS,
+    *ALARM_PARAMETERS,
 )
 """Those that can be changed while the node runs."""
 
@@ -293,3 +357,7 @@ def require_valid(values: Mapping[str, Any]) -> None:
     require_valve_units(settings.valve, settings.identification.fixed)
     baseline_from(values)
     webhook_from(values)
+    if values[AIR_TO.name] not in AIR_TO.choices:
+        raise ValueError(
+            f"{AIR_TO.name} must be {' or '.join(AIR_TO.choices)}, got {values[AIR_TO.name]!r}"
+        )

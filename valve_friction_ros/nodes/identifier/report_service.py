@@ -1,5 +1,6 @@
 """``~/report``: a page on the identifier's last result."""
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
 from itertools import count
@@ -14,50 +15,72 @@ from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+from valve_friction_ros.usage import ValveUsage
 
-__all__ = ["written_report"]
+__all__ = ["report_writer", "written_report"]
 
 
 async def written_report(
-    node: Node, monitor: FrictionMonitor, history: HistoryWriter, worker: ThreadPoolExecutor
+    node: Node,
+    monitor: FrictionMonitor,
+    history: HistoryWriter,
+    usage: ValveUsage,
+    worker: ThreadPoolExecutor,
 ) -> Path:
     """Write a page on the last result, in a thread of `worker`; return its path.
 
     Raises RefusalError if there is no result, or the page cannot be written.
     """
+    write_page = report_writer(node, monitor, history, usage)
+    given = node.get_parameter(REPORT_FOLDER.name).value
+    name = file_name(node, monitor.stamp or 0)
+
+    def write() -> Path:
+        with output_folder(given, "reports", "a report") as folder:
+            folder.mkdir(parents=True, exist_ok=True)
+            path = _free_name(folder, name)
+            write_page(path)
+            return path
+
+    return await done_in(worker, write)
+
+
+def report_writer(
+    node: Node, monitor: FrictionMonitor, history: HistoryWriter, usage: ValveUsage
+) -> Callable[[Path], None]:
+    """Return what writes the page on the last result of now to a path, in any thread.
+
+    Raises RefusalError if there is no result; what it returns raises OSError.
+    """
     result, stamp, refusal = monitor.result, monitor.stamp, monitor.refusal
     if result is None or stamp is None:
         raise RefusalError("the valve has no result to report: identify it first")
     time = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
-    given, name = node.get_parameter(REPORT_FOLDER.name).value, file_name(node, stamp)
     title, node_name = history.valve.tag or node.get_name(), node.get_fully_qualified_name()
     baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
     healthy = None if kept is None or kept.baseline != baseline else kept.record
     notes = () if refusal is None else (f"a later record was refused: {refusal}",)
 
-    def write() -> Path:
+    def write(path: Path) -> None:
         # Costs memory and time at the start, and most nodes never report.
         from valve_friction_ros import reports  # noqa: PLC0415
 
-        with output_folder(given, "reports", "a report") as folder:
-            folder.mkdir(parents=True, exist_ok=True)
-            path = _free_name(folder, name)
-            before, unread = _read(history)
-            record = reports.IdentifiedRecord(
-                name=title,
-                source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
-                dated=f"identified {time:%Y-%m-%d %H:%M} UTC",
-                result=result,
-                baseline=baseline,
-                limits=limits,
-                notes=(*notes, *unread),
-                healthy=healthy,
-                history=before,
-            )
-            reports.write_report(reports.identification_report(record), path)
-            return path
+        before, unread = _read(history)
+        record = reports.IdentifiedRecord(
+            name=title,
+            source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
+            dated=f"identified {time:%Y-%m-%d %H:%M} UTC",
+            result=result,
+            baseline=baseline,
+            limits=limits,
+            notes=(*notes, *unread),
+            healthy=healthy,
+            history=before,
+            usage=usage,
+        )
+        reports.write_report(reports.identification_report(record), path)
 
-    return await done_in(worker, write)
+    return write
 
 
 def _read(history: HistoryWriter) -> tuple[ValveHistory | None, list[str]]:

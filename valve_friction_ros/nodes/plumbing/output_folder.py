@@ -10,7 +10,7 @@ from rclpy.node import Node
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.records.data_folder import data_folder
 
-__all__ = ["file_name", "output_folder"]
+__all__ = ["file_name", "output_folder", "valve_name"]
 
 
 @contextlib.contextmanager
@@ -31,7 +31,11 @@ def output_folder(given: str, usual: str, content: str) -> Iterator[Path]:
         raise RefusalError(f"cannot write {content} into {folder}: {cause}") from None
 
 
+def valve_name(node: Node) -> str:
+    """Name the node's valve as a part of file names."""
+    return node.get_namespace().strip("/").replace("/", "_") or node.get_name()
+
+
 def file_name(node: Node, stamp: int) -> str:
     """Name a file, without its ending, after the node's valve and a time (ns)."""
-    valve = node.get_namespace().strip("/").replace("/", "_") or node.get_name()
-    return f"{valve}_{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y%m%dT%H%M%SZ}"
+    return f"{valve_name(node)}_{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y%m%dT%H%M%SZ}"

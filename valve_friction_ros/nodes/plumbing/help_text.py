@@ -6,10 +6,10 @@ import yaml
 
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
 
-__all__ = ["usage"]
+__all__ = ["help_text"]
 
 
-def usage(name: str, purpose: str, specs: Iterable[ParameterSpec]) -> str:
+def help_text(name: str, purpose: str, specs: Iterable[ParameterSpec]) -> str:
     """Say how the executable `name` is run, and what its parameters mean."""
     lines = [
         f"usage: {name} [--ros-args [-r __ns:=/fv_101] [-p NAME:=VALUE] [--params-file FILE]]",

@@ -1,0 +1,119 @@
+"""The sub-command `history` on usage and alarm recordings."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from histories import DAY, OTHER, START, VALVE, success
+
+from valve_friction_ros.health import Level
+from valve_friction_ros.history import (
+    AlarmRecording,
+    HistoryFile,
+    keep_alarm_recording,
+    keep_renewal,
+    keep_usage,
+)
+from valve_friction_ros.usage import BINS, Usage, UsedDay
+
+FIRST = START // DAY
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Three days, a renewal after two of them; another valve that was never identified."""
+    history = HistoryFile(tmp_path_factory.mktemp("usage") / "history.sqlite")
+    history.add(success())
+    times = (3600 * 10**9, *[0] * (BINS - 2), 72_000 * 10**9)
+    for n, renewal in enumerate((0, 0, START + 2 * DAY)):
+        keep_usage(history, VALVE, "run", [UsedDay(FIRST + n, renewal, Usage(1.5, 10, 4, times))])
+    keep_renewal(history, VALVE, START + 2 * DAY)
+    keep_usage(history, OTHER, "run", [UsedDay(FIRST, 0, Usage(7.0, 1, 1, times))])
+    for n in range(2):
+        one = AlarmRecording(START + n, Level.ERROR, Path(f"/alarms/{n}"), "excess friction")
+        keep_alarm_recording(history, VALVE, one)
+    return history.path
+
+
+@pytest.fixture
+def run(file, command, capsys):
+    def call(*arguments):
+        try:
+            return command("history", file, *arguments)
+        except SystemExit as end:
+            code = end.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def test_below_the_list(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    code, output, errors = run()
+    assert (code, errors) == (0, "")
+    figures = "{} m of travel, {} reversals, {} breakaways in {} h of watching"
+    lines = output.splitlines()
+    new = figures.format("1.5", 10, 4, 21)
+    assert f"usage: {new}, since 2026-09-23 (packing renewed)" in lines
+    assert f"usage: {figures.format('4.5', 30, 12, 63)}, in all" in lines
+    assert "alarm recordings: 2, the latest 2026-09-21T14:13:20Z ERROR: /alarms/1" in lines
+
+
+def test_in_json(run):
+    (valve,) = json.loads(run("--json")[1])["valves"]
+    assert valve["usage"]["since_renewal"]["distance"] == 1.5
+    assert valve["usage"]["renewal"] == "2026-09-23T14:13:20Z"
+    assert [one["day"] for one in valve["usage"]["days"]] == [
+        "2026-09-21",
+        "2026-09-22",
+        "2026-09-23",
+    ]
+    assert valve["alarm_recordings"][1] == {
+        "time": "2026-09-21T14:13:20Z",
+        "level": "ERROR",
+        "path": "/alarms/1",
+        "message": "excess friction",
+    }
+
+
+def test_days(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    code, output, _ = run("--usage")
+    assert code == 0
+    lines = [" ".join(line.split()) for line in output.splitlines()]
+    assert "FV-101 /fv_101/identifier" in lines
+    assert "LV-7 /area_2/lv_7/identifier" in lines
+    assert "2026-09-22 1.5 10 4 21 1 not known" in lines
+    assert "2026-09-23 1.5 10 4 21 1 2026-09-23" in lines
+
+
+def test_days_in_json_and_csv(run, tmp_path):
+    path = tmp_path / "usage.csv"
+    options = ("--valve", "FV-101", "--since", "2026-09-22", "--until", "2026-09-22")
+    code, output, _ = run("--usage", "--json", "--csv", path, *options)
+    assert code == 0
+    (valve,) = json.loads(output)["valves"]
+    assert [one["day"] for one in valve["usage"]["days"]] == ["2026-09-22"]
+    with path.open(encoding="utf-8", newline="") as stream:
+        (row,) = csv.DictReader(stream)
+    assert (row["day"], row["tag"], row["packing_renewed"]) == ("2026-09-22", "FV-101", "")
+    assert float(row["distance_m"]) == 1.5
+    assert float(row["time_at_95_to_100_percent_s"]) == 72_000
+    times = [float(row[name]) for name in row if name.startswith("time_at_")]
+    assert sum(times) == float(row["time_watched_s"])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--usage", "--plot", "x.png"], "--usage: neither --plot nor --fail-on"),
+        (["--usage", "--since", "2027-01-01"], "no usage of these valves within these times"),
+    ],
+)
+def test_refused(run, options, words):
+    code, output, errors = run(*options)
+    assert (code, output) == (2, "")
+    assert errors.count("\n") == 1
+    assert words in errors

@@ -1,0 +1,27 @@
+"""The figure of a valve's usage shows the packing in use."""
+
+import pytest
+
+from valve_friction_ros.figures.usage_figure import usage_figure
+from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
+
+TIMES = (1, 3, *[0] * (BINS - 3), 4)
+
+
+def test_histogram_and_days():
+    days = [UsedDay(day, 0, Usage(9.0, 1, 1, TIMES)) for day in range(50)]
+    days += [UsedDay(50 + day, 7, Usage(1.0 + day, 1, 1, TIMES)) for day in range(3)]
+    figure = usage_figure(ValveUsage.of(days, renewal=7))
+    assert figure.get_figwidth() == pytest.approx(7.1)
+    places, distances = figure.axes
+    assert [bar.get_height() for bar in places.patches] == [12.5, 37.5, *[0] * (BINS - 3), 50]
+    assert [bar.get_x() for bar in places.patches] == [5 * n for n in range(BINS)]
+    assert [bar.get_height() for bar in distances.patches] == [1, 2, 3]
+    for axes in figure.axes:
+        assert "[" in axes.get_xlabel()
+        assert "[" in axes.get_ylabel()
+
+
+def test_nothing_to_draw():
+    with pytest.raises(ValueError, match="not watched"):
+        usage_figure(ValveUsage())

@@ -1,0 +1,132 @@
+"""Usage and alarm recordings in the history: kept once, in all and since the renewal."""
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+from histories import DAY, OTHER, START, VALVE, success
+
+from valve_friction_ros.health import Level
+from valve_friction_ros.history import (
+    AlarmRecording,
+    HistoryError,
+    HistoryFile,
+    alarm_recordings,
+    keep_alarm_recording,
+    keep_renewal,
+    keep_usage,
+    read_usage,
+    schema,
+    valve_histories,
+)
+from valve_friction_ros.usage import BINS, Usage, UsedDay
+
+TODAY = START // DAY
+
+
+def usage(distance, reversals=4, breakaways=2, hours=1):
+    return Usage(distance, reversals, breakaways, (hours * 3600 * 10**9, *[0] * (BINS - 1)))
+
+
+@pytest.fixture
+def history(tmp_path):
+    return HistoryFile(tmp_path / "history.sqlite")
+
+
+def test_a_day_is_kept_as_often_as_one_likes(history):
+    first, later = UsedDay(TODAY, 0, usage(1.0)), UsedDay(TODAY, 0, usage(2.5, 7))
+    for day in (first, first, later, later):
+        keep_usage(history, VALVE, "run 1", [day])
+    found = read_usage(history, VALVE.name)
+    assert found.days == (later,)
+    assert found.total == found.since_renewal == later.usage
+    assert read_usage(history, OTHER.name).days == ()
+
+
+def test_runs_of_a_day_add_up(history):
+    """Also where they have counted samples of the same stamps."""
+    for run in ("run 1", "run 2"):
+        keep_usage(history, VALVE, run, [UsedDay(TODAY, 0, usage(1.0))])
+    keep_usage(history, OTHER, "run 1", [UsedDay(TODAY, 0, usage(9.0))])
+    (day,) = read_usage(history, VALVE.name).days
+    assert day == UsedDay(TODAY, 0, usage(2.0, 8, 4, 2))
+
+
+def test_a_renewal_parts_a_day(history):
+    old = [UsedDay(TODAY - 1, 0, usage(1.0)), UsedDay(TODAY, 0, usage(2.0))]
+    keep_usage(history, VALVE, "run 1", old)
+    for _ in range(2):
+        keep_renewal(history, VALVE, START)
+    assert read_usage(history, VALVE.name).since_renewal == Usage()
+    keep_usage(history, VALVE, "run 1", [UsedDay(TODAY, START, usage(0.25))])
+    found = read_usage(history, VALVE.name)
+    assert found.renewal == START
+    assert found.since_renewal == usage(0.25)
+    assert found.total == usage(3.25, 12, 6, 3)
+
+
+def test_it_outlives_the_identifications(history):
+    keep_usage(history, VALVE, "run", [UsedDay(TODAY - 4000, 0, usage(1.0))])
+    history.add(success(), days=1.0)
+    assert read_usage(history, VALVE.name).total == usage(1.0)
+
+
+def test_alarm_recordings(history):
+    alarms = [
+        AlarmRecording(START + n, Level(1 + n), Path(f"/alarms/{n}"), "excess") for n in (0, 1)
+    ]
+    for one in reversed((*alarms, alarms[0])):
+        keep_alarm_recording(history, VALVE, one)
+    assert alarm_recordings(history, VALVE.name) == tuple(alarms)
+    assert alarm_recordings(history, OTHER.name) == ()
+    history.add(success())
+    (found,) = valve_histories(history, (VALVE,), 0, START + 1)
+    assert found.alarms == (alarms[0],)
+    assert alarms[0].to_dict()["level"] == "WARN"
+
+
+def make_version_5(history):
+    connection = sqlite3.connect(history.path)
+    for table in ("usage", "packing_renewal", "alarm_recording"):
+        connection.execute(f"DROP TABLE {table}")
+    connection.execute("PRAGMA user_version = 5")
+    connection.commit()
+    connection.close()
+
+
+def version(history):
+    connection = sqlite3.connect(history.path)
+    (number,) = connection.execute("PRAGMA user_version").fetchone()
+    connection.close()
+    return number
+
+
+def test_a_file_of_version_5_is_read_and_extended(history):
+    history.add(success())
+    make_version_5(history)
+    assert read_usage(history, VALVE.name).days == ()
+    assert alarm_recordings(history, VALVE.name) == ()
+    assert len(valve_histories(history, (VALVE,), 0, START + 1)) == 1
+    assert version(history) == 5
+    keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
+    assert version(history) == schema.SCHEMA_VERSION
+    assert read_usage(history, VALVE.name).total == usage(1.0)
+    assert len(history.entries()) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "read"),
+    [
+        ("usage SET histogram_ns = '[1]'", read_usage),
+        ("usage SET reversals = 'many'", read_usage),
+        ("alarm_recording SET level = 7", alarm_recordings),
+    ],
+)
+def test_rows_that_hold_nothing(history, change, read):
+    keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
+    keep_alarm_recording(history, VALVE, AlarmRecording(START, Level.WARN, Path("/a"), "x"))
+    connection = sqlite3.connect(history.path)
+    connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {change}")
+    connection.close()
+    with pytest.raises(HistoryError, match="a row holds no"):
+        read(history, VALVE.name)

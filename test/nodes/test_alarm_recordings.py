@@ -1,0 +1,193 @@
+"""Recordings of alarms over DDS: a bag and a page, bounded, named, also after a restart."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
+from records import quick_record
+
+from valve_friction_ros.history import HistoryFile, alarm_recordings
+from valve_friction_ros.model import HIGH_FRICTION
+
+NODE = f"{NAMESPACE}/identifier"
+ERROR = b"\x02"
+HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
+FAST = {"method": "refined", "alarm_recording": 0.1, "alarm_pause": 0.0}
+
+
+def baseline_set(live, parameters):
+    """Start a node with the healthy valve as its baseline."""
+    node = live.start_identifier({**FAST, **parameters})
+    live.client.identified(HEALTHY)
+    assert live.client.trigger("set_baseline").success
+    return node
+
+
+def recorded(client, before=None):
+    """Wait for another recording than the one before; its path."""
+    key = "alarm_recording"
+    values = client.status_values(
+        lambda one: values_of(one).get(key, before) != before, "a recording of the alarm"
+    )
+    return Path(values[key])
+
+
+def alarmed(client, before=None):
+    """Raise an alarm, and wait for its recording."""
+    client.identified(HEALTHY)
+    client.identified(TIGHT)
+    return recorded(client, before)
+
+
+def paged(client, path):
+    """Wait for the page of a recording; its text."""
+    page = Path(path) / "report.html"
+    client.wait_until(page.exists, f"{page}", timeout=100)
+    return page.read_text(encoding="utf-8")
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_an_alarm_is_recorded(live, tmp_path):
+    node = baseline_set(live, {"alarm_recording": 3.0})
+    client = live.client
+    message = client.identified(TIGHT)
+    assert client.statuses[-1][1].level == ERROR
+    assert "alarm_recording" not in client.last_values()  # what comes after is awaited
+    after = START + 5 * SECOND
+    client.send_record(TIGHT, after)
+    path = recorded(client)
+    assert path.parent == tmp_path / "valve_friction_ros" / "alarms"
+    assert path.name.startswith("alarm_fv_101_")
+    assert path.name.endswith("_ERROR")
+    values = client.last_values()
+    assert values["alarm_recording level"] == "ERROR"
+    assert values["alarm_recording [time]"][:10].count("-") == 2
+    assert "Excess friction" in paged(client, path)
+
+    # The whole bag has both records; the first alone gives what the node has said.
+    baseline = float(values["baseline_coulomb_friction [N]"])
+    command = [sys.executable, "-m", "valve_friction_ros", "identify", str(path), "--json"]
+    done = subprocess.run(
+        [*command, "--end", "4.995", "--baseline-coulomb-friction", f"{baseline}"],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["parameters"]["coulomb_friction"]["value"] == pytest.approx(
+        float(values["coulomb_friction [N]"]), rel=1e-6
+    )
+    assert told["diagnosis"]["level"] == "ERROR"
+    assert told["diagnosis"]["message"].partition(":")[0] == message.partition(":")[0]
+
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    (kept,) = client.wait_until(lambda: alarm_recordings(history, NODE), "a row of the alarm")
+    assert kept.path == path
+    assert kept.message.startswith("excess friction")
+
+    # It is named after a restart, whose level is none that has risen.
+    client.watched.clear()
+    node.kill()
+    live.nodes.remove(node)
+    client.statuses.clear()
+    live.start_identifier(FAST)
+    status = client.next_status()
+    assert status.level == ERROR
+    assert values_of(status)["alarm_recording"] == str(path)
+    client.next_status()
+    client.next_status()
+    assert names(path.parent) == [path.name]
+
+
+def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
+    folder = tmp_path / "plant" / "alarms"
+    others = [
+        "alarm_fv_101_20200101T000000Z_ERROR",  # with a note in it
+        "alarm_fv_1_20200101T000000Z_ERROR",  # of another valve
+        "alarm_fv_101_notes",
+    ]
+    for name in others:
+        (folder / name).mkdir(parents=True)
+        (folder / name / "metadata.yaml").touch()
+    (folder / others[0] / "note.txt").touch()
+    baseline_set(live, {"alarm_folder": str(folder), "alarm_recordings": 2})
+    client, path, paths = live.client, None, []
+    for _ in range(4):
+        path = str(alarmed(client, path))
+        paged(client, path)
+        paths.append(Path(path).name)
+    assert len(set(paths)) == 4
+    assert names(folder) == sorted([*others, *paths[-2:]])
+    size = sum(one.stat().st_size for one in Path(path).iterdir())
+
+    (done,) = client.set_parameters(NODE, {"alarm_megabytes": 1.5 * size / 1e6})
+    assert done.successful
+    path = str(alarmed(client, path))
+    expected = sorted([*others, Path(path).name])
+    client.wait_until(lambda: names(folder) == expected, "one recording", timeout=100)
+    assert "Excess friction" in paged(client, path)
+    (done,) = client.set_parameters(NODE, {"alarm_megabytes": 0.001})
+    assert done.successful
+    client.identified(HEALTHY)
+    client.identified(TIGHT)
+    told = client.status_values(lambda one: "alarm_recording problem" in values_of(one), "no room")[
+        "alarm_recording problem"
+    ]
+    assert "MB has no room in alarm_megabytes (0.001): raise it" in told
+    assert names(folder) == sorted(others)
+
+
+def test_a_level_that_flaps_is_recorded_once(live):
+    baseline_set(live, {"alarm_pause": 3600.0})
+    client = live.client
+    path = alarmed(client)
+    for _ in range(2):
+        client.identified(HEALTHY)
+        client.identified(TIGHT)
+    client.next_status()
+    client.next_status()
+    assert names(path.parent) == [path.name]
+
+
+@pytest.mark.parametrize("switched_off", [{"alarm_recording": 0.0}, {"input_timeout": 0.1}])
+def test_what_is_not_recorded(live, tmp_path, switched_off):
+    """Nothing where it is switched off, and nothing for inputs that are silent."""
+    live.start_identifier({**FAST, **switched_off})
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    if "alarm_recording" in switched_off:
+        client.identified(TIGHT)
+    else:
+        client.next_status(lambda one: one.level == b"\x01", "silent inputs")
+    client.next_status()
+    client.next_status()
+    assert "alarm_recording" not in client.last_values()
+    assert not (tmp_path / "valve_friction_ros" / "alarms").exists()
+
+
+def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
+    (tmp_path / "file").touch()
+    baseline_set(live, {"alarm_folder": str(tmp_path / "file" / "alarms")})
+    client = live.client
+    client.identified(TIGHT)
+    values = client.status_values(
+        lambda one: "alarm_recording problem" in values_of(one), "what hindered it"
+    )
+    assert values["alarm_recording problem"] == (
+        "the alarm was not recorded: cannot write an alarm's recording into "
+        f"{tmp_path / 'file' / 'alarms'}: Not a directory"
+    )
+    (done,) = client.set_parameters(NODE, {"alarm_folder": str(tmp_path / "alarms")})
+    assert done.successful
+    assert alarmed(client).parent == tmp_path / "alarms"
+    assert "alarm_recording problem" not in client.last_values()

@@ -1,0 +1,44 @@
+"""``--help`` of the nodes: how to run them, and their parameters, without starting ROS."""
+
+import subprocess
+import sys
+
+import pytest
+import yaml
+from live_nodes import PROJECT
+
+_START = """
+import sys
+import rclpy
+def refuse(*_, **__):
+    raise AssertionError("ROS was started")
+rclpy.init = refuse
+from valve_friction_ros.nodes import start
+sys.exit(getattr(start, sys.argv[1])())
+"""
+
+
+@pytest.mark.parametrize("option", ["-h", "--help"])
+@pytest.mark.parametrize(
+    ("node", "parameter", "default"),
+    [
+        ("identifier", "window", 60.0),
+        ("identifiers", "valves", [""]),
+        ("simulator", "joint", "stem"),
+        ("pressure_source", "excitation", "square"),
+    ],
+)
+def test_help_ends_well_and_names_the_parameters(node, parameter, default, option):
+    done = subprocess.run(
+        [sys.executable, "-c", _START, node, option],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    first, *rest = done.stdout.splitlines()
+    assert first.startswith(f"usage: {node} [--ros-args ")
+    listed = yaml.safe_load("\n".join(line for line in rest if line.startswith("  ")))
+    assert listed[parameter] == default

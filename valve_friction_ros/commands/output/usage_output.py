@@ -1,0 +1,147 @@
+"""How the usage of valves is shown: as lines, as a table of days, as JSON, and as CSV."""
+
+import csv
+import io
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from valve_friction_ros.commands.output.formatting import plain_console
+from valve_friction_ros.history import AlarmRecording, KeptValve
+from valve_friction_ros.outside_text import harmless, printable
+from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.usage import BINS, DAY, Usage, UsedDay, ValveUsage
+
+__all__ = [
+    "alarms_as_json",
+    "print_usage",
+    "service_lines",
+    "usage_as_json",
+    "write_usage",
+]
+
+_HOUR = 3600e9
+
+
+def _date(time: int) -> str:
+    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d}"
+
+
+def _time(time: int) -> str:
+    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%dT%H:%M:%SZ}"
+
+
+def usage_as_json(usage: ValveUsage) -> dict[str, Any] | None:
+    """Return the usage as a mapping, with its times as text; None where nothing was counted."""
+    if not usage.days and not usage.renewal:
+        return None
+    shown = usage.to_dict()
+    shown["renewal"] = _time(usage.renewal) if usage.renewal else None
+    for one in shown["days"]:
+        one["day"] = _date(one["day"])
+        one["renewal"] = _time(one["renewal"]) if one["renewal"] else None
+    return shown
+
+
+def alarms_as_json(alarms: Sequence[AlarmRecording]) -> list[dict[str, Any]]:
+    """Return the recordings of alarms as mappings, with their times as text."""
+    return [{**one.to_dict(), "time": _time(one.time)} for one in alarms]
+
+
+def service_lines(usage: ValveUsage, alarms: Sequence[AlarmRecording]) -> list[str]:
+    """Return what stands below the list of a valve: its usage, and its latest alarm recording."""
+    lines = []
+    if usage.days:
+        since = f"since {_date(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
+        lines.append(f"usage: {_words(usage.since_renewal)}, {since}")
+        if usage.renewal:
+            lines.append(f"usage: {_words(usage.total)}, in all")
+    if alarms:
+        last = alarms[-1]
+        lines.append(
+            f"alarm recordings: {len(alarms)}, the latest {_time(last.time)} {last.level.name}: "
+            f"{printable(str(last.path))}"
+        )
+    return lines
+
+
+def _words(usage: Usage) -> str:
+    return (
+        f"{usage.distance:.5g} m of travel, {usage.reversals} reversals, {usage.breakaways} "
+        f"breakaways in {usage.time_watched / _HOUR:.4g} h of watching"
+    )
+
+
+def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
+    """Print a table of days a valve, and the sums and the pace below it."""
+    console = plain_console()
+    for valve, usage in valves:
+        tag = f"{valve.tag} " if valve.tag else ""
+        names = ("travel [m]", "reversals", "breakaways", "watched [h]", "near 0 [h]")
+        table = Table(
+            "day [UTC]",
+            *names,
+            "packing of",
+            box=None,
+            header_style="bold",
+            title=printable(f"{tag}{valve.name}"),
+            title_justify="left",
+        )
+        for column in table.columns[1:-1]:
+            column.justify = "right"
+        for one in usage.days:
+            table.add_row(
+                _date(one.day * DAY),
+                f"{one.usage.distance:.5g}",
+                str(one.usage.reversals),
+                str(one.usage.breakaways),
+                f"{one.usage.time_watched / _HOUR:.4g}",
+                f"{one.usage.time_near_seat() / _HOUR:.4g}",
+                _date(one.renewal) if one.renewal else "not known",
+            )
+        console.print(table)
+        for line in service_lines(usage, ()):
+            console.print(line)
+        if (pace := usage.pace()) is not None:
+            console.print(
+                f"pace of the last days: {pace.distance:.4g} m and {pace.reversals:.4g} reversals "
+                "in a day of watching"
+            )
+        console.print()
+
+
+def write_usage(path: Path, valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
+    """Write a row for each day of each valve, oldest first.
+
+    Raises OSError if it cannot be written; it names `path`, and no part of the table stays.
+    """
+    rows = [_row(valve, one) for valve, usage in valves for one in usage.days]
+    text = io.StringIO()
+    writer = csv.DictWriter(
+        text, _row(KeptValve("", ""), UsedDay(0, 0, Usage())), lineterminator="\n"
+    )
+    writer.writeheader()
+    writer.writerows({name: harmless(value) for name, value in row.items()} for row in rows)
+    write_whole(path, text.getvalue().encode())
+
+
+def _row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
+    width = 100 // BINS
+    times = {
+        f"time_at_{n * width}_to_{(n + 1) * width}_percent_s": time / 1e9
+        for n, time in enumerate(one.usage.histogram)
+    }
+    return {
+        "day": _date(one.day * DAY),
+        "valve": valve.name,
+        "tag": valve.tag,
+        "packing_renewed": _time(one.renewal) if one.renewal else None,
+        "distance_m": one.usage.distance,
+        "reversals": one.usage.reversals,
+        "breakaways": one.usage.breakaways,
+        "time_watched_s": one.usage.time_watched / 1e9,
+        **times,
+    }

@@ -1,0 +1,36 @@
+"""The tables of the valve in service: its usage, and the recordings of its alarms."""
+
+__all__ = ["ALARM_RECORDINGS", "USAGE"]
+
+USAGE = """
+CREATE TABLE usage (
+    valve_id INTEGER NOT NULL REFERENCES valve,
+    renewal_ns INTEGER NOT NULL,
+    day INTEGER NOT NULL,
+    run TEXT NOT NULL,
+    distance REAL NOT NULL CHECK (distance >= 0),
+    reversals INTEGER NOT NULL CHECK (reversals >= 0),
+    breakaways INTEGER NOT NULL CHECK (breakaways >= 0),
+    time_watched_ns INTEGER NOT NULL CHECK (time_watched_ns >= 0),
+    histogram_ns TEXT NOT NULL,
+    PRIMARY KEY (valve_id, renewal_ns, day, run)
+) WITHOUT ROWID;
+CREATE TABLE packing_renewal (
+    valve_id INTEGER NOT NULL REFERENCES valve,
+    time_ns INTEGER NOT NULL,
+    PRIMARY KEY (valve_id, time_ns)
+) WITHOUT ROWID;
+"""
+"""A row for each day (since 1970, UTC) of each run of an identifier, with the packing in use."""
+
+ALARM_RECORDINGS = """
+CREATE TABLE alarm_recording (
+    valve_id INTEGER NOT NULL REFERENCES valve,
+    time_ns INTEGER NOT NULL,
+    level INTEGER NOT NULL CHECK (level BETWEEN 0 AND 2),
+    path TEXT NOT NULL,
+    message TEXT NOT NULL,
+    PRIMARY KEY (valve_id, path)
+) WITHOUT ROWID;
+"""
+"""A row for each alarm that was recorded."""

@@ -1,0 +1,89 @@
+"""The usage of valves in the history: a row a day, and the renewals of the packing."""
+
+import json
+import sqlite3
+from collections.abc import Iterable
+
+from valve_friction_ros.history.entry import KeptValve
+from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.rows import valve_id
+from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
+from valve_friction_ros.usage import Usage, UsedDay, ValveUsage
+
+__all__ = ["keep_renewal", "keep_usage", "read_usage"]
+
+
+def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[UsedDay]) -> None:
+    """Keep what a run of an identifier has counted on some days; `run` is a name of its own.
+
+    The usage of a day is that of the whole run: it takes the place of what the run has kept of this
+    day before, so that keeping it twice changes nothing. Raises HistoryError if it cannot be
+    written.
+    """
+    with writing(file.path) as connection:
+        row = valve_id(connection, valve)
+        for day, renewal, usage in days:
+            connection.execute(
+                "INSERT INTO usage (valve_id, renewal_ns, day, run, distance, reversals, "
+                "breakaways, time_watched_ns, histogram_ns) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
+                "ON CONFLICT (valve_id, renewal_ns, day, run) DO UPDATE SET "
+                "distance = excluded.distance, reversals = excluded.reversals, "
+                "breakaways = excluded.breakaways, time_watched_ns = excluded.time_watched_ns, "
+                "histogram_ns = excluded.histogram_ns",
+                (
+                    row,
+                    renewal,
+                    day,
+                    run,
+                    usage.distance,
+                    usage.reversals,
+                    usage.breakaways,
+                    usage.time_watched,
+                    json.dumps(usage.histogram),
+                ),
+            )
+
+
+def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
+    """Keep that the packing of a valve was renewed at a time, ns since 1970 (UTC).
+
+    Raises HistoryError if it cannot be written.
+    """
+    with writing(file.path) as connection:
+        connection.execute(
+            "INSERT OR IGNORE INTO packing_renewal (valve_id, time_ns) VALUES (?, ?)",
+            (valve_id(connection, valve), time),
+        )
+
+
+def read_usage(file: HistoryFile, valve: str) -> ValveUsage:
+    """Return the usage of the valve of this name; an older file holds none.
+
+    Raises HistoryError if the file cannot be read.
+    """
+    with reading(file.path) as connection:
+        if not has_table(connection, "usage"):
+            return ValveUsage()
+        connection.row_factory = sqlite3.Row
+        rows = connection.execute(
+            "SELECT usage.* FROM usage JOIN valve ON valve.id = valve_id WHERE name = ?", (valve,)
+        ).fetchall()
+        (renewal,) = connection.execute(
+            "SELECT max(time_ns) FROM packing_renewal JOIN valve ON valve.id = valve_id "
+            "WHERE name = ?",
+            (valve,),
+        ).fetchone()
+    try:
+        return ValveUsage.of(map(_day, rows), renewal or 0)
+    except (TypeError, ValueError) as error:
+        raise HistoryError(f"{file.path}: a row holds no usage: {error}") from None
+
+
+def _day(row: sqlite3.Row) -> UsedDay:
+    usage = Usage(
+        row["distance"],
+        row["reversals"],
+        row["breakaways"],
+        tuple(json.loads(row["histogram_ns"])),
+    )
+    return UsedDay(row["day"], row["renewal_ns"], usage)

@@ -1,0 +1,81 @@
+"""The folder of alarm recordings: their names, and how many of them stay."""
+
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+
+from valve_friction_ros.health import Level
+
+__all__ = ["PAGE", "recording_name", "remove_oldest", "remove_recording", "size_of"]
+
+PAGE = "report.html"
+"""The page of the report, in the folder of the bag."""
+
+_CONTENT = re.compile(rf"metadata\.yaml|valve\.yaml|(\.\d+_)?{re.escape(PAGE)}|.+\.mcap")
+"""Files of a recording, and the draft of a page. A folder that holds any other file is left."""
+_STALE = 86_400.0
+"""Age, s, from which an unfinished bag is what a killed node has left."""
+
+
+def recording_name(valve: str, stamp: int, level: Level) -> str:
+    """Name the recording of a valve whose level has risen at a time, ns."""
+    date = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
+    return f"alarm_{valve}_{date:%Y%m%dT%H%M%SZ}_{level.name}"
+
+
+def size_of(recording: Path) -> int:
+    """Return the bytes of the files of a recording."""
+    return sum(one.stat().st_size for one in recording.iterdir())
+
+
+def remove_recording(recording: Path) -> None:
+    """Remove the files of a recording, and its folder if nothing else is in it."""
+    for one in recording.iterdir():
+        if _CONTENT.fullmatch(one.name):
+            one.unlink()
+    recording.rmdir()
+
+
+def remove_oldest(
+    folder: Path, valve: str, most: int, most_bytes: float, new: Path | None = None
+) -> None:
+    """Remove the oldest recordings of a valve until few enough, and small enough, are left.
+
+    Only folders by the name of such a recording count that hold the files of one and no others. The
+    `new` one counts and stays. What a killed node has left of this valve goes after a day. Raises
+    OSError if something cannot be removed.
+    """
+    pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(?:WARN|ERROR)(?:_(\d+))?")
+    found: dict[Path, tuple[str, int]] = {}
+    for place in _folders(folder):
+        if (name := pattern.fullmatch(place.name)) and _is_recording(place):
+            found[place] = name[1], int(name[2] or 1)
+        elif place.name.startswith(".saving_") and _is_left(place, pattern):
+            shutil.rmtree(place)
+    oldest = sorted(found, key=lambda place: (place == new, found[place]))
+    sizes = [size_of(place) for place in oldest]
+    while oldest and oldest[0] != new and (len(oldest) > most or sum(sizes) > most_bytes):
+        remove_recording(oldest.pop(0))
+        sizes.pop(0)
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        for place in sorted(folder.iterdir()):
+            if place.is_dir() and not place.is_symlink():
+                yield place
+
+
+def _is_recording(place: Path) -> bool:
+    names = {one.name for one in place.iterdir()}
+    return "metadata.yaml" in names and all(map(_CONTENT.fullmatch, names))
+
+
+def _is_left(workplace: Path, pattern: re.Pattern[str]) -> bool:
+    """Return whether a killed node has left an unfinished bag by such a name there."""
+    names = [one.name for one in workplace.iterdir()]
+    is_old = time.time() - workplace.stat().st_mtime > _STALE
+    return is_old and len(names) == 1 and pattern.fullmatch(names[0]) is not None

@@ -1,0 +1,229 @@
+"""A bag, and the page of the report, of the time before and after a rise of the level."""
+
+import time
+from concurrent.futures import Future
+from datetime import datetime, timezone
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+
+from valve_friction_ros.health import FrictionMonitor, Level
+from valve_friction_ros.history import AlarmRecording, keep_alarm_recording
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.alarm_folder import (
+    PAGE,
+    recording_name,
+    remove_oldest,
+    remove_recording,
+    size_of,
+)
+from valve_friction_ros.nodes.identifier.bag_service import bag_writer
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.parameters import (
+    ALARM_FOLDER,
+    ALARM_MEGABYTES,
+    ALARM_PAUSE,
+    ALARM_RECORDING,
+    ALARM_RECORDINGS,
+)
+from valve_friction_ros.nodes.identifier.report_service import report_writer
+from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
+from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name
+from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.records.bags.topics import StreamNames
+from valve_friction_ros.streams import Samples, Snapshot, nanoseconds
+
+__all__ = ["AlarmRecorder"]
+
+_LATE = 1.0
+"""Time, s, for which samples may be late before a recording ends without them."""
+
+
+class _Rise(NamedTuple):
+    """A rise of the level: the level, when, what was said, and the buffer of that time."""
+
+    level: Level
+    time: int
+    message: str
+    before: Snapshot
+    newest: int | None
+    clock: float
+
+
+class AlarmRecorder:
+    """Saves the buffer from before and after a rise of the level, one at a time.
+
+    The level is that of what is found on the valve: silent inputs and a history that cannot be
+    written do not count. The level at the start is none that has risen. After a rise, others are
+    recorded for a pause only if they reach a higher level, so that a level that flaps fills no
+    disk. The worker writes; the executor's thread looks for the outcome once a second.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        monitor: FrictionMonitor,
+        history: HistoryWriter,
+        usage: UsageWatch,
+        worker: Worker,
+    ) -> None:
+        self._node, self._monitor, self._history = node, monitor, history
+        self._usage, self._worker = usage, worker
+        self._level: Level | None = None
+        self._rise: _Rise | None = None
+        self._last_rise: _Rise | None = None
+        self._bag: Future[AlarmRecording] | None = None
+        self._page: Future[str | None] | None = None
+        self._latest = history.last_alarm()
+        self._problem: str | None = None
+
+    def follow(self, status: DiagnosticStatus, names: StreamNames) -> None:
+        """Follow what is found on the valve; begin and end recordings."""
+        level, before = Level(status.level[0]), self._level
+        self._level = level
+        self._settle()
+        if before is not None and level > before:
+            self._risen(level, status.message)
+        is_writing = self._bag is not None or self._page is not None
+        if self._rise is not None and not is_writing and self._is_over(self._rise):
+            self._write_bag(self._rise, names)
+            self._rise = None
+
+    def values(self) -> dict[str, str]:
+        """Return the latest recording, and what hindered one since."""
+        values: dict[str, str] = {}
+        if self._latest is not None:
+            risen = datetime.fromtimestamp(self._latest.time / 1e9, timezone.utc)
+            values["alarm_recording"] = str(self._latest.path)
+            values["alarm_recording [time]"] = f"{risen:%Y-%m-%dT%H:%M:%SZ}"
+            values["alarm_recording level"] = self._latest.level.name
+        if self._problem is not None:
+            values["alarm_recording problem"] = self._problem
+        return values
+
+    def _parameter(self, name: str) -> float:
+        return float(self._node.get_parameter(name).value)
+
+    def _risen(self, level: Level, message: str) -> None:
+        last, now = self._last_rise, time.monotonic()
+        if self._parameter(ALARM_RECORDING.name) <= 0:
+            return
+        if self._rise is not None:
+            level = max(level, self._rise.level)
+            self._rise = self._rise._replace(level=level, message=message)
+            self._last_rise = self._rise._replace(before=_NOTHING)
+            return
+        pause = self._parameter(ALARM_PAUSE.name)
+        if last is not None and now - last.clock < pause and level <= last.level:
+            return
+        buffer, stamp = self._monitor.buffer, self._node.get_clock().now().nanoseconds
+        self._rise = _Rise(level, stamp, message, buffer.snapshot(), buffer.newest_stamp, now)
+        self._last_rise = self._rise._replace(before=_NOTHING)
+
+    def _is_over(self, rise: _Rise) -> bool:
+        """Whether the time after a rise is over: by the stamps, or else by the machine's clock."""
+        after = min(self._parameter(ALARM_RECORDING.name), self._monitor.settings.window)
+        before, newest = rise.newest, self._monitor.buffer.newest_stamp
+        if before is not None and newest is not None and newest - before >= nanoseconds(after):
+            return True
+        return time.monotonic() - rise.clock >= after + _LATE
+
+    def _write_bag(self, rise: _Rise, names: StreamNames) -> None:
+        node = self._node
+        after, settings = self._monitor.input()
+        given = node.get_parameter(ALARM_FOLDER.name).value
+        most, room = self._bounds()
+        valve, samples = valve_name(node), _joined(rise.before, after)
+        name = recording_name(valve, rise.time, rise.level)
+        write = bag_writer(node, settings.valve, names)
+
+        def write_bag() -> AlarmRecording:
+            with output_folder(given, "alarms", "an alarm's recording") as folder:
+                remove_oldest(folder, valve, most - 1, room)
+                path = write(folder, name, samples)
+                size = size_of(path)
+                if size > room:
+                    remove_recording(path)
+                    raise RefusalError(
+                        f"a bag of {size / 1e6:.3g} MB has no room in {ALARM_MEGABYTES.name} "
+                        f"({room / 1e6:g}): raise it"
+                    )
+                remove_oldest(folder, valve, most, room, new=path)
+            return AlarmRecording(rise.time, rise.level, path, rise.message)
+
+        self._bag = self._worker.submit(write_bag)
+
+    def _write_page(self, path: Path) -> None:
+        """Write the page into the folder of the bag; it may take its time, and the bag is there."""
+        try:
+            write = report_writer(self._node, self._monitor, self._history, self._usage.usage())
+        except RefusalError:
+            return  # an alarm from before a restart has no result
+        valve, (most, room), page = valve_name(self._node), self._bounds(), path / PAGE
+
+        def write_page() -> str | None:
+            try:
+                write(page)
+                if size_of(path) > room:
+                    page.unlink()
+                    return f"{page} has no room in {ALARM_MEGABYTES.name}: raise it"
+                remove_oldest(path.parent, valve, most, room, new=path)
+            except OSError as error:
+                return f"{page} was not written: {error.strerror or error}"
+            return None
+
+        self._page = self._worker.submit(write_page)
+
+    def _bounds(self) -> tuple[int, float]:
+        """Return how many recordings stay, and their room, bytes."""
+        most = int(self._parameter(ALARM_RECORDINGS.name))
+        return most, 1e6 * self._parameter(ALARM_MEGABYTES.name)
+
+    def _settle(self) -> None:
+        """Take the outcome of what was written, if it has ended."""
+        try:
+            with bugs_reported(self._node, known=self._problem):
+                if self._page is not None and self._page.done():
+                    page, self._page = self._page, None
+                    self._problem = page.result()
+                if self._bag is not None and self._bag.done():
+                    bag, self._bag = self._bag, None
+                    self._saved(bag.result())
+        except (RefusalError, InternalError) as error:
+            self._problem = f"the alarm was not recorded: {error}"
+            self._node.get_logger().warning(self._problem)
+
+    def _saved(self, recording: AlarmRecording) -> None:
+        self._latest, self._problem = recording, None
+        self._node.get_logger().info(f"the alarm is recorded: {recording.path}")
+        valve = self._history.valve
+        self._history.keep_soon(partial(keep_alarm_recording, valve=valve, one=recording))
+        self._write_page(recording.path)
+
+
+_EMPTY = Samples(np.empty(0, np.int64), np.empty(0))
+_NOTHING = Snapshot(_EMPTY, _EMPTY, (), None)
+
+
+def _joined(before: Snapshot, after: Snapshot) -> Snapshot:
+    """Join two copies of a buffer; what came after a jump back of the clock is left out."""
+    return after._replace(
+        pressure=_following(before.pressure, after.pressure),
+        position=_following(before.position, after.position),
+        rejections=tuple(dict.fromkeys((*before.rejections, *after.rejections))),
+    )
+
+
+def _following(before: Samples, after: Samples) -> Samples:
+    if not before.stamps.size:
+        return after
+    new = slice(int(np.searchsorted(after.stamps, before.stamps[-1], side="right")), None)
+    return Samples(
+        np.concatenate((before.stamps, after.stamps[new])),
+        np.concatenate((before.values, after.values[new])),
+    )

@@ -1,0 +1,251 @@
+"""The usage of the valve: counted from the stem, kept in the history, shown, and limited."""
+
+import contextlib
+import math
+import time
+import uuid
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
+
+from rclpy.node import Node
+
+from valve_friction_ros.health import Finding, FrictionMonitor, Level, StatusSignal
+from valve_friction_ros.history import HistoryError, HistoryFile, keep_renewal, keep_usage
+from valve_friction_ros.history.usage_rows import read_usage
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.parameters import (
+    AIR_TO,
+    COUNTING_DEAD_BAND,
+    REVERSAL_LIMIT,
+    TRAVEL_LIMIT,
+)
+from valve_friction_ros.streams import Arrivals, Kind
+from valve_friction_ros.usage import (
+    LimitState,
+    Pace,
+    Usage,
+    UsageCounter,
+    UsageLimits,
+    UsedDay,
+    ValveUsage,
+    limit_states,
+)
+
+__all__ = ["UsageWatch"]
+
+_WRITE_EVERY = 60.0
+"""Time between two writings, s: of the stamps, or of silence. A killed node loses so much."""
+_MOST_DAYS = 62
+"""Days of this run that are held one by one."""
+
+
+def _date(stamp: int) -> str:
+    return f"{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y-%m-%d}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.9g}"
+
+
+class UsageWatch:
+    """Counts what the valve does; satisfies `Watch`.
+
+    What this run has counted is kept under a name of its own, so that it can be written again
+    without being counted twice; what earlier runs have kept is added to it.
+    """
+
+    def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
+        self._node, self._monitor, self._history = node, monitor, history
+        self._run = uuid.uuid4().hex
+        self._counter: UsageCounter | None = None
+        self._counted_with: tuple[float, float] | None = None
+        self._own: dict[tuple[int, int], Usage] = {}
+        self._unwritten: dict[tuple[int, int], Usage] = {}
+        self._written: dict[tuple[int, int], Usage] = {}
+        self._written_stamp: int | None = None
+        self._written_at = time.monotonic()
+        found = history.usage()
+        self._earlier = None if found is None else found.condensed()
+        self._found_late: ValveUsage | None = None
+        self._renewal = 0 if found is None else found.renewal
+        self._total = self._since_renewal = Usage()
+        self._pace: Pace | None = None
+        self.follow_parameters()
+        self._add_up()
+
+    def follow_parameters(self) -> None:
+        """Count with the travel and the dead band in force."""
+        travel = self._monitor.settings.valve.travel
+        wanted = travel, float(self._node.get_parameter(COUNTING_DEAD_BAND.name).value)
+        if wanted == self._counted_with:
+            return
+        self._gather(is_end=True)
+        self._counted_with = wanted
+        self._counter = UsageCounter(*wanted) if math.isfinite(travel) else None
+
+    def take(self, arrivals: Arrivals) -> None:
+        """Count positions; write now and then."""
+        if self._counter is None:
+            return
+        samples = arrivals.samples(Kind.POSITION)
+        self._counter.add(samples)
+        if samples.stamps.size:
+            newest = int(samples.stamps[-1])
+            if self._written_stamp is None:
+                self._written_stamp = newest
+            if abs(newest - self._written_stamp) >= _WRITE_EVERY * 1e9:
+                self._written_stamp = newest
+                self._keep()
+
+    def findings(self) -> Sequence[Finding]:
+        """Return the limits that are reached, or will be soon."""
+        self._gather()
+        return [
+            Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, state.message)
+            for state in self._states()
+            if state.warns
+        ]
+
+    def values(self) -> Mapping[str, str]:
+        """Return the figures since the packing was renewed, and in all."""
+        self._history.settle()
+        self._gather()
+        if time.monotonic() - self._written_at >= _WRITE_EVERY and self._unwritten:
+            self._keep()
+        if self._counter is None:
+            return {"usage": "not counted, as the travel is not finite: set travel"}
+        used, everything, travel = self._since_renewal, self._total, self._travel
+        at_travel = self._node.get_parameter(AIR_TO.name).value == "close"
+        values = {
+            "packing_renewed [date]": _date(self._renewal) if self._renewal else "not known",
+            "travelled_distance [m]": _number(used.distance),
+            "travelled_distance in all [m]": _number(everything.distance),
+            "reversals": str(used.reversals),
+            "reversals in all": str(everything.reversals),
+            "strokes": _number(used.strokes(travel)),
+            "breakaways": str(used.breakaways),
+            "time_watched [s]": _number(used.time_watched / 1e9),
+            "time_watched in all [s]": _number(everything.time_watched / 1e9),
+            "time_near_seat [s]": _number(used.time_near_seat(at_travel) / 1e9),
+            "travel_histogram [s]": ", ".join(f"{one / 1e9:.6g}" for one in used.histogram),
+            "counting_dead_band [mm]": f"{1e3 * self._counter.band:.4g}",
+        }
+        if self._counter.is_raised:
+            values["counting_dead_band reason"] = (
+                f"above {COUNTING_DEAD_BAND.name}, as the sensor's noise or resolution demands"
+            )
+        if self._earlier is None and self._history.path is not None:
+            values["usage"] = "of this run only, as the history cannot be read"
+        if self._pace is not None:
+            values["travelled_distance pace [m/day]"] = _number(self._pace.distance)
+            values["reversals pace [1/day]"] = _number(self._pace.reversals)
+        for state in self._states():
+            if state.expected is not None:
+                values[f"{state.name}_expected [date]"] = _date(state.expected)
+        return values
+
+    def usage(self) -> ValveUsage:
+        """Return what the valve has done, also in earlier runs."""
+        self._gather()
+        own = (UsedDay(day, renewal, one) for (renewal, day), one in self._own.items())
+        earlier = () if self._earlier is None else self._earlier.days
+        return ValveUsage.of((*earlier, *own), self._renewal)
+
+    async def reset(self) -> str:
+        """Begin anew, as the packing is renewed; return what the old one has done."""
+        self._gather(is_end=True)
+        used, since = self._since_renewal, self._renewal
+        self._renewal = now = self._node.get_clock().now().nanoseconds
+
+        def renew(file: HistoryFile) -> None:
+            self._write(file)
+            keep_renewal(file, self._history.valve, now)
+
+        await self._history.keep_change(renew)
+        self._add_up()
+        answer = (
+            f"the packing counts from {_date(now)} on; the one before, "
+            f"{f'of {_date(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
+            f"travel, {used.reversals} reversals, {used.breakaways} breakaways in "
+            f"{used.time_watched / 3600e9:.3g} h of watching{self._history.reservation}"
+        )
+        self._node.get_logger().info(answer)
+        return answer
+
+    def close(self) -> None:
+        """Write what is counted; the writer's thread finishes it."""
+        self._gather(is_end=True)
+        self._keep()
+
+    @property
+    def _travel(self) -> float:
+        return self._monitor.settings.valve.travel
+
+    def _states(self) -> tuple[LimitState, ...]:
+        limits = UsageLimits(
+            self._node.get_parameter(TRAVEL_LIMIT.name).value,
+            self._node.get_parameter(REVERSAL_LIMIT.name).value,
+        )
+        now = self._node.get_clock().now().nanoseconds
+        return limit_states(self._since_renewal, self._pace, limits, now)
+
+    def _gather(self, is_end: bool = False) -> None:
+        """Add what the counter has counted; at the end also what waits there."""
+        if self._found_late is not None and self._earlier is None:
+            self._join(self._found_late)
+        if self._counter is None:
+            return
+        if is_end:
+            self._counter.flush()
+        for day, more in self._counter.drain().items():
+            key = self._renewal, day
+            self._own[key] = self._unwritten[key] = self._own.get(key, Usage()) + more
+            self._total += more
+            self._since_renewal += more
+
+    def _join(self, earlier: ValveUsage) -> None:
+        """Go on from earlier runs, where they could not be read at the start."""
+        self._earlier = earlier
+        self._renewal = self._renewal or earlier.renewal
+        for found in (self._own, self._unwritten):
+            for renewal, day in [key for key in found if key[0] == 0]:
+                found[earlier.renewal, day] = found.pop((renewal, day))
+        self._add_up()
+
+    def _add_up(self) -> None:
+        """Find the sums and the pace from the days."""
+        usage = self.usage()
+        self._total, self._since_renewal = usage.total, usage.since_renewal
+        self._pace = usage.pace()
+
+    def _keep(self) -> None:
+        """Have the writer's thread write what has changed."""
+        self._gather()
+        self._written_at = time.monotonic()
+        for key, one in self._written.items():
+            if self._unwritten.get(key) is one:
+                del self._unwritten[key]
+        self._condense()
+        self._pace = self.usage().pace()
+        if self._unwritten:
+            self._history.keep_soon(self._write)
+
+    def _condense(self) -> None:
+        """Hold old days as sums."""
+        if len(self._own) > _MOST_DAYS and self._earlier is not None:
+            old = [key for key in self._own if key not in self._unwritten][: -_MOST_DAYS // 2]
+            days = [UsedDay(day, renewal, self._own[renewal, day]) for renewal, day in old]
+            self._earlier = ValveUsage.of((*self._earlier.days, *days), self._renewal).condensed()
+            for key in old:
+                del self._own[key]
+
+    def _write(self, file: HistoryFile) -> None:
+        """Write, in the writer's thread, what this run has counted since the last writing."""
+        valve, rows = self._history.valve, dict(self._unwritten)
+        if self._earlier is None and self._found_late is None:
+            with contextlib.suppress(HistoryError):
+                self._found_late = read_usage(file, valve.name).condensed()
+                return  # the next writing knows the packing
+        days = [UsedDay(day, renewal, usage) for (renewal, day), usage in rows.items()]
+        keep_usage(file, valve, self._run, days)
+        self._written = rows

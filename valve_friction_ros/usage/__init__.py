@@ -1,0 +1,20 @@
+"""Usage of a valve: distance, reversals, breakaways, time at each travel; no ROS."""
+
+from valve_friction_ros.usage.counter import DEFAULT_BAND, UsageCounter
+from valve_friction_ros.usage.limits import LimitState, UsageLimits, limit_states
+from valve_friction_ros.usage.usage import BINS, Usage
+from valve_friction_ros.usage.valve_usage import DAY, Pace, UsedDay, ValveUsage
+
+__all__ = [
+    "BINS",
+    "DAY",
+    "DEFAULT_BAND",
+    "LimitState",
+    "Pace",
+    "Usage",
+    "UsageCounter",
+    "UsageLimits",
+    "UsedDay",
+    "ValveUsage",
+    "limit_states",
+]
