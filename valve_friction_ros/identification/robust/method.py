@@ -12,6 +12,7 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.robust.fitted_record import fitted_record
 from valve_friction_ros.identification.robust.intervals import estimated
+from valve_friction_ros.identification.robust.numbers import found_sizes
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.robust.remarks import sampling_remarks
 from valve_friction_ros.identification.robust.search import Prior, search
@@ -41,10 +42,20 @@ from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
-__all__ = ["METHOD", "TIMING_UNCERTAINTY", "has_no_place_for", "identify_robust"]
+__all__ = [
+    "IMPERFECTIONS_FOUND",
+    "METHOD",
+    "TIMING_UNCERTAINTY",
+    "has_no_place_for",
+    "identify_robust",
+]
 
 METHOD = "robust"
 """Name of this method."""
+
+IMPERFECTIONS_FOUND = "imperfections"
+"""Name of the evidence that holds lag, slip force and asymmetry, with half widths
+(`found_sizes`)."""
 
 TIMING_UNCERTAINTY = 0.04
 """Timing uncertainty without a setting, s.
@@ -123,6 +134,10 @@ def identify_robust(
             BUDGET: {
                 name: {"record": one.budget.record, "timing": one.budget.timing}
                 for name, one in numbers.items()
+            },
+            IMPERFECTIONS_FOUND: {
+                name: {"value": one.value, "half_width": one.half_width}
+                for name, one in estimated(fits, found_sizes).items()
             },
         },
         findings=(

@@ -10,7 +10,7 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import FrictionMonitor
+from valve_friction_ros.health import FrictionMonitor, by_severity
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
@@ -37,6 +37,7 @@ from valve_friction_ros.nodes.identifier.status import (
 )
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.identifier.watch import Watch
+from valve_friction_ros.nodes.identifier.whole_valve import WholeValve
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError
 from valve_friction_ros.nodes.plumbing.parameters import (
@@ -97,7 +98,7 @@ class Identifier(PolledNode):
         self._estimate_topic = EstimateTopic(self)
         results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
-        self._watches: tuple[Watch, ...] = ()
+        self._watches: tuple[Watch, ...] = (WholeValve(self._monitor),)
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
@@ -194,7 +195,13 @@ class Identifier(PolledNode):
         except InternalError:
             self._publish_diagnostics()
             raise
-        answer = "; ".join((*self._input_problems(), self._monitor.diagnosis().message))
+        answer = "; ".join(
+            (
+                *self._input_problems(),
+                self._monitor.diagnosis().message,
+                *(one.message for one in by_severity(self._monitor.findings)),
+            )
+        )
         await self._history.keep(record)
         self._publish_diagnostics()
         if refused is not None:
