@@ -80,7 +80,7 @@ def _line(row: _Row) -> _Line:
         _dead_band(row),
         _with_width(row, "sliding_friction"),
         _with_width(row, "coulomb_friction"),
-        text("error") or text("message"),
+        text("error") or "; ".join(filter(None, (text("message"), text("findings")))),
         quote(text("report")),
     )
 

@@ -26,7 +26,7 @@ from valve_friction_ros.health.friction_monitor import (
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_changes import Change, valve_changes
-from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
+from valve_friction_ros.health.valve_diagnosis import diagnose_numbers, diagnose_parameters
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 
@@ -54,6 +54,7 @@ __all__ = [
     "diagnose",
     "diagnose_again",
     "diagnose_numbers",
+    "diagnose_parameters",
     "friction_words",
     "identify_snapshot",
     "percentage",

@@ -10,14 +10,42 @@ from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.stop_findings import stop_findings
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.health.valve_numbers import valve_numbers
+from valve_friction_ros.identification import Result
 from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["diagnose_numbers"]
+__all__ = ["diagnose_numbers", "diagnose_parameters"]
 
 _COMMON_SHARE = 0.3
 """Half width of the interval of a ratio, as a share, up to which it speaks for a common factor."""
+
+
+def diagnose_parameters(
+    result: Result, baseline: Baseline | None, limits: ValveLimits | None = None
+) -> tuple[Finding, ...]:
+    """Compare what a result says of its valve with the baseline (`diagnose_numbers`).
+
+    Nothing is found without a baseline, or by one that holds a friction alone.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> from valve_friction_ros.health import diagnose_parameters
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
+    >>> def identified(spring_constant):
+    ...     packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, spring_constant)
+    ...     stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    ...     return vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
+    >>> healthy = vf.Baseline.of(identified(2.05e5))
+    >>> [str(one)[:58] for one in diagnose_parameters(identified(1.37e5), healthy)]
+    ['ERROR: the spring constant has changed: 0.668 times (0.66']
+    """
+    if baseline is None or not baseline.numbers:
+        return ()
+    return diagnose_numbers(valve_numbers(result), baseline, result.valve, limits)
 
 
 def diagnose_numbers(

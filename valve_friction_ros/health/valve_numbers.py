@@ -16,9 +16,9 @@ from valve_friction_ros.identification import (
     Verdict,
 )
 
-__all__ = ["valve_numbers"]
+__all__ = ["COMPARED", "fit_numbers", "valve_numbers"]
 
-_COMPARED = (
+COMPARED = (
     "spring_constant",
     "spring_preload",
     "coulomb_friction",
@@ -26,6 +26,7 @@ _COMPARED = (
     "viscous_friction",
     "viscous_asymmetry",
 )
+"""Parameters of a result that are compared with those of a baseline."""
 
 _SURE_SPRING = 0.1
 """Half width of the spring constant, as a share, up to which the numbers of a fit count.
@@ -54,18 +55,29 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
     holding = _static_friction(known) if is_described else math.nan
     numbers = sensor_noises(result.recording)
     numbers |= stem_reach(result.recording, result.valve, holding)
+    fit = fit_numbers(known) if is_described else {}
+    if fit and CLOCK_OFFSET in known:
+        fit["lag"] = known[CLOCK_OFFSET]
+    if fit:
+        fit |= _imperfections(result.evidence, known.get("coulomb_friction"))
+    return numbers | fit
+
+
+def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
+    """Return what known parameters say of a valve: `COMPARED` and ``slip_force``, F_s − F_c.
+
+    There is nothing where the spring constant is not known well enough.
+    """
     spring = known.get("spring_constant")
-    if not is_described or spring is None or spring.share > _SURE_SPRING:
-        return numbers
-    numbers |= {name: known[name] for name in _COMPARED if name in known}
-    if CLOCK_OFFSET in known:
-        numbers["lag"] = known[CLOCK_OFFSET]
+    if spring is None or spring.share > _SURE_SPRING:
+        return {}
+    numbers = {name: known[name] for name in COMPARED if name in known}
     if {"static_friction", "coulomb_friction"} <= known.keys():
         static, coulomb = known["static_friction"], known["coulomb_friction"]
         numbers["slip_force"] = Measured(
             static.value - coulomb.value, static.half_width + coulomb.half_width
         )
-    return numbers | _imperfections(result.evidence, known.get("coulomb_friction"))
+    return numbers
 
 
 def _is_known(one: Parameter) -> bool:

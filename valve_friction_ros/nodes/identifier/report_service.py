@@ -32,6 +32,7 @@ async def written_report(
     given, name = node.get_parameter(REPORT_FOLDER.name).value, file_name(node, stamp)
     title, node_name = history.valve.tag or node.get_name(), node.get_fully_qualified_name()
     baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
+    valve_limits = monitor.settings.valve_limits
     healthy = None if kept is None or kept.baseline != baseline else kept.record
     notes = () if refusal is None else (f"a later record was refused: {refusal}",)
 
@@ -50,6 +51,7 @@ async def written_report(
                 result=result,
                 baseline=baseline,
                 limits=limits,
+                valve_limits=valve_limits,
                 notes=(*notes, *unread),
                 healthy=healthy,
                 history=before,
