@@ -56,10 +56,8 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
     numbers = sensor_noises(result.recording)
     numbers |= stem_reach(result.recording, result.valve, holding)
     fit = fit_numbers(known) if is_described else {}
-    if fit and CLOCK_OFFSET in known:
-        fit["lag"] = known[CLOCK_OFFSET]
     if fit:
-        fit |= _imperfections(result.evidence, known.get("coulomb_friction"))
+        fit |= _imperfections(result.evidence, known)
     return numbers | fit
 
 
@@ -92,13 +90,27 @@ def _static_friction(known: Mapping[str, Measured]) -> float:
     return max((one.value + one.half_width for one in frictions), default=math.nan)
 
 
-def _imperfections(evidence: Mapping[str, Any], coulomb: Measured | None) -> dict[str, Measured]:
-    """Return what the method robust found; a slip force is known no better than F_c."""
+def _imperfections(
+    evidence: Mapping[str, Any], known: Mapping[str, Measured]
+) -> dict[str, Measured]:
+    """Return slip force, asymmetry and lag, as the method found them.
+
+    A slip force is known no better than F_c, from which it is counted. Sliding, the stem stands
+    (F_v/k)·ẋ behind where it would be without viscous friction, and a lag τ shows it τ·ẋ behind: so
+    the lag is known no better than F_v/k, and not at all without F_v.
+    """
     found = {
         name: Measured(one["value"], one["half_width"])
         for name, one in evidence.get(IMPERFECTIONS_FOUND, {}).items()
     }
-    if (slip := found.pop("slip_force", None)) is not None and coulomb is not None:
-        width = math.hypot(slip.half_width, coulomb.half_width)
-        found["slip_force"] = Measured(slip.value, width)
+    if CLOCK_OFFSET in known:
+        found["lag"] = known[CLOCK_OFFSET]
+    spring = known["spring_constant"].value
+    for name, beside, per in (
+        ("slip_force", "coulomb_friction", 1.0),
+        ("lag", "viscous_friction", spring),
+    ):
+        if (one := found.pop(name, None)) is not None and beside in known:
+            width = math.hypot(one.half_width, known[beside].half_width / per)
+            found[name] = Measured(one.value, width)
     return found

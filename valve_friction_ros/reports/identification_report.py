@@ -64,7 +64,8 @@ def identification_report(record: IdentifiedRecord) -> Page:
     The status, the diagnosis in one sentence and the date, then parameters, uncertainty budget,
     friction against its baseline, the other numbers of the valve against theirs, trend, the
     record, the valve signature, the evidence of the method, the measured against the simulated
-    position, the residual, notes, settings and versions. Parts that a method does not have are left out.
+    position, the residual, notes, settings and versions. Parts that a method does not have are
+    left out.
     """
     return Page(
         f"Friction of {record.name}",
