@@ -109,8 +109,8 @@ def identify_robust(
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
             f"{misfit.systematic * 1e3:.2g} mm of misfit): check that both signals belong to this "
-            "valve, and their units; if the packing was changed during the record, clear the "
-            "buffer and record again"
+            "valve, and their units, and that its stem reaches both ends of the travel; if the "
+            "packing was changed during the record, clear the buffer and record again"
         )
     return Result(
         method=METHOD,
