@@ -3,7 +3,7 @@
 import pytest
 
 from valve_friction_ros.fleet import read_baselines
-from valve_friction_ros.health import Baseline, SlidingFriction
+from valve_friction_ros.health import Baseline, Measured, SlidingFriction
 
 OUTPUT = """\
 recording,valve,coulomb_friction_n,coulomb_friction_half_width_n,coulomb_friction_verdict,\
@@ -33,6 +33,19 @@ def test_an_earlier_output(tmp_path):
     assert found.of("=1.csv") == {"": Baseline(50.0, 1.0)}
     assert found.of("refused.csv") == found.of("elsewhere.csv") == {}
     assert found.count(["bag", "refused.csv"]) == 1
+
+
+def test_what_else_an_earlier_output_says_of_the_valve(tmp_path):
+    """Numbers with intervals count, where the spring constant is known well."""
+    names = "spring_constant_n_per_m,spring_constant_half_width_n_per_m,"
+    names += "spring_preload_n,spring_preload_half_width_n,viscous_friction_n_s_per_m"
+    rows = "a.csv,600,2e5,1e3,500,20,5e3\nb.csv,600,2e5,3e4,500,20,5e3\n"
+    found = read_baselines(written(tmp_path, f"recording,coulomb_friction_n,{names}\n{rows}"))
+    assert found.of("a.csv")[""].numbers == {
+        "spring_constant": Measured(2e5, 1e3),
+        "spring_preload": Measured(500.0, 20.0),
+    }
+    assert found.of("b.csv")[""].numbers == {}
 
 
 def test_written_by_hand(tmp_path):

@@ -8,7 +8,8 @@ import pytest
 from valve_friction_ros.fleet import COLUMNS, ranked
 from valve_friction_ros.fleet.page import page_text
 from valve_friction_ros.fleet.picture import HEIGHT, WIDTH, signature_points
-from valve_friction_ros.fleet.ranking import status_of
+from valve_friction_ros.fleet.ranking import reaches, status_of
+from valve_friction_ros.health import Level
 from valve_friction_ros.model import Recording
 
 EVIL = "<script>alert(1)</script> & \"x' {{ 1 + 1 }}"
@@ -77,6 +78,19 @@ class Cells(HTMLParser):
             self.rows[-1][-1] += data
 
 
+CHANGED = {"findings_level": "WARN", "findings": "WARN: the spring constant has changed"}
+
+
+def test_a_valve_with_a_finding_comes_before_a_normal_one():
+    changed = row("b", ratio=1.0) | CHANGED
+    rows = ranked([row("a", ratio=1.1), changed])
+    assert [one["recording"] for one in rows] == ["b", "a"]
+    assert reaches(changed, Level.WARN)
+    assert not reaches(changed, Level.ERROR)
+    lines = [line for line in Cells(page_text(rows, "plant")).rows if line]
+    assert lines[0][-1].endswith("WARN: the spring constant has changed")
+
+
 def test_the_order():
     assert [one["recording"] for one in ranked(FLEET)] == ORDER
 
@@ -91,6 +105,8 @@ def test_the_order():
         (FLEET[8], "check"),
         (FLEET[9], "perhaps grown"),
         (row("x", ratio=0.49), "perhaps collapsed"),
+        (row("x", ratio=1.0) | CHANGED, "changed"),
+        (row("x", ratio=3.0, level="ERROR", ne_107="F") | CHANGED, "excessive"),
     ],
 )
 def test_the_status(given, word):

@@ -12,7 +12,7 @@ from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, succ
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.health import Baseline, Level, SlidingFriction
+from valve_friction_ros.health import Baseline, Level, Measured, SlidingFriction
 from valve_friction_ros.history import (
     FrictionPoint,
     HistoryError,
@@ -145,19 +145,60 @@ OF_VERSION_5 = {
 }
 
 
+def make_version_5(history):
+    """Take away what version 6 knows: the valve in service."""
+    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
+    newer = {name for (name,) in tables} - OF_VERSION_5
+    connection = sqlite3.connect(history.path)
+    connection.executescript("".join(f"DROP TABLE {name};" for name in newer))
+    connection.execute("PRAGMA user_version = 5")
+    connection.close()
+
+
 def make_version_4(history):
-    """Take away newer tables, and what version 5 knows of a baseline: its service, its level …"""
+    """Take away what version 5 knows of a baseline, who set it and what it replaced, and 6."""
+    make_version_5(history)
     columns = [
         name for (name,) in select(history, "SELECT name FROM pragma_table_info('baseline')")
     ]
     new = [one for one in columns if one.startswith("replaced_")] + ["set_by", "level", "withdrawn"]
     connection = sqlite3.connect(history.path)
     drop = "".join(f"ALTER TABLE baseline DROP COLUMN {name};" for name in new)
-    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
-    newer = {name for (name,) in tables} - OF_VERSION_5
-    drop += "".join(f"DROP TABLE {name};" for name in newer)
     connection.executescript(f"{drop} PRAGMA user_version = 4")
     connection.close()
+
+
+NUMBERS = {"spring_constant": Measured(2.05e5, 40.0), "lag": Measured(-0.002, 0.003)}
+
+
+def test_the_numbers_of_baseline_and_identification_are_kept(history):
+    kept = KeptBaseline(Baseline(150.0, numbers=NUMBERS), START, START)
+    history.set_baseline(OTHER, KeptBaseline(Baseline(150.0), START, START))
+    history.set_baseline(VALVE, kept)
+    assert history.baseline(VALVE.name).baseline.numbers == NUMBERS
+    assert history.baseline(OTHER.name).baseline.numbers == {}
+    bare, whole = success(), success(START + 1, numbers=NUMBERS)
+    for entry in (bare, whole, refused(START + 2)):
+        history.add(entry)
+    assert [entry.numbers for entry in history.entries()] == [{}, NUMBERS, {}]
+    assert history.last_success(VALVE.name).numbers == NUMBERS
+    history.add(success(START + 9 * DAY), days=1.0)
+    assert select(history, "SELECT count(*) FROM identification_number") == [(0,)]
+
+
+def test_a_file_of_version_5_is_read_and_extended(history):
+    """Version 5 had no numbers of a valve beside its friction."""
+    kept = KeptBaseline(Baseline(150.0, numbers=NUMBERS), START, START)
+    history.set_baseline(VALVE, kept)
+    history.add(success(numbers=NUMBERS))
+    make_version_5(history)
+    assert history.baseline(VALVE.name).baseline.numbers == {}
+    assert history.last_success(VALVE.name).numbers == {}
+    assert select(history, "PRAGMA user_version") == [(5,)]
+    history.set_baseline(VALVE, replace(kept, time=START + 1))
+    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert history.baseline(VALVE.name).baseline.numbers == NUMBERS
+    assert history.baseline(VALVE.name, until=START + 1).baseline.numbers == {}
 
 
 def test_a_file_of_version_4_is_read_and_extended(history):

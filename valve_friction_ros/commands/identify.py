@@ -25,7 +25,7 @@ from valve_friction_ros.commands.output.identification_files import (
     identification_files,
 )
 from valve_friction_ros.commands.output.result_output import as_json, print_table
-from valve_friction_ros.health import Diagnosis, diagnose
+from valve_friction_ros.health import Diagnosis, Finding, Level, diagnose, diagnose_parameters
 from valve_friction_ros.identification import (
     METHODS,
     IdentificationSettings,
@@ -45,11 +45,18 @@ REFUSALS = (RefusalError,)
 
 
 class _Answer(NamedTuple):
-    """A valve of the file, its result or refusal, and its diagnosis if asked for."""
+    """A valve of the file, its result or refusal, its diagnosis and findings if asked for."""
 
     recorded: RecordedValve
     outcome: Result | RefusalError
     diagnosis: Diagnosis | None = None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Levels of all that is known of the valve's health."""
+        own = () if self.diagnosis is None else (self.diagnosis.level,)
+        return (*own, *(one.level for one in self.findings))
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -90,8 +97,8 @@ def _print_json(results: Sequence[_Answer]) -> None:
     answers = {
         recorded.name: {"error": str(outcome)}
         if isinstance(outcome, RefusalError)
-        else as_json(outcome, recorded.notes, diagnosis)
-        for recorded, outcome, diagnosis in results
+        else as_json(outcome, recorded.notes, diagnosis, findings)
+        for recorded, outcome, diagnosis, findings in results
     }
     answer = {"valves": answers} if len(results) > 1 else next(iter(answers.values()))
     print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
@@ -99,12 +106,12 @@ def _print_json(results: Sequence[_Answer]) -> None:
 
 def _print_tables(results: Sequence[_Answer]) -> None:
     printed = 0
-    for recorded, outcome, diagnosis in results:
+    for recorded, outcome, diagnosis, findings in results:
         if isinstance(outcome, RefusalError):
             continue
         if len(results) > 1:
             print("\n" * (printed > 0) + printable(recorded.name))
-        print_table(outcome, recorded.notes, diagnosis)
+        print_table(outcome, recorded.notes, diagnosis, findings)
         printed += 1
 
 
@@ -143,14 +150,16 @@ def run(options: argparse.Namespace) -> int:
     results = []
     for each in recorded:
         outcome = _identified(each, valve, method, settings)
-        diagnosis = None
+        diagnosis: Diagnosis | None = None
+        findings: tuple[Finding, ...] = ()
         if isinstance(outcome, Result) and (baseline is not None or options.fail_on is not None):
             diagnosis = diagnose(outcome, valve, baseline)
-        results.append(_Answer(each, outcome, diagnosis))
+            findings = diagnose_parameters(outcome, baseline)
+        results.append(_Answer(each, outcome, diagnosis, findings))
     try:
         code = _print(results, options.command, options.json)
     finally:  # a closed output costs no picture, and a full disk no numbers
-        for each, outcome, _ in results:
+        for each, outcome, _, _ in results:
             if isinstance(outcome, Result):
                 files.write(each, outcome, baseline)
     if options.fail_on is not None and baseline is None:
@@ -159,5 +168,5 @@ def run(options: argparse.Namespace) -> int:
             "--fail-on: there is no baseline, so no friction was compared: give "
             "--baseline-recording or --baseline-coulomb-friction",
         )
-    levels = (each.diagnosis.level for each in results if each.diagnosis is not None)
+    levels = (level for each in results for level in each.levels)
     return ExitCode.ALARM if has_failed(options, levels) else code

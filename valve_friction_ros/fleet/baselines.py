@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from valve_friction_ros.health import Baseline, SlidingFriction
+from valve_friction_ros.health import Baseline, Measured, SlidingFriction
 from valve_friction_ros.health.baseline import LARGEST_SHARE
+from valve_friction_ros.health.valve_numbers import COMPARED, fit_numbers
 from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification.units import column_suffix
 from valve_friction_ros.outside_text import as_read
 from valve_friction_ros.records.unreadable import cause_of
 
@@ -54,20 +56,34 @@ def _friction(row: Mapping[str, str | None], name: str) -> tuple[float, float] |
     return (value, width) if value > 0 and width <= LARGEST_SHARE * value else None
 
 
+def _numbers(row: Mapping[str, str | None]) -> dict[str, Measured]:
+    """Return what else a row says of its valve, where it has intervals."""
+    known = {}
+    for name in COMPARED:
+        suffix = column_suffix(name)
+        value = _number(row, f"{name}{suffix}")
+        width = _number(row, f"{name}_half_width{suffix}")
+        if math.isfinite(value) and width > 0:
+            known[name] = Measured(value, width)
+    return fit_numbers(known)
+
+
 def _baseline(row: Mapping[str, str | None]) -> Baseline | None:
     """Return the baseline of a row; None where no friction is known well enough."""
+    numbers = _numbers(row)
     coulomb, slid, speed = _friction(row, _COULOMB), _friction(row, _SLIDING), _number(row, _SPEED)
     sliding = SlidingFriction(*slid, speed) if slid is not None and speed > 0 else None
     if coulomb is not None:
-        return Baseline(*coulomb, sliding)
-    return None if sliding is None else Baseline(sliding=sliding)
+        return Baseline(*coulomb, sliding, numbers)
+    return None if sliding is None else Baseline(sliding=sliding, numbers=numbers)
 
 
 def read_baselines(path: Path) -> Baselines:
     """Read the friction of healthy valves from a CSV file, as `identify-folder` writes it.
 
     Of its columns these count: ``recording``, ``valve``, and the frictions with their half widths;
-    an empty half width stands for an exact value. A friction that is not known well enough to be a
+    an empty half width stands for an exact value. The other
+    parameters count where they have half widths. A friction that is not known well enough to be a
     baseline is left out, and so is a refused valve.
 
     Raises ValueError, one line with the file and the row, if it cannot be read.

@@ -68,7 +68,7 @@ def _dead_band(row: _Row) -> _Number:
 
 def _line(row: _Row) -> _Line:
     def text(name: str) -> str:
-        return str(row[name] or "")
+        return str(row.get(name) or "")
 
     began = text("began").replace("T", " ").removesuffix("Z")
     return _Line(
@@ -80,7 +80,7 @@ def _line(row: _Row) -> _Line:
         _dead_band(row),
         _with_width(row, "sliding_friction"),
         _with_width(row, "coulomb_friction"),
-        text("error") or text("message"),
+        text("error") or "; ".join(filter(None, (text("message"), text("findings")))),
         quote(text("report")),
     )
 

@@ -26,8 +26,14 @@ _BY_SIGNAL = {
 }
 
 
-def _level(row: Mapping[str, Cell]) -> Level | None:
+def _friction_level(row: Mapping[str, Cell]) -> Level | None:
     return Level[str(row["level"])] if row.get("level") else None
+
+
+def _level(row: Mapping[str, Cell]) -> Level | None:
+    """Return the level of friction and findings together; None for a refused valve."""
+    own, others = _friction_level(row), row.get("findings_level")
+    return own if own is None or not others else max(own, Level[str(others)])
 
 
 def _number(row: Mapping[str, Cell], name: str) -> float:
@@ -40,15 +46,21 @@ def status_of(row: Mapping[str, Cell]) -> Status:
     level, ratio = _level(row), _number(row, "ratio")
     if level is None:
         return Status("refused", "none")
+    if level > (_friction_level(row) or Level.OK):
+        return Status("changed", level.name.lower())
     if level is Level.OK:
-        if row["ratio"] is None:
-            return Status("no comparison", "none")
-        if ratio >= _LIMITS.warn_ratio:
-            return Status("perhaps grown", "maybe")
-        if ratio <= _LIMITS.low_ratio:
-            return Status("perhaps collapsed", "maybe")
-        return Status("normal", "ok")
+        return _status_of_ratio(ratio)
     return Status(_BY_SIGNAL[str(row["ne_107"])], level.name.lower())
+
+
+def _status_of_ratio(ratio: float) -> Status:
+    if ratio == -math.inf:
+        return Status("no comparison", "none")
+    if ratio >= _LIMITS.warn_ratio:
+        return Status("perhaps grown", "maybe")
+    if ratio <= _LIMITS.low_ratio:
+        return Status("perhaps collapsed", "maybe")
+    return Status("normal", "ok")
 
 
 def _need(row: Mapping[str, Cell]) -> tuple[float, float, float, str, str]:

@@ -5,7 +5,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from valve_friction_ros.fleet.picture import signature_points
-from valve_friction_ros.health import Diagnosis, dead_band
+from valve_friction_ros.health import Diagnosis, Finding, by_severity, dead_band
 from valve_friction_ros.identification import PARAMETER_UNITS, Result, parameter_columns, plain
 from valve_friction_ros.model import Recording
 
@@ -27,6 +27,8 @@ COLUMNS: tuple[str, ...] = (
     "ratio_of",
     "dead_band_of_travel",
     "message",
+    "findings_level",
+    "findings",
     "method",
     *(column for name in PARAMETER_UNITS for column in parameter_columns(name, None)),
     "sliding_speed_m_per_s",
@@ -60,9 +62,15 @@ def _began(recording: Recording) -> str | None:
 
 
 def result_cells(
-    valve: str, result: Result, diagnosis: Diagnosis, notes: Sequence[str]
+    valve: str,
+    result: Result,
+    diagnosis: Diagnosis,
+    notes: Sequence[str],
+    findings: Sequence[Finding] = (),
 ) -> dict[str, Cell]:
     """Fill the cells of an identified valve; the notes of the reading join the warnings.
+
+    `findings` are those beside the friction.
 
     A parameter that the result does not hold leaves its cells empty.
     """
@@ -76,6 +84,8 @@ def result_cells(
         "ratio_high": high,
         "dead_band_of_travel": plain(dead_band(result, result.valve)),
         "message": _one_line(diagnosis.message),
+        "findings_level": max(one.level for one in findings).name if findings else None,
+        "findings": "; ".join(map(str, by_severity(findings))) or None,
         PICTURE: signature_points(recording),
     }
     for name in PARAMETER_UNITS:

@@ -24,9 +24,15 @@ from valve_friction_ros.health.friction_monitor import (
     identify_snapshot,
 )
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.valve_diagnosis import diagnose_numbers, diagnose_parameters
+from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.health.valve_numbers import valve_numbers
 
 __all__ = [
     "Baseline",
+    "Change",
     "Comparison",
     "Diagnosis",
     "EarlierEstimate",
@@ -35,17 +41,23 @@ __all__ = [
     "FrictionMonitor",
     "IdentificationInput",
     "Level",
+    "Measured",
     "MonitorSettings",
     "Ratio",
     "SlidingFriction",
     "StatusSignal",
+    "ValveLimits",
     "by_severity",
     "carried",
     "compared",
     "dead_band",
     "diagnose",
     "diagnose_again",
+    "diagnose_numbers",
+    "diagnose_parameters",
     "friction_words",
     "identify_snapshot",
     "percentage",
+    "valve_changes",
+    "valve_numbers",
 ]

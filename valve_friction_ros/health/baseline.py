@@ -1,8 +1,11 @@
-"""The friction of the healthy valve."""
+"""The healthy valve: its friction, and what else was measured of it."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.checks import require_non_negative, require_positive
@@ -55,7 +58,7 @@ class SlidingFriction:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Friction of the healthy valve: Coulomb friction, sliding friction, or both.
+    """The healthy valve: its Coulomb friction, its sliding friction, or both; and other numbers.
 
     Its intervals leave out the uncertainties of area and sensor scales, which cancel in the ratio
     of two frictions that the same sensors measured.
@@ -68,6 +71,9 @@ class Baseline:
         Half the width of its 95 % interval, N; zero for a given value.
     sliding : SlidingFriction or None
         The sliding friction, which needs no split into F_c and F_v.
+    numbers : mapping of str to Measured
+        What else its result says of the valve (`valve_numbers`); empty for a friction alone. They
+        take no part in a comparison of two baselines: the frictions tell results apart.
 
     Raises
     ------
@@ -85,6 +91,7 @@ class Baseline:
     coulomb_friction: float | None = None
     half_width: float = 0.0
     sliding: SlidingFriction | None = None
+    numbers: Mapping[str, Measured] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         """Refuse a baseline that is not above zero."""
@@ -106,7 +113,7 @@ class Baseline:
 
     @classmethod
     def of(cls, result: Result) -> "Baseline":
-        """Return the frictions of a result as baseline, those that are known well enough.
+        """Return a result as baseline, with those of its frictions that are known well enough.
 
         Raises RefusalError if neither is known to `LARGEST_SHARE`; the message names why.
         """
@@ -134,6 +141,7 @@ class Baseline:
             None
             if slid is None
             else SlidingFriction(slid.value, slid.half_width, result.sliding_speed),
+            valve_numbers(result),
         )
 
 

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
 from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
@@ -146,6 +147,10 @@ class EarlierEstimate(Frictions, Protocol):
     @property
     def limits(self) -> FrictionLimits:
         """The limits of that time."""
+
+    @property
+    def numbers(self) -> Mapping[str, Measured]:
+        """What else was measured of the valve."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain values, with the keys of `Result.to_dict`."""

@@ -1,5 +1,6 @@
 """The monitor of one valve, without ROS: buffer, last result, baseline, diagnosis."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -11,7 +12,12 @@ from valve_friction_ros.health.diagnosis import (
     diagnose,
     diagnose_again,
 )
-from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
+from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     IdentificationSettings,
@@ -43,6 +49,8 @@ class MonitorSettings:
         Bounds of the friction.
     window : float
         Length of the buffered and identified record, s.
+    valve_limits : ValveLimits
+        Bounds of what else may change on the valve.
     """
 
     valve: Valve
@@ -50,6 +58,7 @@ class MonitorSettings:
     method: str = DEFAULT_METHOD
     limits: FrictionLimits = field(default_factory=FrictionLimits)
     window: float = 60.0
+    valve_limits: ValveLimits = field(default_factory=ValveLimits)
 
     def __post_init__(self) -> None:
         """Refuse impossible windows and unknown methods."""
@@ -111,12 +120,13 @@ class FrictionMonitor:
     buffer : RecordBuffer
         The last seconds of both signals.
     baseline : Baseline or None
-        Friction of the healthy valve.
+        The healthy valve.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
         self._result: Result | None = None
+        self._numbers: Mapping[str, Measured] = {}
         self._earlier: EarlierEstimate | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
@@ -150,6 +160,24 @@ class FrictionMonitor:
         return self._result or self._earlier
 
     @property
+    def numbers(self) -> Mapping[str, Measured]:
+        """What the estimate says of the valve beside its friction (`valve_numbers`)."""
+        return self._numbers
+
+    @property
+    def changes(self) -> dict[str, Change]:
+        """Changes of these numbers since the baseline; empty without one."""
+        return {} if self.baseline is None else valve_changes(self._numbers, self.baseline.numbers)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What has changed on the valve beside its friction (`diagnose_numbers`)."""
+        if self.baseline is None:
+            return ()
+        settings = self._settings
+        return diagnose_numbers(self._numbers, self.baseline, settings.valve, settings.valve_limits)
+
+    @property
     def refusal(self) -> str | None:
         """Why the latest identification was refused; None if it was not."""
         return self._refusal
@@ -172,11 +200,12 @@ class FrictionMonitor:
 
     def remember(self, earlier: EarlierEstimate) -> None:
         """Go on with an estimate from before the monitor began, until there is a result."""
-        self._earlier, self._stamp = earlier, earlier.time
+        self._earlier, self._stamp, self._numbers = earlier, earlier.time, earlier.numbers
 
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
         self._result, self._earlier, self._stamp = result, None, stamp
+        self._numbers = valve_numbers(result)
         self._refusal = self._internal_error = None
 
     def refuse(self, refusal: RefusalError) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from typing import Any
 
 __all__ = ["Finding", "Level", "StatusSignal", "by_severity"]
 
@@ -42,6 +43,18 @@ class Finding:
     level: Level
     status_signal: StatusSignal
     message: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as a mapping of plain values: ``level``, ``ne_107`` and ``message``."""
+        return {
+            "level": self.level.name,
+            "ne_107": self.status_signal.value,
+            "message": self.message,
+        }
+
+    def __str__(self) -> str:
+        """Return level and message on one line."""
+        return f"{self.level.name}: {self.message}"
 
 
 def by_severity(findings: Iterable[Finding]) -> list[Finding]:

@@ -13,6 +13,7 @@ from valve_friction_ros.health.comparison import carried
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
 from valve_friction_ros.health.levels import Level
+from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import (
     SLIDING,
     Parameter,
@@ -198,6 +199,8 @@ class HistoryEntry:
         Version of this software.
     sliding_speed : float
         Speed that the sliding friction belongs to, m/s; nan where it is unknown.
+    numbers : mapping of str to Measured
+        What else was measured of the valve (`valve_numbers`).
     """
 
     time: int
@@ -214,6 +217,7 @@ class HistoryEntry:
     refusal: str = ""
     version: str = __version__
     sliding_speed: float = math.nan
+    numbers: Mapping[str, Measured] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse an entry that is not exactly one of success and refusal."""
@@ -344,6 +348,7 @@ def entry_of(
             ),
             "warnings": result.warnings,
             "sliding_speed": result.sliding_speed,
+            "numbers": monitor.numbers,
         }
     return HistoryEntry(
         time=time,

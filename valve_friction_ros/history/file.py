@@ -15,6 +15,7 @@ from valve_friction_ros.history.entry import (
     KeptValve,
     friction_point,
 )
+from valve_friction_ros.history.number_rows import numbers_in
 from valve_friction_ros.history.rows import (
     entries_in,
     frictions_in,
@@ -96,7 +97,10 @@ class HistoryFile:
             ).fetchone()
             if row is None or (kept := kept_baseline_in(row)).withdrawn:
                 return None
-            return replace(kept, record=record_in(connection, row["id"]))
+            number = row["id"]
+            numbers = numbers_in(connection, "baseline", number, number).get(number, {})
+            whole = replace(kept.baseline, numbers=numbers)
+            return replace(kept, baseline=whole, record=record_in(connection, number))
 
     def baselines(
         self, valve: str, since: int = -_END_OF_TIME, until: int = _END_OF_TIME

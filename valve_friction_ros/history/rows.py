@@ -3,7 +3,7 @@
 import math
 import sqlite3
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import Any
@@ -14,6 +14,7 @@ from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.history.entry import (
     Fit,
     HistoryEntry,
@@ -21,6 +22,7 @@ from valve_friction_ros.history.entry import (
     KeptValve,
     Span,
 )
+from valve_friction_ros.history.number_rows import insert_numbers, numbers_in
 from valve_friction_ros.identification import (
     FORMER_METHODS,
     PARAMETER_UNITS,
@@ -132,6 +134,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
             published=one.published,
             uncalibrated_half_width=one.uncalibrated and one.uncalibrated.half_width,
         )
+    insert_numbers(connection, "identification", identification, entry.numbers)
 
 
 def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseline) -> None:
@@ -148,6 +151,7 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         level=kept.level,
         withdrawn=kept.withdrawn,
     )
+    insert_numbers(connection, "baseline", row, kept.baseline.numbers)
     if kept.record is not None:
         _insert(
             connection,
@@ -243,7 +247,9 @@ def _parameter(row: sqlite3.Row) -> Parameter:
     return replace(shown, uncalibrated=replace(shown, standard_error=math.nan, half_width=width))
 
 
-def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
+def _entry(
+    row: sqlite3.Row, parameters: Sequence[Parameter], numbers: Mapping[str, Measured]
+) -> HistoryEntry:
     ratio = Ratio(
         _number(row["ratio"]),
         _number(row["ratio_low"]),
@@ -271,6 +277,7 @@ def _entry(row: sqlite3.Row, parameters: Sequence[Parameter]) -> HistoryEntry:
         warnings=tuple(filter(None, row["warnings"].split("\n"))),
         refusal=row["refusal"] or "",
         version=row["software_version"],
+        numbers=numbers,
     )
 
 
@@ -307,11 +314,15 @@ def _entries_of_valve(
         choice,
     ):
         parameters[row["identification_id"]].append(_parameter(row))
-    for row in connection.execute(
+    rows = connection.execute(
         "SELECT identification.*, valve.name, valve.tag, settings.content FROM identification "
         "JOIN settings ON settings.id = settings_id JOIN valve ON valve.id = valve_id "
         "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ? "
         "ORDER BY time_ns, identification.id",
         choice,
-    ):
-        yield _entry(row, sorted(parameters[row["id"]], key=_place))
+    ).fetchall()
+    ids = [row["id"] for row in rows] or [0]
+    numbers = numbers_in(connection, "identification", min(ids), max(ids))
+    for row in rows:
+        ordered = sorted(parameters[row["id"]], key=_place)
+        yield _entry(row, ordered, numbers.get(row["id"], {}))

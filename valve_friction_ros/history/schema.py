@@ -159,7 +159,7 @@ UPDATE baseline SET
 """
 """Who set a baseline, at which level, and what it replaced: in an older file the row before it."""
 
-_SERVICE = ";".join((USAGE, ALARM_RECORDINGS))
+_SERVICE = ";".join((NUMBER_TABLES, USAGE, ALARM_RECORDINGS))
 """The tables of the valve in service."""
 
 _ADDED = {

@@ -26,7 +26,11 @@ from valve_friction_ros.identification.rendering import (
 )
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.robust.expectation import expected_half_widths
-from valve_friction_ros.identification.robust.method import TIMING_UNCERTAINTY, identify_robust
+from valve_friction_ros.identification.robust.method import (
+    IMPERFECTIONS_FOUND,
+    TIMING_UNCERTAINTY,
+    identify_robust,
+)
 from valve_friction_ros.identification.settings import (
     CALIBRATION,
     FIXABLE,
@@ -52,13 +56,15 @@ from valve_friction_ros.identification.trust.plausible_units import require_valv
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
-from valve_friction_ros.identification.units import PARAMETER_UNITS, UNITS
+from valve_friction_ros.identification.units import CLOCK_OFFSET, PARAMETER_UNITS, UNITS
 
 __all__ = [
     "CALIBRATION",
+    "CLOCK_OFFSET",
     "DEFAULT_METHOD",
     "FIXABLE",
     "FORMER_METHODS",
+    "IMPERFECTIONS_FOUND",
     "METHODS",
     "MOST_UNCERTAIN",
     "PARAMETER_UNITS",

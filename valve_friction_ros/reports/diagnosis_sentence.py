@@ -35,7 +35,8 @@ _ALARMS = {
 def diagnosis_sentence(record: IdentifiedRecord) -> str:
     """Return one sentence: finding, certainty, consequence and advice.
 
-    It states the diagnosis of the monitor in words for readers outside control engineering.
+    What else has changed on the valve follows, one sentence each. It states the diagnosis of the
+    monitor in words for readers outside control engineering.
     """
     friction = _friction(record)
     alarm = _ALARMS.get(record.diagnosis.status_signal)
@@ -56,8 +57,9 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     else:
         finding = _found(record)
     doubt = _doubt(record)
-    sentence = f"{doubt}{finding.what}{_consequence(record)}: {finding.advice}."
-    return sentence[0].upper() + sentence[1:]
+    told = f"{doubt}{finding.what}{_consequence(record)}: {finding.advice}"
+    sentences = (told, *(one.message for one in record.findings))
+    return " ".join(f"{one[0].upper()}{one[1:]}." for one in sentences)
 
 
 def _frictions(record: IdentifiedRecord) -> list[Parameter]:

@@ -31,6 +31,7 @@ from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
 from valve_friction_ros.reports.published_words import published_words
 from valve_friction_ros.reports.usage_section import usage_section
 from valve_friction_ros.reports.valve_status import date_line, valve_status
+from valve_friction_ros.reports.valve_table import valve_table
 
 __all__ = ["identification_report"]
 
@@ -40,6 +41,8 @@ _VERDICTS = (
     "not determine the parameter, and no value is shown. Fixed: the value was given."
 )
 _FRICTION = "Friction against its baseline"
+_WHOLE_VALVE = "The valve beside its friction"
+_NOTHING_ELSE = "Nothing else has surely changed beyond its limit"
 _BUDGET = (
     "Where the intervals come from. By the record: its noise, what the model leaves of the motion, "
     "and the imperfections of the valve. By the timing: a lag between the signals. By the "
@@ -60,9 +63,10 @@ def identification_report(record: IdentifiedRecord) -> Page:
     """Return the page on an identified record: its parameters and the evidence for them.
 
     The status, the diagnosis in one sentence and the date, then parameters, uncertainty budget,
-    friction against its baseline, trend, use, the record, the valve signature, the evidence of the
-    method, the measured against the simulated position, the residual, notes, settings and versions.
-    Parts that a method does not have are left out.
+    friction against its baseline, the other numbers of the valve against theirs, trend, use, the
+    record, the valve signature, the evidence of the method, the measured against the simulated
+    position, the residual, notes, settings and versions. Parts that a method does not have are
+    left out.
     """
     return Page(
         f"Friction of {record.name}",
@@ -80,6 +84,10 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
     if budget := budget_table(record):
         yield Section("Uncertainty budget", (budget, Paragraph(_BUDGET)))
     yield _friction(record)
+    if table := valve_table(record):
+        found = [one.message for one in record.findings] or [_NOTHING_ELSE]
+        told = (Paragraph(f"{one[0].upper()}{one[1:]}.") for one in found)
+        yield Section(_WHOLE_VALVE, (*told, table))
     if record.history is not None:
         yield _trend(record.history)
     if (use := usage_section(record.usage, record.valve)) is not None:

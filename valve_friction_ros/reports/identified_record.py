@@ -1,8 +1,20 @@
 """The content of a report of an identification."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from valve_friction_ros.health import Baseline, Diagnosis, FrictionLimits, diagnose
+from valve_friction_ros.health import (
+    Baseline,
+    Diagnosis,
+    Finding,
+    FrictionLimits,
+    Measured,
+    ValveLimits,
+    by_severity,
+    diagnose,
+    diagnose_numbers,
+    valve_numbers,
+)
 from valve_friction_ros.history import ValveHistory
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
@@ -37,6 +49,8 @@ class IdentifiedRecord:
         What was identified of this valve before.
     usage : ValveUsage
         What the valve has done.
+    valve_limits : ValveLimits
+        Bounds of what else may change on the valve.
     """
 
     name: str
@@ -49,6 +63,7 @@ class IdentifiedRecord:
     healthy: Recording | None = field(default=None, repr=False)
     history: ValveHistory | None = field(default=None, repr=False)
     usage: ValveUsage = field(default_factory=ValveUsage, repr=False)
+    valve_limits: ValveLimits = field(default_factory=ValveLimits)
 
     @property
     def recording(self) -> Recording:
@@ -64,3 +79,16 @@ class IdentifiedRecord:
     def diagnosis(self) -> Diagnosis:
         """The diagnosis of the valve."""
         return diagnose(self.result, self.valve, self.baseline, self.limits)
+
+    @cached_property
+    def numbers(self) -> dict[str, Measured]:
+        """What the result says of the valve beside its friction."""
+        return valve_numbers(self.result)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What has changed on the valve beside its friction, the most severe first."""
+        if self.baseline is None:
+            return ()
+        found = diagnose_numbers(self.numbers, self.baseline, self.valve, self.valve_limits)
+        return tuple(by_severity(found))

@@ -3,7 +3,7 @@
 import math
 from datetime import datetime, timezone
 
-from valve_friction_ros.health import StatusSignal
+from valve_friction_ros.health import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.model import Recording
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
@@ -31,6 +31,10 @@ _ALARMS = {
 def valve_status(record: IdentifiedRecord) -> Status:
     """Return the status; green only where a comparison with a baseline found nothing."""
     diagnosis, limits = record.diagnosis, record.limits
+    worst = next(iter(record.findings), None)
+    if worst is not None and worst.level > diagnosis.level:
+        colour = Colour.RED if worst.level is Level.ERROR else Colour.AMBER
+        return Status(colour, "The valve has changed", f"NE 107: {worst.status_signal.value}")
     if diagnosis.status_signal in _ALARMS:
         return _ALARMS[diagnosis.status_signal]
     if diagnosis.ratio is None:

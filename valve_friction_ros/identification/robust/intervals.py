@@ -1,15 +1,15 @@
 """Intervals of the reported numbers, and where they come from."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.robust.broad_model import SWINGING
-from valve_friction_ros.identification.robust.coordinates import MAIN
+from valve_friction_ros.identification.robust.broad_model import SWINGING, BroadModel
+from valve_friction_ros.identification.robust.coordinates import MAIN, Coordinates
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS, TIMING
 from valve_friction_ros.identification.robust.numbers import (
     ReportedNumber,
@@ -21,6 +21,9 @@ from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING, SLID
 from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
 
 __all__ = ["NOISE_LIKE", "UNLIKELY", "Budget", "Estimated", "estimated"]
+
+NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
+"""Function of a model and a place of its fit: numbers by name."""
 
 _QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 NOISE_LIKE = 4.0
@@ -145,8 +148,12 @@ def _chance(fit: PosteriorFit) -> float:
     return count + 2.0 * math.sqrt(2.0 * count)
 
 
-def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
-    """Return the reported numbers with their intervals, of the best fit and its competitors.
+def estimated(
+    fits: Sequence[PosteriorFit], numbers_at: NumbersAt = reported_numbers
+) -> dict[str, Estimated]:
+    """Return numbers with their intervals, of the best fit and its competitors.
+
+    `numbers_at` says what the numbers are at a place of a fit; by default the reported ones.
 
     Of the places that the best fit came by, and of the ends of the others, those count whose
     probability chance may have lowered. Among those with all coordinates, and with a viscous
@@ -169,7 +176,7 @@ def estimated(fits: Sequence[PosteriorFit]) -> dict[str, Estimated]:
     places.sort(
         key=lambda place: (place[0].names != fit.names, _swings(place[1]), place[1].penalty)
     )
-    readings = [reported_numbers(fit.model, stage.at) for _, stage, _ in places]
+    readings = [numbers_at(fit.model, stage.at) for _, stage, _ in places]
     result = {}
     for name, first in readings[0].items():
         own = width = _half_width(*places[0][:2], first)

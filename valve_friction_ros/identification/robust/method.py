@@ -12,6 +12,7 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.robust.fitted_record import fitted_record
 from valve_friction_ros.identification.robust.intervals import estimated
+from valve_friction_ros.identification.robust.numbers import found_sizes
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.robust.remarks import sampling_remarks
 from valve_friction_ros.identification.robust.search import Prior, search
@@ -42,6 +43,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 
 __all__ = [
+    "IMPERFECTIONS_FOUND",
     "METHOD",
     "TIMING_UNCERTAINTY",
     "has_no_place_for",
@@ -53,6 +55,10 @@ __all__ = [
 
 METHOD = "robust"
 """Name of this method."""
+
+IMPERFECTIONS_FOUND = "imperfections"
+"""Name of the evidence that holds lag, slip force and asymmetry, with half widths
+(`found_sizes`)."""
 
 TIMING_UNCERTAINTY = 0.04
 """Timing uncertainty without a setting, s.
@@ -106,8 +112,8 @@ def identify_robust(
         raise RefusalError(
             f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
             f"{misfit.systematic * 1e3:.2g} mm of misfit): check that both signals belong to this "
-            "valve, and their units; if the packing was changed during the record, clear the "
-            "buffer and record again"
+            "valve, and their units, and that its stem reaches both ends of the travel; if the "
+            "packing was changed during the record, clear the buffer and record again"
         )
     return Result(
         method=METHOD,
@@ -131,6 +137,10 @@ def identify_robust(
             BUDGET: {
                 name: {"record": one.budget.record, "timing": one.budget.timing}
                 for name, one in numbers.items()
+            },
+            IMPERFECTIONS_FOUND: {
+                name: {"value": one.value, "half_width": one.half_width}
+                for name, one in estimated(fits, found_sizes).items()
             },
         },
         findings=(

@@ -8,9 +8,10 @@ import numpy as np
 
 from valve_friction_ros.identification.robust.broad_model import BroadModel
 from valve_friction_ros.identification.robust.coordinates import Coordinates
+from valve_friction_ros.identification.robust.imperfections import TIMING
 from valve_friction_ros.identification.trust.sliding import mean_over_distance, mean_speed
 
-__all__ = ["ReportedNumber", "loop_friction", "reported_numbers"]
+__all__ = ["ReportedNumber", "found_sizes", "loop_friction", "reported_numbers"]
 
 _RECTANGLE = 1.0 / math.sqrt(3.0)
 """Standard deviation of a rectangular distribution over its half width."""
@@ -103,6 +104,22 @@ def reported_numbers(model: BroadModel, at: Coordinates) -> dict[str, ReportedNu
         speed = at["stribeck_velocity"]
         numbers["stribeck_velocity"] = ReportedNumber(speed, {"stribeck_velocity": 1.0}, 0.0)
     return numbers
+
+
+def found_sizes(_: BroadModel, at: Coordinates) -> dict[str, ReportedNumber]:
+    """Return imperfections at a place of the fit that may be compared with those of another record.
+
+    The ``lag`` of the stem behind the pressure, s, is the sum of all timing; ``slip_force`` is
+    F_s − F_c, N; ``viscous_asymmetry`` is the share by which F_v is larger upward.
+    """
+    lag = sum(at[name] for name in TIMING)
+    return {
+        "lag": ReportedNumber(lag, dict.fromkeys(TIMING, 1.0), 0.0),
+        "slip_force": ReportedNumber(at["slip_force"], {"slip_force": 1.0}, 0.0),
+        "viscous_asymmetry": ReportedNumber(
+            at["viscous_asymmetry"], {"viscous_asymmetry": 1.0}, 0.0
+        ),
+    }
 
 
 def loop_friction(model: BroadModel, at: Coordinates) -> float:

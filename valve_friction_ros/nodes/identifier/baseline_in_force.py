@@ -7,7 +7,7 @@ from datetime import datetime, timezone
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import Baseline, FrictionMonitor, Level
+from valve_friction_ros.health import Baseline, Diagnosis, Finding, FrictionMonitor, Level
 from valve_friction_ros.history import KeptBaseline
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -85,13 +85,14 @@ class BaselineInForce:
         return await self._change(self._history.replaced_now(last, _RESTORE))
 
     def _require_no_alarm(self) -> None:
-        diagnosis = self._monitor.diagnosis()
+        found: list[Diagnosis | Finding] = [self._monitor.diagnosis(), *self._monitor.findings]
+        worst = max(found, key=lambda one: one.level)
         allowed = self._node.get_parameter(BASELINE_IN_ALARM.name).value
-        if diagnosis.level >= Level.WARN and not allowed:
+        if worst.level >= Level.WARN and not allowed:
             raise RefusalError(
-                f"the valve is in {diagnosis.level.name}, which another baseline may hide "
-                f"({diagnosis.message}): repair it and identify again, or set "
-                f"{BASELINE_IN_ALARM.name} to true if its friction is healthy, and call again"
+                f"the valve is in {worst.level.name}, which another baseline may hide "
+                f"({worst.message}): repair it and identify again, or set "
+                f"{BASELINE_IN_ALARM.name} to true if the valve is healthy, and call again"
             )
 
     async def _change(self, kept: KeptBaseline) -> str:

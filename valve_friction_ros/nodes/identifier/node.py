@@ -10,7 +10,7 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import FrictionMonitor
+from valve_friction_ros.health import FrictionMonitor, by_severity
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
@@ -41,6 +41,7 @@ from valve_friction_ros.nodes.identifier.status import (
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.identifier.watch import Watch
+from valve_friction_ros.nodes.identifier.whole_valve import WholeValve
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError
 from valve_friction_ros.nodes.plumbing.parameters import (
@@ -114,7 +115,11 @@ class Identifier(PolledNode):
         self._alerts = Alerts(self, workers.alerts, tag, self._monitor.diagnosis().level)
         self._usage = UsageWatch(self, self._monitor, self._history)
         self._alarm = AlarmRecorder(self, self._monitor, self._history, self._usage, workers.files)
-        self._watches: tuple[Watch, ...] = (self._usage, ResponseWatch(self))
+        self._watches: tuple[Watch, ...] = (
+            WholeValve(self._monitor),
+            self._usage,
+            ResponseWatch(self),
+        )
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
@@ -204,7 +209,13 @@ class Identifier(PolledNode):
         except InternalError:
             self._publish_diagnostics()
             raise
-        answer = "; ".join((*self._input_problems(), self._monitor.diagnosis().message))
+        answer = "; ".join(
+            (
+                *self._input_problems(),
+                self._monitor.diagnosis().message,
+                *(one.message for one in by_severity(self._monitor.findings)),
+            )
+        )
         await self._history.keep(record)
         self._publish_diagnostics()
         if refused is not None:

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from valve_friction_ros.alerts import Secrets, Webhook
-from valve_friction_ros.health import Baseline, FrictionLimits, MonitorSettings
+from valve_friction_ros.health import Baseline, FrictionLimits, MonitorSettings, ValveLimits
 from valve_friction_ros.identification import (
     CALIBRATION,
     DEFAULT_METHOD,
@@ -48,6 +49,7 @@ __all__ = [
     "SAVE_FOLDER",
     "TRAVEL",
     "TRAVEL_LIMIT",
+    "VALVE_LIMITS",
     "VALVE_TAG",
     "WEBHOOK_PERIOD",
     "WEBHOOK_URL",
@@ -214,6 +216,21 @@ ALARM_PARAMETERS = (
     ALARM_MEGABYTES,
     ALARM_PAUSE,
 )
+_CHANGES = {
+    "spring_change": "Change of the spring constant, as a share, worth maintenance [-]",
+    "spring_failure": "Change of the spring constant, as a share, that is a failure [-]",
+    "preload_change": "Shift of the preload over the spring's force in the travel, reported [-]",
+    "slip_change": "Growth of the slip jump, as a share of the travel, reported [-]",
+    "viscous_factor": "Factor of the viscous friction, up or down, reported [-]",
+    "asymmetry_change": "Change of viscous friction up against down, as a share, reported [-]",
+    "stop_change": "Shift of a travel stop, as a share of the travel, reported [-]",
+    "noise_factor": "Factor of the noise of a sensor, reported [-]",
+    "lag_change": "Change of the lag of the stem behind the pressure, reported [s]",
+}
+VALVE_LIMITS = tuple(
+    ParameterSpec(name, value, f"{_CHANGES[name]}, against the baseline", (0.0, 1e3))
+    for name, value in asdict(ValveLimits()).items()
+)
 
 CHANGEABLE = (
     *VALVE_PARAMETERS,
@@ -289,6 +306,7 @@ CHANGEABLE = (
         "Friction over baseline at which the packing may leak [-]",
         (0.0, 1.0),
     ),
+    *VALVE_LIMITS,
     SAVE_FOLDER,
     REPORT_FOLDER,
     HISTORY_DAYS,
@@ -325,6 +343,7 @@ def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
         method=values["method"],
         limits=FrictionLimits(values["warn_ratio"], values["error_ratio"], values["low_ratio"]),
         window=values["window"],
+        valve_limits=ValveLimits(**{one.name: values[one.name] for one in VALVE_LIMITS}),
     )
 
 

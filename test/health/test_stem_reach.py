@@ -1,0 +1,45 @@
+"""Ends of the stem's motion, and the stops among them, on simulated valves."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.health.stem_reach import stem_reach
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, Recording, SineWave, simulate
+
+STICKY = replace(HIGH_FRICTION, static_friction=2 * HIGH_FRICTION.coulomb_friction)
+TRAVEL = BENCH_VALVE.travel
+TIME = np.arange(3000) / 100
+
+
+def record(low, high, seat=0.0, noise=0.0):
+    """Three slow strokes between two pressures, kPa, on a stop that may have moved."""
+    wave = SineWave(period=10.0).sample(TIME)
+    share = (wave - wave.min()) / np.ptp(wave)
+    pressure = 1e3 * (low + (high - low) * share)
+    inner = replace(BENCH_VALVE, travel=TRAVEL - seat)
+    moved = replace(STICKY, spring_preload=STICKY.spring_preload + STICKY.spring_constant * seat)
+    position = simulate(inner, moved, pressure, 0.01).position + seat
+    position = position + noise * np.random.default_rng(5).standard_normal(position.size)
+    return Recording(0.01, pressure, position)
+
+
+@pytest.mark.parametrize("known", [STICKY.static_friction, math.nan])
+@pytest.mark.parametrize("noise", [0.0, 40e-6])
+def test_a_stem_that_turns_between_the_stops_meets_none(known, noise):
+    found = stem_reach(record(70.0, 160.0, noise=noise), BENCH_VALVE, known)
+    assert found.keys() == {"lowest_position", "highest_position"}
+    low, high = found["lowest_position"], found["highest_position"]
+    assert 0.0 < low.value < high.value < TRAVEL
+
+
+@pytest.mark.parametrize("known", [STICKY.static_friction, math.nan])
+@pytest.mark.parametrize("noise", [0.0, 40e-6])
+@pytest.mark.parametrize("seat", [0.0, 2e-3])
+def test_stops_are_found_where_they_are(known, noise, seat):
+    found = stem_reach(record(-45.0, 300.0, seat, noise), BENCH_VALVE, known)
+    for name, place in (("lower_stop", seat), ("upper_stop", TRAVEL)):
+        assert abs(found[name].value - place) <= found[name].half_width
+        assert found[name].half_width < 0.01 * TRAVEL

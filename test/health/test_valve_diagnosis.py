@@ -1,0 +1,272 @@
+"""What has changed on a valve beside its friction: bounds, causes, and whole identifications."""
+
+import math
+from dataclasses import fields, replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from records import quick_record
+
+from valve_friction_ros.health import (
+    Baseline,
+    Level,
+    Measured,
+    StatusSignal,
+    ValveLimits,
+    diagnose_numbers,
+    diagnose_parameters,
+    valve_numbers,
+)
+from valve_friction_ros.identification import RefusalError, identify
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, Valve
+
+TRAVEL, SPRING = 0.03, 2e5
+VALVE = Valve(diaphragm_area=0.04, pressure_reference=1e5, travel=TRAVEL)
+FORCE = SPRING * TRAVEL
+HEALTHY = {
+    "spring_constant": Measured(SPRING, 1e3),
+    "spring_preload": Measured(500.0, 20.0),
+    "coulomb_friction": Measured(150.0, 3.0),
+    "static_friction": Measured(170.0, 3.0),
+    "viscous_friction": Measured(5e3, 100.0),
+    "viscous_asymmetry": Measured(0.0, 0.05),
+    "slip_force": Measured(20.0, 5.0),
+    "lag": Measured(0.0, 0.003),
+    "lower_stop": Measured(0.0, 1e-5),
+    "upper_stop": Measured(TRAVEL, 1e-5),
+    "lowest_position": Measured(0.0, 1e-5),
+    "highest_position": Measured(TRAVEL, 1e-5),
+    "drive_noise": Measured(100.0, 2.0),
+    "stem_noise": Measured(1e-5, 2e-7),
+}
+BASELINE = Baseline(150.0, 3.0, numbers=HEALTHY)
+WARN, ERROR = Level.WARN, Level.ERROR
+MAINTENANCE, FUNCTION = StatusSignal.MAINTENANCE_REQUIRED, StatusSignal.CHECK_FUNCTION
+
+
+def found(baseline=BASELINE, valve=VALVE, limits=None, **changes):
+    """Findings where the numbers of the healthy valve are changed to these; None: not known."""
+    numbers = HEALTHY | {name: Measured(*one) for name, one in changes.items() if one is not None}
+    for name, one in changes.items():
+        if one is None:
+            del numbers[name]
+    return diagnose_numbers(numbers, baseline, valve, limits)
+
+
+def only(findings):
+    assert len(findings) == 1, findings
+    return findings[0]
+
+
+def test_an_unchanged_valve_has_no_finding():
+    assert found() == ()
+
+
+def test_a_baseline_of_a_friction_alone_says_nothing():
+    assert found(Baseline(150.0), spring_constant=(1e5, 10.0)) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "signal", "words"),
+    [
+        ({"spring_constant": (0.75 * SPRING, 1e3)}, WARN, MAINTENANCE, "check the spring"),
+        ({"spring_constant": (0.6 * SPRING, 1e3)}, ERROR, StatusSignal.FAILURE, "check the spring"),
+        ({"spring_constant": (1.25 * SPRING, 1e3)}, WARN, MAINTENANCE, "1.25 times"),
+        ({"spring_preload": (800.0, 20.0)}, WARN, MAINTENANCE, "check the bench set"),
+        ({"slip_force": (120.0, 20.0)}, WARN, MAINTENANCE, "jump by 2 % of its travel"),
+        ({"viscous_friction": (2e4, 4e2)}, WARN, MAINTENANCE, "viscous friction has grown to 4"),
+        ({"viscous_friction": (1e3, 50.0)}, WARN, MAINTENANCE, "viscous friction has fallen"),
+        ({"viscous_asymmetry": (-0.5, 0.05)}, WARN, MAINTENANCE, "larger downward"),
+        ({"lower_stop": (2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at its lower end: the stem stops"),
+        ({"lower_stop": (-2e-3, 1e-5)}, WARN, MAINTENANCE, "lower end has moved outward by -2.00"),
+        ({"upper_stop": (TRAVEL - 2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at its upper end"),
+        ({"stem_noise": (3e-5, 6e-7)}, WARN, FUNCTION, "noise of the stem position has grown to 3"),
+        ({"drive_noise": (300.0, 6.0)}, WARN, FUNCTION, "noise of the pressure has grown to 3"),
+        ({"lag": (0.05, 0.003)}, WARN, FUNCTION, "later against the pressure: +50 ms"),
+        ({"lag": (-0.05, 0.003)}, WARN, FUNCTION, "earlier against the pressure: -50 ms"),
+    ],
+)
+def test_each_change_is_a_finding_of_its_own(changes, level, signal, words):
+    finding = only(found(**changes))
+    assert (finding.level, finding.status_signal) == (level, signal)
+    assert words in finding.message
+
+
+LIMITS = ValveLimits()
+BOUNDS = {
+    "spring_constant": SPRING * (1 - LIMITS.spring_change),
+    "spring_preload": 500.0 + LIMITS.preload_change * FORCE,
+    "slip_force": 20.0 + LIMITS.slip_change * FORCE,
+    "viscous_asymmetry": LIMITS.asymmetry_change,
+    "lag": LIMITS.lag_change,
+    "upper_stop": TRAVEL * (1 - LIMITS.stop_change),
+}
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+@given(width=st.floats(1e-4, 0.5), past=st.sampled_from([-0.01, 0.01]))
+def test_a_bound_is_passed_only_by_the_whole_interval(name, width, past):
+    """Of the interval of the change, both half widths in squares; in the logarithm for a ratio."""
+    healthy, bound = HEALTHY[name], BOUNDS[name]
+    away = math.copysign(1.0, bound - healthy.value)
+    if name == "spring_constant":
+        whole = (1 + past) * math.hypot(width, healthy.share)
+        value = bound * math.exp(away * whole)
+        half = width * value
+    else:
+        half = width * abs(bound - healthy.value)
+        value = bound + away * (1 + past) * math.hypot(half, healthy.half_width)
+    assert bool(found(**{name: (value, half)})) == (past > 0)
+
+
+@given(st.dictionaries(st.sampled_from([*HEALTHY]), st.floats(-1, 1)))
+def test_numbers_within_their_intervals_raise_nothing(moved):
+    changes = {
+        name: (HEALTHY[name].value + share * HEALTHY[name].half_width, HEALTHY[name].half_width)
+        for name, share in moved.items()
+    }
+    assert found(**changes) == ()
+
+
+def scaled(factor, *names):
+    return {name: tuple(factor * one for one in HEALTHY[name]) for name in names}
+
+
+FORCES = ("spring_constant", "coulomb_friction", "static_friction", "viscous_friction")
+
+
+class TestCausesThatLookTheSame:
+    """A cause is named unless another number excludes it."""
+
+    def test_one_common_factor_is_a_scale(self):
+        finding = only(found(**scaled(0.75, *FORCES)))
+        assert finding.status_signal is FUNCTION
+        assert "one common factor points to the scale of the pressure sensor" in finding.message
+        assert "and the diaphragm area rather than to spring and packing" in finding.message
+
+    def test_a_spring_whose_friction_stays_is_no_scale_of_the_pressure(self):
+        message = only(found(**scaled(0.75, "spring_constant"))).message
+        assert "the position sensor's scale" in message
+        assert "pressure" not in message
+        unknown = found(
+            **scaled(0.75, "spring_constant"), coulomb_friction=None, static_friction=None
+        )
+        assert "the scale of the pressure sensor and the diaphragm area" in only(unknown).message
+
+    def test_a_weak_spring_takes_its_preload_with_it(self):
+        finding = only(found(**scaled(0.5, "spring_constant", "spring_preload")))
+        assert "the spring constant has changed, and its preload with it" in finding.message
+
+    def test_a_shifted_balance_has_four_causes(self):
+        message = only(
+            found(spring_preload=(620.0, 1.0), lower_stop=None, upper_stop=None, limits=LOW)
+        ).message
+        assert "+120 N" in message
+        assert "the zero of the pressure sensor (-3 kPa)" in message
+        assert "the zero of the position sensor (-0.6 mm)" in message
+        assert "packing whose friction is larger upward" in message
+
+    def test_stops_that_stay_exclude_the_position_sensor(self):
+        message = only(found(spring_preload=(620.0, 1.0), limits=LOW)).message
+        assert "the bench set" in message
+        assert "position sensor" not in message
+
+    def test_a_shift_beyond_the_friction_is_no_asymmetry(self):
+        message = only(found(spring_preload=(800.0, 1.0))).message
+        assert "packing" not in message
+
+    def test_stops_that_move_with_the_balance_convict_the_position_sensor(self):
+        shift = -2e-3
+        balance, stops = found(
+            spring_preload=(500.0 - SPRING * shift, 20.0),
+            lower_stop=(shift, 1e-5),
+            upper_stop=(TRAVEL + shift, 1e-5),
+        )
+        assert "zero of the position sensor (-2 mm), as the travel stops have" in balance.message
+        assert "both travel stops have moved alike, by -2.00 mm" in stops.message
+
+
+LOW = replace(LIMITS, preload_change=0.01)
+
+
+def test_travel_is_lost_where_the_baseline_met_no_stop_and_went_further():
+    reached = {name: one for name, one in HEALTHY.items() if "stop" not in name}
+    baseline = replace(BASELINE, numbers=reached)
+    assert "travel is lost" in only(found(baseline, lower_stop=(2e-3, 1e-5))).message
+    assert found(baseline, lower_stop=(-2e-3, 1e-5)) == ()
+
+
+def test_without_travel_shares_of_it_are_not_compared():
+    changed = {"spring_preload": (900.0, 1.0), "slip_force": (400.0, 1.0), "lower_stop": (1.0, 0.0)}
+    assert found(valve=replace(VALVE, travel=math.inf), **changed) == ()
+
+
+@pytest.mark.parametrize("name", [one.name for one in fields(ValveLimits)])
+def test_impossible_limits_are_refused(name):
+    with pytest.raises(ValueError, match=f"{name} must be above"):
+        ValveLimits(**{name: 0.0})
+
+
+def test_limits_of_the_spring_are_in_order():
+    with pytest.raises(ValueError, match="spring_change < spring_failure"):
+        ValveLimits(spring_change=0.4)
+
+
+def noisy_record(packing, seed):
+    return SensorNoise(5e-6, 50.0, seed).applied_to(quick_record(packing))
+
+
+@pytest.fixture(scope="module")
+def healthy_result():
+    return identify(noisy_record(LOW_FRICTION, 1), BENCH_VALVE)
+
+
+class TestWholeIdentifications:
+    """Records of simulated valves, from the samples to the sentence."""
+
+    def test_an_unchanged_valve_with_another_noise(self, healthy_result):
+        again = identify(noisy_record(LOW_FRICTION, 2), BENCH_VALVE)
+        assert diagnose_parameters(again, Baseline.of(healthy_result)) == ()
+
+    def test_a_spring_that_has_lost_a_third_of_its_stiffness(self, healthy_result):
+        weak = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
+        result = identify(noisy_record(weak, 3), BENCH_VALVE)
+        finding = only(diagnose_parameters(result, Baseline.of(healthy_result)))
+        assert finding.level is ERROR
+        assert finding.message.startswith("the spring constant has changed")
+        numbers = valve_numbers(result)
+        assert numbers["spring_constant"].value == pytest.approx(weak.spring_constant, rel=0.01)
+
+    def test_another_area_is_one_common_factor(self, healthy_result):
+        area = replace(BENCH_VALVE, diaphragm_area=0.75 * BENCH_VALVE.diaphragm_area)
+        result = identify(noisy_record(LOW_FRICTION, 4), area)
+        first, *_ = diagnose_parameters(result, Baseline.of(healthy_result))
+        assert "one common factor" in first.message
+
+    def test_without_a_baseline_nothing_is_compared(self, healthy_result):
+        assert diagnose_parameters(healthy_result, None) == ()
+        assert diagnose_parameters(healthy_result, Baseline(150.0)) == ()
+
+
+def test_a_doubted_model_leaves_only_what_the_signals_say(healthy_result):
+    doubted = replace(healthy_result.misfit, systematic=1e-3, tolerated=1e-4)
+    assert not doubted.describes
+    numbers = valve_numbers(replace(healthy_result, misfit=doubted))
+    assert numbers.keys() == {"drive_noise", "stem_noise", "lowest_position", "highest_position"}
+
+
+def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):
+    spring = replace(healthy_result.parameters["spring_constant"], half_width=0.11 * 2.05e5)
+    parameters = {**healthy_result.parameters, "spring_constant": spring}
+    numbers = valve_numbers(replace(healthy_result, parameters=parameters))
+    assert "spring_preload" not in numbers
+    assert "stem_noise" in numbers
+
+
+def test_a_refused_baseline_is_still_refused(healthy_result):
+    parameters = {
+        name: replace(one, value=math.nan) for name, one in healthy_result.parameters.items()
+    }
+    with pytest.raises(RefusalError):
+        Baseline.of(replace(healthy_result, parameters=parameters))

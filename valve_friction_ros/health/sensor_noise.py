@@ -1,0 +1,53 @@
+"""Noise of both sensors of a record, where the record shows it as noise and as nothing else."""
+
+import math
+
+import numpy as np
+
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.stamped import StampedSignal
+from valve_friction_ros.signals.holds import without_repeats
+from valve_friction_ros.signals.stamped_noise import stamped_noise
+
+__all__ = ["sensor_noises"]
+
+_FEWEST = 200
+_LIKE_WHITE = 1.25
+"""Noise of every second sample over that of all, up to which it counts.
+
+It is 1 for white noise. Where it is more, the noise has a memory, or the signal itself moves as
+much from sample to sample: the number then depends on rate and drive, and not on the sensor."""
+
+_FINEST = 1e-4
+"""Share of the signal's range below which a noise is not told apart from none."""
+
+
+def sensor_noises(recording: Recording) -> dict[str, Measured]:
+    """Return ``drive_noise`` (Pa or N) and ``stem_noise`` (m), standard deviations.
+
+    One that depends on rate or drive is left out.
+    """
+    if (stamped := recording.stamped) is not None:
+        signals = stamped.drive, stamped.position
+    elif len(recording) >= _FEWEST:
+        time = recording.time
+        drive, position = recording.drive, recording.position
+        signals = StampedSignal(time, drive), StampedSignal(time, position)
+    else:
+        return {}
+    named = zip(("drive_noise", "stem_noise"), map(_noise, signals), strict=True)
+    return {name: noise for name, noise in named if noise is not None}
+
+
+def _noise(signal: StampedSignal) -> Measured | None:
+    fresh = without_repeats(signal)
+    if fresh.time.size < _FEWEST:
+        return None
+    noise = stamped_noise(fresh)
+    sparse = stamped_noise(StampedSignal(fresh.time[::2], fresh.value[::2]))
+    finest = _FINEST * float(np.ptp(fresh.value))
+    if sparse > _LIKE_WHITE * max(noise, finest):
+        return None
+    chance = 2.0 * noise / math.sqrt(fresh.time.size)
+    return Measured(max(noise, finest), math.hypot(chance, sparse - noise))

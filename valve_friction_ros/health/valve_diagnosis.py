@@ -1,0 +1,283 @@
+"""What has changed on a valve beside its friction, and what to check."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.stop_findings import stop_findings
+from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.health.valve_numbers import valve_numbers
+from valve_friction_ros.identification import Result
+from valve_friction_ros.identification.trust.rounding import percentage
+from valve_friction_ros.model.drive import Drive
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["diagnose_numbers", "diagnose_parameters"]
+
+_COMMON_SHARE = 0.3
+"""Half width of the interval of a ratio, as a share, up to which it speaks for a common factor."""
+
+
+def diagnose_parameters(
+    result: Result, baseline: Baseline | None, limits: ValveLimits | None = None
+) -> tuple[Finding, ...]:
+    """Compare what a result says of its valve with the baseline (`diagnose_numbers`).
+
+    Nothing is found without a baseline, or by one that holds a friction alone.
+
+    Examples
+    --------
+    >>> import valve_friction_ros as vf
+    >>> from valve_friction_ros.health import diagnose_parameters
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
+    >>> def identified(spring_constant):
+    ...     packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, spring_constant)
+    ...     stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    ...     return vf.identify(vf.Recording(0.01, pressure, stem.position), valve)
+    >>> healthy = vf.Baseline.of(identified(2.05e5))
+    >>> [str(one)[:58] for one in diagnose_parameters(identified(1.37e5), healthy)]
+    ['ERROR: the spring constant has changed: 0.668 times (0.66']
+    """
+    if baseline is None or not baseline.numbers:
+        return ()
+    return diagnose_numbers(valve_numbers(result), baseline, result.valve, limits)
+
+
+def diagnose_numbers(
+    numbers: Mapping[str, Measured],
+    baseline: Baseline,
+    valve: Valve,
+    limits: ValveLimits | None = None,
+) -> tuple[Finding, ...]:
+    """Compare the numbers of a valve with those of its baseline.
+
+    Parameters
+    ----------
+    numbers : mapping of str to Measured
+        What the latest result says of the valve (`valve_numbers`).
+    baseline : Baseline
+        The healthy valve.
+    valve : Valve
+        Gives travel, area and drive.
+    limits : ValveLimits, optional
+        Bounds of the changes.
+
+    Returns
+    -------
+    tuple of Finding
+        One for each change that is surely beyond its bound, with what to check. A number that
+        either side lacks is not compared. Causes that a record cannot tell apart are all named;
+        those that another number excludes are not.
+    """
+    case = _Case(
+        numbers,
+        baseline.numbers,
+        valve_changes(numbers, baseline.numbers),
+        valve,
+        limits or ValveLimits(),
+    )
+    common = [*_common_scale(case)]
+    single = [] if common else [*_spring(case), *_slip(case), *_viscous(case)]
+    return (
+        *common,
+        *single,
+        *_preload(case),
+        *_asymmetry(case),
+        *stop_findings(case.now, case.healthy, case.valve, case.limits.stop_change),
+        *_noises(case),
+        *_lag(case),
+    )
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Numbers now and of the baseline, with their changes."""
+
+    now: Mapping[str, Measured]
+    healthy: Mapping[str, Measured]
+    changes: Mapping[str, Change]
+    valve: Valve
+    limits: ValveLimits
+
+    @property
+    def spring_force(self) -> float:
+        """Force of the healthy spring over the travel, N; nan where either is unknown."""
+        spring = self.healthy.get("spring_constant")
+        if spring is None or not math.isfinite(self.valve.travel):
+            return math.nan
+        return spring.value * self.valve.travel
+
+    @property
+    def drive(self) -> str:
+        """The drive in words."""
+        return self.valve.driven_by.words
+
+    @property
+    def area(self) -> str:
+        """The area, for a list of causes, where there is one."""
+        return " and the diaphragm area" if self.valve.driven_by is Drive.PRESSURE else ""
+
+
+def _maintenance(message: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message)
+
+
+def _check(message: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message)
+
+
+def _times(change: Change) -> str:
+    return f"{change.value:.3g} times ({change.low:.3g} to {change.high:.3g})"
+
+
+def _by(change: Change, unit: str) -> str:
+    """Write a difference and its interval."""
+    return f"{change.value:+.3g} {unit} ({change.low:+.3g} to {change.high:+.3g})"
+
+
+def _spring_change(case: _Case) -> Change | None:
+    """Return the ratio of the spring constants where it is surely beyond its bound."""
+    change, share = case.changes.get("spring_constant"), case.limits.spring_change
+    return change if change is not None and change.beyond(1 - share, 1 + share) else None
+
+
+def _common_scale(case: _Case) -> Iterator[Finding]:
+    """Find that all forces have changed by one factor, as by another scale of the drive."""
+    spring = _spring_change(case)
+    coulomb = case.changes.get("coulomb_friction")
+    if spring is None or coulomb is None or coulomb.holds(1.0):
+        return
+    others = [case.changes.get(name) for name in ("static_friction", "viscous_friction")]
+    known = [one for one in others if one is not None and one.high / one.low < 1 + _COMMON_SHARE]
+    if all(one.agrees_with(spring) for one in (coulomb, *known)):
+        yield _check(
+            f"spring constant and friction have changed alike, to {_times(spring)} the baseline: "
+            f"one common factor points to the scale of the {case.drive} sensor{case.area} rather "
+            "than to spring and packing at once: check them"
+        )
+
+
+def _spring(case: _Case) -> Iterator[Finding]:
+    change = _spring_change(case)
+    if change is None:
+        return
+    share, value = case.limits.spring_failure, case.now["spring_constant"].value
+    coulomb, preload = case.changes.get("coulomb_friction"), _preload_ratio(case)
+    causes = ["the position sensor's scale"]
+    if coulomb is None or coulomb.agrees_with(change):
+        causes.append(f"the scale of the {case.drive} sensor{case.area}")
+    also = ", and its preload with it" if preload and preload.agrees_with(change) else ""
+    message = (
+        f"the spring constant has changed{also}: {_times(change)} the baseline, now {value:.4g} "
+        f"N/m: check the spring, and {' and '.join(causes)}, which would look the same"
+    )
+    if change.beyond(1 - share, 1 + share):
+        yield Finding(Level.ERROR, StatusSignal.FAILURE, message)
+    else:
+        yield _maintenance(message)
+
+
+def _preload_ratio(case: _Case) -> Change | None:
+    """Return the ratio of the preloads, where both are surely above zero."""
+    now, healthy = (side.get("spring_preload") for side in (case.now, case.healthy))
+    if now is None or healthy is None:
+        return None
+    if min(now.value - now.half_width, healthy.value - healthy.half_width) <= 0:
+        return None
+    return valve_changes({"spring_constant": now}, {"spring_constant": healthy})["spring_constant"]
+
+
+def _preload(case: _Case) -> Iterator[Finding]:
+    shift, bound = case.changes.get("spring_preload"), case.spring_force
+    bound *= case.limits.preload_change
+    if shift is None or not shift.beyond(-bound, bound):
+        return
+    spring, ratio = _spring_change(case), _preload_ratio(case)
+    if spring is not None and ratio is not None and ratio.agrees_with(spring):
+        return  # the same spring, as far compressed as before
+    share = percentage(abs(shift.value) / case.spring_force)
+    yield _maintenance(
+        f"the balance of forces has shifted: spring preload {_by(shift, 'N')}, {share} of the "
+        f"spring's force over the travel: check {' or '.join(_preload_causes(case, shift))}"
+    )
+
+
+def _preload_causes(case: _Case, shift: Change) -> list[str]:
+    """Name what may have shifted the balance, but for what another number excludes."""
+    stiffness = case.healthy["spring_constant"].value
+    moved = shift.times(-1.0 / stiffness)
+    stops = [case.changes[name] for name in ("lower_stop", "upper_stop") if name in case.changes]
+    bound = case.limits.stop_change * case.valve.travel
+    zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm)"
+    if stops and all(one.agrees_with(moved) and one.beyond(-bound, bound) for one in stops):
+        return [f"{zero}, as the travel stops have moved alike"]
+    zero_of_drive = case.valve.actuator_drive(-shift.value) - case.valve.actuator_drive(0.0)
+    drive = f"{zero_of_drive / case.valve.driven_by.size:+.3g} {case.valve.driven_by.unit}"
+    causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive})"]
+    if not stops or any(one.agrees_with(moved) for one in stops):
+        causes.append(zero)
+    friction = case.now.get("coulomb_friction")
+    if friction is None or min(abs(shift.low), abs(shift.high)) < friction.value:
+        way = "up" if shift.value > 0 else "down"
+        causes.append(f"packing whose friction is larger {way}ward")
+    return causes
+
+
+def _slip(case: _Case) -> Iterator[Finding]:
+    growth, bound = case.changes.get("slip_force"), case.limits.slip_change * case.spring_force
+    if growth is None or not growth.low > bound:
+        return
+    jump = percentage(case.now["slip_force"].value / case.spring_force)
+    yield _maintenance(
+        f"the slip jump has grown: static above sliding friction {_by(growth, 'N')}, which makes "
+        f"the stem jump by {jump} of its travel: check packing, stem and guides for sticking"
+    )
+
+
+def _viscous(case: _Case) -> Iterator[Finding]:
+    ratio, factor = case.changes.get("viscous_friction"), case.limits.viscous_factor
+    way = 0 if ratio is None else ratio.beyond(1 / factor, factor)
+    if ratio is not None and way:
+        yield _maintenance(
+            f"viscous friction has {'grown' if way > 0 else 'fallen'} to {_times(ratio)} the "
+            "baseline: check packing and lubricant, and the air path of the actuator; a changed "
+            "lag between the signals would look much the same"
+        )
+
+
+def _asymmetry(case: _Case) -> Iterator[Finding]:
+    change, bound = case.changes.get("viscous_asymmetry"), case.limits.asymmetry_change
+    if change is not None and change.beyond(-bound, bound):
+        way = "up" if change.value > 0 else "down"
+        yield _maintenance(
+            f"viscous friction has become larger {way}ward: share {_by(change, '')}: check stem "
+            "and packing for wear on one side, and the air path for a throttle that acts one way"
+        )
+
+
+def _noises(case: _Case) -> Iterator[Finding]:
+    names = {"drive_noise": case.drive, "stem_noise": "stem position"}
+    for name, words in names.items():
+        ratio = case.changes.get(name)
+        if ratio is not None and ratio.low > case.limits.noise_factor:
+            yield _check(
+                f"the noise of the {words} has grown to {_times(ratio)} the baseline: check the "
+                "sensor, its cable, its supply and its mounting"
+            )
+
+
+def _lag(case: _Case) -> Iterator[Finding]:
+    change, bound = case.changes.get("lag"), case.limits.lag_change
+    if change is None or not change.beyond(-bound, bound):
+        return
+    way = "later" if change.value > 0 else "earlier"
+    yield _check(
+        f"the stem has become {way} against the {case.drive}: {_by(change.times(1e3), 'ms')}: "
+        "check filters and clocks of both sensors, and tubing and volume between sensor and "
+        "actuator; a changed viscous friction would look much the same"
+    )

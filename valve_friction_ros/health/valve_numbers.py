@@ -1,0 +1,116 @@
+"""What a result says of the whole valve: parameters, ends of the stem's motion, sensors."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.sensor_noise import sensor_noises
+from valve_friction_ros.health.stem_reach import stem_reach
+from valve_friction_ros.identification import (
+    CLOCK_OFFSET,
+    IMPERFECTIONS_FOUND,
+    SLIDING,
+    Parameter,
+    Result,
+    Verdict,
+)
+
+__all__ = ["COMPARED", "fit_numbers", "valve_numbers"]
+
+COMPARED = (
+    "spring_constant",
+    "spring_preload",
+    "coulomb_friction",
+    "static_friction",
+    "viscous_friction",
+    "viscous_asymmetry",
+)
+"""Parameters of a result that are compared with those of a baseline."""
+
+_SURE_SPRING = 0.1
+"""Half width of the spring constant, as a share, up to which the numbers of a fit count.
+
+Chosen. Where the spring is known no better, the record leaves open what is spring and what is
+friction, and all numbers of the fit depend on that."""
+
+
+def valve_numbers(result: Result) -> dict[str, Measured]:
+    """Return all that a result has measured of the valve, by name, SI units.
+
+    Parameters are there where they are identified or weak, without the uncertainties of area and
+    sensor scales, which two records of the same sensors share; not where the model does not
+    describe the valve, or the spring constant is known to no better than 10 %. The others are:
+
+    - ``slip_force``, F_s − F_c, N; ``viscous_asymmetry``; ``lag`` of the stem, s;
+    - ``lowest_position``, ``highest_position``, and the stops that were met (`stem_reach`);
+    - ``drive_noise`` and ``stem_noise`` (`sensor_noises`).
+    """
+    known = {
+        one.name: Measured(one.value, one.half_width)
+        for one in (each.without_calibration for each in result.parameters.values())
+        if _is_known(one)
+    }
+    is_described = result.misfit is None or result.misfit.describes
+    holding = _static_friction(known) if is_described else math.nan
+    numbers = sensor_noises(result.recording)
+    numbers |= stem_reach(result.recording, result.valve, holding)
+    fit = fit_numbers(known) if is_described else {}
+    if fit:
+        fit |= _imperfections(result.evidence, known)
+    return numbers | fit
+
+
+def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
+    """Return what known parameters say of a valve: `COMPARED` and ``slip_force``, F_s − F_c.
+
+    There is nothing where the spring constant is not known well enough.
+    """
+    spring = known.get("spring_constant")
+    if spring is None or spring.share > _SURE_SPRING:
+        return {}
+    numbers = {name: known[name] for name in COMPARED if name in known}
+    if {"static_friction", "coulomb_friction"} <= known.keys():
+        static, coulomb = known["static_friction"], known["coulomb_friction"]
+        numbers["slip_force"] = Measured(
+            static.value - coulomb.value, static.half_width + coulomb.half_width
+        )
+    return numbers
+
+
+def _is_known(one: Parameter) -> bool:
+    return one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.half_width >= 0
+
+
+def _static_friction(known: Mapping[str, Measured]) -> float:
+    """Return the largest static friction that there may be, N; nan where no friction is known."""
+    frictions = (
+        known[name] for name in ("static_friction", "coulomb_friction", SLIDING) if name in known
+    )
+    return max((one.value + one.half_width for one in frictions), default=math.nan)
+
+
+def _imperfections(
+    evidence: Mapping[str, Any], known: Mapping[str, Measured]
+) -> dict[str, Measured]:
+    """Return slip force, asymmetry and lag, as the method found them.
+
+    A slip force is known no better than F_c, from which it is counted. Sliding, the stem stands
+    (F_v/k)·ẋ behind where it would be without viscous friction, and a lag τ shows it τ·ẋ behind: so
+    the lag is known no better than F_v/k, and not at all without F_v.
+    """
+    found = {
+        name: Measured(one["value"], one["half_width"])
+        for name, one in evidence.get(IMPERFECTIONS_FOUND, {}).items()
+    }
+    if CLOCK_OFFSET in known:
+        found["lag"] = known[CLOCK_OFFSET]
+    spring = known["spring_constant"].value
+    for name, beside, per in (
+        ("slip_force", "coulomb_friction", 1.0),
+        ("lag", "viscous_friction", spring),
+    ):
+        if (one := found.pop(name, None)) is not None and beside in known:
+            width = math.hypot(one.half_width, known[beside].half_width / per)
+            found[name] = Measured(one.value, width)
+    return found
