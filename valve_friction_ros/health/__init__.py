@@ -1,6 +1,7 @@
 """Health of a valve: its baseline, its diagnosis, and the monitor of one valve; no ROS."""
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
+from valve_friction_ros.health.by_evidence import baseline_by_evidence, diagnosis_by_evidence
 from valve_friction_ros.health.comparison import (
     Comparison,
     Ratio,
@@ -39,12 +40,14 @@ __all__ = [
     "Ratio",
     "SlidingFriction",
     "StatusSignal",
+    "baseline_by_evidence",
     "by_severity",
     "carried",
     "compared",
     "dead_band",
     "diagnose",
     "diagnose_again",
+    "diagnosis_by_evidence",
     "friction_words",
     "identify_snapshot",
     "percentage",
