@@ -60,11 +60,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     told: list[Told] = []
     with ProcessPoolExecutor(options.jobs) as pool:
         pending = [pool.submit(tried, task) for task in tasks]
-        for future in as_completed(pending):
-            told.append(future.result())
-            task = told[-1].task
-            line = f"{len(told)}/{len(tasks)} {task.plant}, {task.course}, {task.hours} h"
-            console.print(line, highlight=False)
+        try:
+            for future in as_completed(pending):
+                told.append(future.result())
+                task = told[-1].task
+                line = f"{len(told)}/{len(tasks)} {task.plant}, {task.course}, {task.hours} h"
+                console.print(line, highlight=False)
+        except KeyboardInterrupt:  # show what is done
+            pool.shutdown(wait=False, cancel_futures=True)
     for table in tables(told):
         console.print(table)
     return 0 if bounds_met(told, console) else 1

@@ -28,7 +28,7 @@ from valve_friction_ros.identification import (
     Parameter,
 )
 from valve_friction_ros.identification.trust.calibration import calibrated, calibration_share
-from valve_friction_ros.identification.trust.verdict import fixed, not_identifiable, with_verdict
+from valve_friction_ros.identification.trust.verdict import Verdict, fixed, not_identifiable, with_verdict
 from valve_friction_ros.model.valve import Valve
 
 __all__ = ["MOST_MOVES", "Change", "Evidence", "evidence_of"]
@@ -46,6 +46,7 @@ _NAMES = (
     "sliding_friction",
     "dead_band",
 )
+_MEAN_SLOPE = "the change of friction with speed among moves, by whatever law"
 _COULOMB = "moves in service do not split friction into F_c and F_v"
 
 
@@ -205,6 +206,12 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
         name: with_verdict(name, float(value), *balance.number(slope))
         for name, (value, slope) in numbers.items()
     }
+    # Kept where it holds zero too: it carries the friction from one speed to another.
+    slope = numbers["viscous_friction"][1]
+    error, width = balance.number(slope)
+    found["viscous_friction"] = Parameter(
+        "viscous_friction", float(values[SPEED]), error, width, Verdict.WEAK, _MEAN_SLOPE
+    )
     if spring is not None:
         found["spring_constant"] = fixed("spring_constant", spring)
     if balance.onsets < FEWEST_MOVES:
