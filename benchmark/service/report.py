@@ -89,9 +89,7 @@ def tables(told: Sequence[Told]) -> list[Table]:
 
 def bounds_met(told: Sequence[Told], console: Console) -> bool:
     """Print each bound and what was reached; return whether all are met."""
-    numbers = {
-        name: [n for one in told for n in one.numbers if n.name == name] for name in _NAMES
-    }
+    numbers = {name: [n for one in told for n in one.numbers if n.name == name] for name in _NAMES}
     spread = [
         n
         for one in told

@@ -78,9 +78,9 @@ def stretches(
     valve: ServiceValve,
     hours: float,
     seed: int,
-    friction: Callable[[float], float] = lambda hour: 1.0,
-    offset: Callable[[float], float] = lambda hour: 0.0,
-    duty: Callable[[float], Duty] | None = None,
+    friction: Callable[[float], float],
+    offset: Callable[[float], float],
+    duty: Callable[[float], Duty],
 ) -> Iterator[Stretch]:
     """Serve for some hours.
 
@@ -96,8 +96,8 @@ def stretches(
         Friction at an hour, over that of the plant.
     offset : callable
         Force, N, by which the preload has moved at an hour.
-    duty : callable, optional
-        Set points at an hour; by default the valve's.
+    duty : callable
+        Set points at an hour.
 
     Yields
     ------
@@ -112,7 +112,7 @@ def stretches(
     count, actions = round(STRETCH * senses.rate), round(STRETCH / loop.action_period)
     for stretch in range(round(hours * 3600.0 / STRETCH)):
         hour = stretch * STRETCH / 3600.0
-        asked = valve.duty if duty is None else duty(hour)
+        asked = duty(hour)
         levels = _set_points(asked, level, round(STRETCH / asked.period), random)
         level = levels[-1]
         asked_at = np.repeat(levels, round(asked.period / loop.action_period))[:actions]

@@ -1,5 +1,6 @@
 """One valve over hours of service: what its evidence says, beside what is true."""
 
+import contextlib
 import math
 from collections import deque
 from collections.abc import Iterator
@@ -26,6 +27,9 @@ __all__ = ["Number", "Task", "Told", "tried"]
 _PER_HOUR = round(3600.0 / STRETCH)
 _BEFORE = 3
 _DAY = 24.0
+_BEGIN = 1_700_000_000
+_SAME = 3600e9
+"""Time of the first sample, s; and between two dates of one change, ns."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +111,7 @@ class _Course:
         return 1.0
 
     def offset(self, hour: float) -> float:
-        """A warm day moves the zero of the pressure, or the preload."""
+        """Return how far a warm day moves the zero of the pressure, N."""
         return self._drift * math.sin(2 * math.pi * (hour - self._phase) / _DAY)
 
     def duty(self, hour: float) -> Duty:
@@ -126,8 +130,15 @@ class _Course:
             )
         return self._phases[part]
 
+    def has_changed(self, hour: float) -> bool:
+        """Return whether friction has begun to change before an hour."""
+        if self._task.course == "step":
+            return hour > self.at
+        return self._task.course == "slow" and hour > _BEFORE
+
     @property
     def reached(self) -> float:
+        """Hour at which friction has reached 1.5."""
         return self.at if self._task.course == "step" else float(self._task.hours - 2)
 
 
@@ -144,63 +155,73 @@ def _truths(
         yield Number(name, truth, one.value, one.half_width)
 
 
+class _Watched:
+    """The evidence of a valve, as an identifier gathers it, and what it declares."""
+
+    def __init__(self, task: Task, valve: Valve, course: _Course) -> None:
+        self._valve, self._course = valve, course
+        self._stream, self._limits = MoveStream(valve), FrictionLimits()
+        self._ledger: deque[Move] = deque(maxlen=MOST_MOVES)
+        self._baseline: Baseline | None = None
+        self._known: list[int] = []
+        self._was_high = False
+        self.told = Told(task)
+        self.evidence = evidence_of([], valve)
+
+    def take(self, hour: float, stretch: Stretch) -> tuple[Move, ...]:
+        """Take ten minutes that end at an hour; return their moves."""
+        moves = self._stream.take(_arrivals(stretch))
+        self._ledger.extend(moves)
+        self.evidence = evidence_of(list(self._ledger), self._valve)
+        if hour == _BEFORE:
+            with contextlib.suppress(RefusalError):
+                self._baseline = baseline_by_evidence(self.evidence)
+        self._declare(hour)
+        self._alarm(hour)
+        return moves
+
+    def _declare(self, hour: float) -> None:
+        told, change = self.told, self.evidence.change
+        if change is None or any(abs(change.latest - one) < _SAME for one in self._known):
+            return
+        self._known.append(change.latest)
+        if not self._course.has_changed(hour):
+            told.changes += 1
+        elif math.isnan(told.declared):
+            told.declared = hour - self._course.reached
+
+    def _alarm(self, hour: float) -> None:
+        told = self.told
+        found = diagnosis_by_evidence(self.evidence, self._valve, self._baseline, self._limits)
+        is_high = found is not None and found.level >= Level.WARN
+        if is_high and not self._course.has_changed(hour):
+            told.alarms += not self._was_high
+        elif is_high and math.isnan(told.alarmed):
+            told.alarmed = hour - self._course.reached
+        self._was_high = is_high
+
+
 def tried(task: Task) -> Told:
     """Simulate the service of a task, and take its evidence every ten minutes."""
     plant = PLANTS[task.plant]
-    body = plant.plant.body
+    body, course = plant.plant.body, _Course(task, plant)
     valve = Valve(body.area, body.pressure_reference, body.travel)
-    course, told = _Course(task, plant), Told(task)
-    stream, limits = MoveStream(valve), FrictionLimits()
-    ledger: deque[Move] = deque(maxlen=MOST_MOVES)
-    baseline: Baseline | None = None
-    known: set[int] = set()
-    high = False
-    hourly: list[Move] = []
+    watched = _Watched(task, valve, course)
+    told, moves = watched.told, []
     work = distance = 0.0
-    evidence = evidence_of([], valve)
-    service = stretches(
-        plant, task.hours, task.seed, course.friction, course.offset, course.duty
-    )
+    service = stretches(plant, task.hours, task.seed, course.friction, course.offset, course.duty)
     for count, stretch in enumerate(service, start=1):
-        hour = count / _PER_HOUR
-        moves = stream.take(_arrivals(stretch))
-        ledger.extend(moves)
-        hourly.extend(moves)
+        moves += watched.take(count / _PER_HOUR, stretch)
         work, distance = work + stretch.work, distance + stretch.distance
-        evidence = evidence_of(list(ledger), valve)
-        if hour == _BEFORE:
-            try:
-                baseline = baseline_by_evidence(evidence)
-            except RefusalError:
-                baseline = None
-        after = task.course != "steady" and hour > (
-            course.at if task.course == "step" else _BEFORE
-        )
-        if (change := evidence.change) is not None and not any(
-            abs(change.latest - one) < 3.6e12 for one in known
-        ):
-            known.add(change.latest)
-            if not after:
-                told.changes += 1
-            elif math.isnan(told.declared):
-                told.declared = hour - course.reached
-        diagnosis = diagnosis_by_evidence(evidence, valve, baseline, limits)
-        is_high = diagnosis is not None and diagnosis.level >= Level.WARN
-        if is_high and not high and not after:
-            told.alarms += 1
-        if is_high and after and math.isnan(told.alarmed):
-            told.alarmed = hour - course.reached
-        high = is_high
-        if count % _PER_HOUR == 0:
-            if course.friction(hour - 1e-6) == course.friction(hour - 1.0):
-                scale = course.friction(hour - 1e-6)
-                alone = evidence_of(hourly, valve)
-                told.numbers += _truths(alone, plant, scale, work / distance)
-            hourly, work, distance, last = [], 0.0, 0.0, work / distance
-            if hour == task.hours:
-                scale = course.friction(hour - 1e-6)
-                told.late = list(_truths(evidence, plant, scale, last))
-    if task.course == "step" and evidence.change is not None:
-        begin = 1_700_000_000 + course.at * 3600
-        told.dated = evidence.change.earliest / 1e9 <= begin <= evidence.change.latest / 1e9
+        if count % _PER_HOUR:
+            continue
+        hour = count // _PER_HOUR
+        scale = course.friction(hour - 1e-6)
+        if scale == course.friction(hour - 1.0):
+            told.numbers += _truths(evidence_of(moves, valve), plant, scale, work / distance)
+        told.late = list(_truths(watched.evidence, plant, scale, work / distance))
+        moves, work, distance = [], 0.0, 0.0
+    if task.course == "step" and (change := watched.evidence.change) is not None:
+        begin = _BEGIN + course.at * 3600
+        told.dated = change.earliest / 1e9 <= begin <= change.latest / 1e9
     return told

@@ -187,7 +187,7 @@ def balance_of(
     values, weight = _robust(design, target, precision, scale)
     scatter, lag = _covariance(design, target, weight, count, precision)
     values[SPRING] += shift
-    systematic = timing**2 * np.outer(lag, lag)
+    systematic: NDArray[np.float64] = timing**2 * np.outer(lag, lag)
     for friction in (SLIDING, STATIC):
         systematic[friction, friction] += (_SYSTEMATIC * values[friction]) ** 2
     if spring_constant is None:
@@ -264,9 +264,7 @@ def _design(moves: Moves, frictions: NDArray[np.intp], speed: float, place: floa
     return _Design(rows, moves.force, weight, moves.force_rate, frictions)
 
 
-def _with_onsets(
-    design: _Design, moves: Moves, blocks: NDArray[np.intp], place: float
-) -> _Design:
+def _with_onsets(design: _Design, moves: Moves, blocks: NDArray[np.intp], place: float) -> _Design:
     """Add a row for each breakaway, and put all rows into their blocks."""
     begun = np.isfinite(moves.onset_force)
     way, away = moves.direction[begun], moves.onset_position[begun] - place
@@ -304,8 +302,9 @@ def _robust(
     design: _Design, target: NDArray[np.float64], precision: NDArray[np.float64], scale: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the values by Huber's weights, and the weights of the rows, 1/N²."""
-    factor, deviation = np.ones(target.size), scale
-    values = np.zeros(design.rows.shape[1])
+    deviation = scale
+    factor: NDArray[np.float64] = np.ones(target.size, dtype=np.float64)
+    values: NDArray[np.float64] = np.zeros(design.rows.shape[1], dtype=np.float64)
     for _ in range(_ROUNDS):
         weight = design.weight * factor / deviation**2
         normal = (design.rows * weight[:, None]).T @ design.rows + np.diag(precision)
@@ -321,7 +320,8 @@ def _solution(normal: NDArray[np.float64], right: NDArray[np.float64]) -> NDArra
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     scaled = normal / np.outer(size, size) + 1e-12 * np.eye(size.size)
     found: NDArray[np.float64] = linalg.solve(scaled, (right.T / size).T, assume_a="pos")
-    return (found.T / size).T
+    solution: NDArray[np.float64] = (found.T / size).T
+    return solution
 
 
 def _covariance(

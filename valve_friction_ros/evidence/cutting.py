@@ -1,6 +1,7 @@
 """Samples of a valve in service, cut into moves."""
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -66,8 +67,9 @@ class _Signals(NamedTuple):
     force: NDArray[np.float64]
     pauses: NDArray[np.float64]
 
-    def force_at(self, time: NDArray[np.float64] | float) -> NDArray[np.float64]:
-        return np.interp(time, self.force_time, self.force)
+    def force_at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        force: NDArray[np.float64] = np.interp(time, self.force_time, self.force)
+        return force
 
 
 def rest_band(position: NDArray[np.float64], travel: float) -> float:
@@ -104,7 +106,8 @@ def moves_in(pressure: Samples, position: Samples, valve: Valve, band: float) ->
     end = both.time.size - 1
     settled = both.time[-1] - 2 * REST
     found: list[Move] = []
-    for first, last in runs:
+    for first, final in runs:
+        last = final
         if both.time[last] > both.time[-1] - 3 * REST:  # perhaps not at rest yet
             if both.time[end] - both.time[first] < _LONGEST:
                 settled = min(settled, both.time[first] - 2 * REST)
@@ -152,7 +155,7 @@ def _moves_of(both: _Signals, first: int, last: int, valve: Valve, band: float) 
     for low, high in _one_way(both.position, begin, end, band):
         chunks = max(1, math.ceil((both.time[high] - both.time[low]) / _LONGEST))
         cuts = np.linspace(low, high, chunks + 1).round().astype(int)
-        for b, e in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
+        for b, e in pairwise(cuts.tolist()):
             rested = b == begin and both.time[first] - both.time[0] >= REST
             move = _move(both, b, e, valve, band, rested)
             if move is not None:
@@ -174,7 +177,7 @@ def _one_way(
     top = int(np.argmax(ahead[: bottom + 1]))
     cuts = sorted({begin, begin + top, begin + bottom, end})
     found: list[tuple[int, int]] = []
-    for b, e in zip(cuts[:-1], cuts[1:], strict=True):
+    for b, e in pairwise(cuts):
         found += [(b, e)] if (b, e) == (begin, end) else _one_way(position, b, e, band)
     return found
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.balance import (
     ALONG,
@@ -28,7 +29,12 @@ from valve_friction_ros.identification import (
     Parameter,
 )
 from valve_friction_ros.identification.trust.calibration import calibrated, calibration_share
-from valve_friction_ros.identification.trust.verdict import Verdict, fixed, not_identifiable, with_verdict
+from valve_friction_ros.identification.trust.verdict import (
+    Verdict,
+    fixed,
+    not_identifiable,
+    with_verdict,
+)
 from valve_friction_ros.model.valve import Valve
 
 __all__ = ["MOST_MOVES", "Change", "Evidence", "evidence_of"]
@@ -149,9 +155,7 @@ def evidence_of(
     return Evidence(len(used), *span, found, balance.speed, change)
 
 
-def _since_change(
-    ledger: Sequence[Move], every: Moves, travel: float
-) -> tuple[int, Change | None]:
+def _since_change(ledger: Sequence[Move], every: Moves, travel: float) -> tuple[int, Change | None]:
     """Return the first move after the last change, and the last change that is declared."""
     series = series_of(every, travel)
     if series is None:
@@ -181,7 +185,7 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
     values = balance.values
     size = values.size
 
-    def along(**slopes: float) -> np.ndarray:
+    def along(**slopes: float) -> NDArray[np.float64]:
         slope = np.zeros(size)
         for name, value in slopes.items():
             slope[_PLACES[name]] = value

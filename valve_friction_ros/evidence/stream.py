@@ -55,8 +55,8 @@ class MoveStream:
         self._waiting: list[Arrivals] = []
         self._count = 0
         self._due: int | None = None
-        self._raw = {kind: _NOTHING for kind in _SIGNALS}
-        self._kept = {kind: _NOTHING for kind in _SIGNALS}
+        self._raw = dict.fromkeys(_SIGNALS, _NOTHING)
+        self._kept = dict.fromkeys(_SIGNALS, _NOTHING)
 
     def take(self, arrivals: Arrivals) -> tuple[Move, ...]:
         """Take samples in the order in which they came; return the moves that have ended."""
@@ -82,7 +82,7 @@ class MoveStream:
             return False
         for kind in _SIGNALS:
             new = arrivals.samples(kind)
-            raw = Samples(*map(np.concatenate, zip(self._raw[kind], new, strict=True)))
+            raw = _joined(self._raw[kind], new)
             last = self._kept[kind].stamps[-1:]
             pauses = np.diff(np.concatenate((last, raw.stamps)))
             if np.any(pauses <= 0) or not np.isfinite(new.values).all():
@@ -103,9 +103,7 @@ class MoveStream:
                 _means(raw.values[:whole], together),
             )
             self._raw[kind] = Samples(raw.stamps[whole:], raw.values[whole:])
-            self._kept[kind] = Samples(
-                *map(np.concatenate, zip(self._kept[kind], averaged, strict=True))
-            )
+            self._kept[kind] = _joined(self._kept[kind], averaged)
             if kind is Kind.POSITION:
                 self._look(averaged.values, together * period)
         return True
@@ -131,6 +129,13 @@ class MoveStream:
             first = max(int(np.searchsorted(kept.stamps, cut.settled)) - 1, 0)
             self._kept[kind] = Samples(kept.stamps[first:], kept.values[first:])
         return cut.moves
+
+
+def _joined(first: Samples, second: Samples) -> Samples:
+    return Samples(
+        np.concatenate((first.stamps, second.stamps)),
+        np.concatenate((first.values, second.values)),
+    )
 
 
 def _means(values: NDArray[np.int64] | NDArray[np.float64], together: int) -> NDArray[np.float64]:

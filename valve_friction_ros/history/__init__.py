@@ -8,6 +8,7 @@ from valve_friction_ros.history.entry import (
     entry_of,
     trended,
 )
+from valve_friction_ros.history.evidence_rows import keep_moves, read_moves
 from valve_friction_ros.history.file import HistoryError, HistoryFile
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
 from valve_friction_ros.history.valve_history import ValveHistory, current_trend, valve_histories
@@ -26,6 +27,8 @@ __all__ = [
     "ValveHistory",
     "current_trend",
     "entry_of",
+    "keep_moves",
+    "read_moves",
     "trend_of",
     "trended",
     "valve_histories",

@@ -7,14 +7,16 @@ from itertools import chain
 from pathlib import Path
 from urllib.parse import quote
 
+from valve_friction_ros.history.evidence_table import EVIDENCE_TABLE
+
 __all__ = ["SCHEMA_VERSION", "HistoryError", "is_current", "reading", "writing"]
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
 and no half widths without calibration; version 3 has no records of baselines; version 4 does not
-say what a baseline replaced."""
+say what a baseline replaced; version 5 knows nothing of the valve in service."""
 
 _APPLICATION = 0x56465248
 """The database's application_id, "VFRH" in ASCII, so that a history is recognised."""
@@ -175,6 +177,7 @@ _STEPS = {
     ),
     3: (_RECORD,),
     4: tuple(_REPLACED.split(";")),
+    5: tuple(EVIDENCE_TABLE.split(";")),
 }
 """What leads from a version to the next one."""
 
@@ -262,9 +265,8 @@ def _make_tables(connection: sqlite3.Connection) -> None:
     """Create the tables of a new file, and add to those of an older one what they lack."""
     version = _pragma(connection, "user_version")
     steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
-    statements = (
-        chain(*steps) if version else f"{_SCHEMA};{_BASELINE};{_RECORD};{_REPLACED}".split(";")
-    )
+    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, EVIDENCE_TABLE)
+    statements = chain(*steps) if version else ";".join(tables).split(";")
     for statement in filter(str.strip, statements):
         connection.execute(statement)
     connection.execute(f"PRAGMA application_id = {_APPLICATION}")

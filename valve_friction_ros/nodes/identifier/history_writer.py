@@ -3,6 +3,7 @@
 import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TypeVar
 
 from rclpy.node import Node
 
+from valve_friction_ros.evidence import Move
 from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput
 from valve_friction_ros.history import (
     HistoryEntry,
@@ -21,6 +23,7 @@ from valve_friction_ros.history import (
     ValveHistory,
     current_trend,
     entry_of,
+    read_moves,
     valve_histories,
 )
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
@@ -61,6 +64,7 @@ class HistoryWriter:
         self._trend: Trend | None = None
         self._baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
+        self._under_way: Future[None] | None = None
 
     @property
     def valve(self) -> KeptValve:
@@ -150,11 +154,14 @@ class HistoryWriter:
             entry = entry_of(monitor, self._valve, *identified, time=found or now)
             await self._written(lambda file: file.add(entry, days))
 
-    def kept_now(self, baseline: Baseline) -> KeptBaseline:
-        """Describe a baseline that is taken from the latest result now."""
+    def kept_now(self, baseline: Baseline, evidence_since: int | None = None) -> KeptBaseline:
+        """Describe a baseline that is taken now: of the latest result, or of moves since a time."""
         now, monitor = self._node.get_clock().now().nanoseconds, self._monitor
-        since = now if monitor.stamp is None else monitor.stamp
-        record = None if monitor.result is None else KeptBaseline.thin(monitor.result.recording)
+        since, record = now if monitor.stamp is None else monitor.stamp, None
+        if evidence_since is not None:
+            since = evidence_since
+        elif monitor.result is not None:
+            record = KeptBaseline.thin(monitor.result.recording)
         replaced, level = monitor.baseline, monitor.diagnosis().level
         return KeptBaseline(baseline, now, since, record, replaced, level=level)
 
@@ -180,6 +187,31 @@ class HistoryWriter:
         self._former, self._baseline = self._baseline, None if kept.withdrawn else kept
         with self._failures_remembered():
             await self._written(lambda file: file.set_baseline(self._valve, kept))
+
+    def moves(self) -> tuple[Move, ...]:
+        """Read the moves of the valve in service; none without a file."""
+        built = self._monitor.settings.valve
+        return self._tried(lambda file: read_moves(file, self._valve.name, built)) or ()
+
+    def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
+        """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
+
+        A change that waits already is not made twice.
+        """
+        if self._file is None:
+            return
+        if change not in self._waiting:
+            self._waiting.append(change)
+        if self._under_way is None or self._under_way.done():
+            self.settle()
+            self._under_way = self._writer.submit(self._write_waiting, self._file)
+
+    def settle(self) -> None:
+        """Take the outcome of `keep_soon`, if it is there."""
+        if self._under_way is not None and self._under_way.done():
+            with self._failures_remembered():
+                self._under_way.result()
+            self._under_way = None
 
     def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
         """Return what computes the trend with the baseline and settings of now, in any thread."""
@@ -208,12 +240,15 @@ class HistoryWriter:
         self, file: HistoryFile, trend: Callable[[HistoryFile], Trend | None]
     ) -> Trend | None:
         """Write, in the writer's thread, all that waits."""
+        self._write_waiting(file)
+        return trend(file)
+
+    def _write_waiting(self, file: HistoryFile) -> None:
         while self._waiting:
             change = self._waiting[0]
             change(file)
             with contextlib.suppress(ValueError):  # given up meanwhile
                 self._waiting.remove(change)
-        return trend(file)
 
     def _complain(self, error: HistoryError | InternalError) -> None:
         if str(error) != self._problem:

@@ -14,6 +14,7 @@ from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
+from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.identification import Identification
 from valve_friction_ros.nodes.identifier.level_log import LevelLog
@@ -97,12 +98,13 @@ class Identifier(PolledNode):
         self._estimate_topic = EstimateTopic(self)
         results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
-        self._watches: tuple[Watch, ...] = ()
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
-        self._baseline = BaselineInForce(self, self._monitor, self._history)
         earlier = self._history.prepare()
+        self._evidence = EvidenceWatch(self, self._monitor, self._history)
+        self._watches: tuple[Watch, ...] = (self._evidence,)
+        self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
         self._baseline.begin()
         if earlier is not None:
             self._monitor.remember(earlier)
@@ -128,8 +130,9 @@ class Identifier(PolledNode):
         )
 
     def destroy_node(self) -> None:
-        """Stop the clock's callback, then the node."""
+        """Stop the clock's callback, write what waits, then stop the node."""
         self._jump_handle.unregister()
+        self._evidence.close()
         super().destroy_node()
 
     def poll(self) -> None:
@@ -169,6 +172,7 @@ class Identifier(PolledNode):
     def _take_parameters(self, changes: list[Parameter]) -> None:
         self._inputs.take()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
+        self._evidence.follow_parameters()
         self._baseline.follow_parameter(changes)
         self._schedule.follow()
 
@@ -176,6 +180,7 @@ class Identifier(PolledNode):
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
         self._inputs.take()
         self._monitor.buffer.clear(cause)
+        self._evidence.forget_samples()
         self.get_logger().warning(
             f"{cause}: the buffer was cleared", throttle_duration_sec=_LOG_EVERY
         )
@@ -238,6 +243,7 @@ class Identifier(PolledNode):
     async def _clear(self) -> str:
         self._inputs.take()
         self._monitor.buffer.clear("on request")
+        self._evidence.forget_samples()
         return "the buffer is empty; estimate and baseline are kept"
 
     def _input_problems(self) -> list[str]:
