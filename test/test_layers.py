@@ -16,7 +16,7 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # What each room may import of the others; each holds what the rooms below it may import too.
 _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
-_VALVES = {*_CORE, "streams", "health"}
+_VALVES = {*_CORE, "streams", "evidence", "health"}
 _PAGES = {*_VALVES, "history", "records"}
 MAY_IMPORT = {
     "model": set(),
@@ -24,7 +24,8 @@ MAY_IMPORT = {
     "identification": {"model", "signals"},
     "streams": _CORE,
     "records": {*_CORE, "streams"},
-    "health": {*_CORE, "streams"},
+    "evidence": {*_CORE, "streams"},
+    "health": {*_CORE, "streams", "evidence"},
     "history": _VALVES,
     "figures": _PAGES,
     "reports": {*_PAGES, "figures"},
@@ -56,7 +57,17 @@ ROS_ROOMS = ("nodes", "commands/demo")
 
 # The one arrow up: a result draws itself, and loads the figures when it is asked to.
 UPWARD = {"identification/result.py": {"figures"}}
-CORE = ["model", "signals", "identification", "streams", "records", "health", "history", "fleet"]
+CORE = [
+    "model",
+    "signals",
+    "identification",
+    "streams",
+    "records",
+    "evidence",
+    "health",
+    "history",
+    "fleet",
+]
 
 
 def rooms():

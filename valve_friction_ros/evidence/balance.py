@@ -187,7 +187,7 @@ def balance_of(
     values, weight = _robust(design, target, precision, scale)
     scatter, lag = _covariance(design, target, weight, count, precision)
     values[SPRING] += shift
-    systematic: NDArray[np.float64] = timing**2 * np.outer(lag, lag)
+    systematic = np.outer(timing * lag, timing * lag).astype(np.float64)
     for friction in (SLIDING, STATIC):
         systematic[friction, friction] += (_SYSTEMATIC * values[friction]) ** 2
     if spring_constant is None:

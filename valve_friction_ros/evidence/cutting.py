@@ -76,7 +76,7 @@ def rest_band(position: NDArray[np.float64], travel: float) -> float:
     """Return the displacement, m, that noise or a converter alone may show."""
     step = quantisation_step(position)
     noise = math.hypot(position_noise(position), step / math.sqrt(12.0))
-    least = _BAND_TRAVEL * travel if math.isfinite(travel) else 0.0
+    least = _BAND_TRAVEL * travel if math.isfinite(travel) else 1e-3 * float(np.ptp(position))
     return max(_BAND_NOISE * noise, _BAND_STEPS * step, least)
 
 
@@ -105,14 +105,16 @@ def moves_in(pressure: Samples, position: Samples, valve: Valve, band: float) ->
     runs = _motions(both, band)
     end = both.time.size - 1
     settled = both.time[-1] - 2 * REST
+    done = -math.inf
     found: list[Move] = []
     for first, final in runs:
         last = final
         if both.time[last] > both.time[-1] - 3 * REST:  # perhaps not at rest yet
             if both.time[end] - both.time[first] < _LONGEST:
-                settled = min(settled, both.time[first] - 2 * REST)
+                settled = min(settled, max(both.time[first] - 2 * REST, done))
                 break
             last, settled = end, both.time[end]
+        done = both.time[last]
         found += _moves_of(both, first, last, valve, band)
     return Cut(tuple(found), both.origin + round(settled * 1e9))
 

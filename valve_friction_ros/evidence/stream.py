@@ -23,6 +23,9 @@ _PAUSE = 0.1
 _PAUSES = 10
 """A pause of this many seconds, and of so many periods, is a gap."""
 
+_MOST_WAITING = 50_000
+"""Samples that are looked at together at most, whatever their stamps."""
+
 _MEMORY = 60.0
 _LOOK = 10.0
 _FADING = 0.95
@@ -50,9 +53,16 @@ class MoveStream:
         self._seen: NDArray[np.float64] = np.empty(0)
         self.forget()
 
+    @property
+    def size(self) -> int:
+        """Samples in memory."""
+        parts = (*self._raw.values(), *self._kept.values())
+        return self._held + sum(part.stamps.size for part in parts)
+
     def forget(self) -> None:
         """Drop the samples that are not part of a finished move."""
         self._waiting: list[Arrivals] = []
+        self._held = 0
         self._count = 0
         self._due: int | None = None
         self._raw = dict.fromkeys(_SIGNALS, _NOTHING)
@@ -66,15 +76,27 @@ class MoveStream:
         newest = int(arrivals.stamps[-1])
         if self._due is None:
             self._due = int(arrivals.stamps[0]) + _EVERY
-        if self._due - 2 * _EVERY <= newest < self._due:
+        self._held += arrivals.stamps.size
+        if self._due - 2 * _EVERY <= newest < self._due and self._held < _MOST_WAITING:
             return ()
+        self._held = 0
         self._due = newest + _EVERY
         waiting = Arrivals(*(np.concatenate(part) for part in zip(*self._waiting, strict=True)))
         self._waiting = []
         if not self._extended(waiting):
             self.forget()
             return ()
-        return self._moves()
+        moves = self._moves()
+        self._trim()
+        return moves
+
+    def _trim(self) -> None:
+        """Drop what has waited too long for the other signal."""
+        for kind, kept in self._kept.items():
+            if kept.stamps.size:
+                oldest = int(kept.stamps[-1]) - round(1e9 * _MEMORY)
+                first = int(np.searchsorted(kept.stamps, oldest))
+                self._kept[kind] = Samples(kept.stamps[first:], kept.values[first:])
 
     def _extended(self, arrivals: Arrivals) -> bool:
         """Add samples; tell whether there is no fault in them."""
@@ -93,9 +115,10 @@ class MoveStream:
                 self._raw[kind] = raw
                 continue
             period = float(np.median(np.diff(raw.stamps))) / 1e9
-            if np.any(np.diff(raw.stamps) > 1e9 * max(_PAUSE, _PAUSES * period)):
-                return False
             together = max(1, round(_SHORTEST / period))
+            longest = 1e9 * max(_PAUSE, _PAUSES * period)
+            if together > 1 and np.any(np.diff(raw.stamps) > longest):
+                return False  # no mean may bridge a gap
             whole = raw.stamps.size // together * together
             averaged = Samples(
                 raw.stamps[0]
