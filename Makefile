@@ -7,6 +7,7 @@ PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
 BENCH_ARGS ?=
 REALITY_ARGS ?=
+SERVICE_ARGS ?=
 CHURN_ARGS ?=
 MUTANTS_ARGS ?=
 
@@ -85,6 +86,10 @@ accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--
 .PHONY: reality
 reality: venv  ## the estimate on valves and sensors with imperfections; REALITY_ARGS="--brief --seeds 1" for less
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.reality $(REALITY_ARGS)
+
+.PHONY: service
+service: venv  ## evidence of valves in closed-loop service, 1,000 hours and more; SERVICE_ARGS="--brief --hours 40" for less
+	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.service $(SERVICE_ARGS)
 
 .PHONY: bench
 bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep" for some

@@ -16,7 +16,7 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 # What each room may import of the others; each holds what the rooms below it may import too.
 _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
-_VALVES = {*_CORE, "streams", "usage", "health"}
+_VALVES = {*_CORE, "streams", "usage", "evidence", "health"}
 _PAGES = {*_VALVES, "history", "records"}
 _PICTURES = {*_PAGES, "planning"}
 MAY_IMPORT = {
@@ -27,7 +27,8 @@ MAY_IMPORT = {
     "planning": _CORE,
     "usage": {*_CORE, "streams"},
     "records": {*_CORE, "streams"},
-    "health": {*_CORE, "streams"},
+    "evidence": {*_CORE, "streams"},
+    "health": {*_CORE, "streams", "evidence"},
     "alerts": {*_CORE, "health"},
     "response": _VALVES,
     "history": _VALVES,
@@ -69,6 +70,7 @@ CORE = [
     "streams",
     "usage",
     "records",
+    "evidence",
     "health",
     "history",
     "alerts",

@@ -44,7 +44,7 @@ OF_VERSION_2 = {
 
 
 def write_version_2(history):
-    history.path.parent.mkdir(parents=True)
+    history.path.parent.mkdir(parents=True, exist_ok=True)
     connection = sqlite3.connect(history.path)
     connection.executescript(VERSION_2)
     connection.close()

@@ -1,6 +1,7 @@
 """Health of a valve: its baseline, its diagnosis, and the monitor of one valve; no ROS."""
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
+from valve_friction_ros.health.by_evidence import baseline_by_evidence, diagnosis_by_evidence
 from valve_friction_ros.health.comparison import (
     Comparison,
     Ratio,
@@ -47,6 +48,7 @@ __all__ = [
     "SlidingFriction",
     "StatusSignal",
     "ValveLimits",
+    "baseline_by_evidence",
     "by_severity",
     "carried",
     "compared",
@@ -55,6 +57,7 @@ __all__ = [
     "diagnose_again",
     "diagnose_numbers",
     "diagnose_parameters",
+    "diagnosis_by_evidence",
     "friction_words",
     "identify_snapshot",
     "percentage",

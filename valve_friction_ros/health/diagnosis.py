@@ -18,6 +18,7 @@ __all__ = [
     "EarlierEstimate",
     "FrictionLimits",
     "Frictions",
+    "against",
     "dead_band",
     "diagnose",
     "diagnose_again",
@@ -270,7 +271,7 @@ def _by_size(
         return Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
     effect = _consequence(result, valve)
     if found is not None:
-        return _against(found.ratio, limits, effect)
+        return against(found.ratio, limits, effect)
     why = "no baseline yet" if baseline is None else _why_not_compared(result, baseline)
     return Diagnosis(Level.OK, StatusSignal.GOOD, f"{why}; {effect}", None)
 
@@ -334,7 +335,8 @@ def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:
     )
 
 
-def _against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
+def against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
+    """Return the diagnosis of a friction over its baseline, with its `effect` in words."""
     finding = f"{ratio.what} is {_figures(ratio)} times its baseline"
     if ratio.low >= limits.error_ratio:
         return Diagnosis(

@@ -10,6 +10,7 @@ from rclpy.parameter import Parameter
 from valve_friction_ros.health import Baseline, Diagnosis, Finding, FrictionMonitor, Level
 from valve_friction_ros.history import KeptBaseline
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import (
     BASELINE,
@@ -40,10 +41,17 @@ class BaselineInForce:
     leaves no baseline.
     """
 
-    def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
+    def __init__(
+        self,
+        node: Node,
+        monitor: FrictionMonitor,
+        history: HistoryWriter,
+        evidence: EvidenceWatch,
+    ) -> None:
         self._node = node
         self._monitor = monitor
         self._history = history
+        self._evidence = evidence
 
     def begin(self) -> None:
         """Take the baseline of the parameter, or else of the history, and log which."""
@@ -62,11 +70,24 @@ class BaselineInForce:
     async def set(self) -> str:
         """Take the latest result as the baseline, and keep it; return the old and the new one.
 
-        Raises RefusalError in an alarm, or if the result cannot be a baseline.
+        Where there is no result, where the latest identification was refused, or where the result
+        cannot be a baseline, the sliding friction of the moves in service is taken. Raises
+        RefusalError in an alarm, or if neither can be a baseline.
         """
-        baseline = self._monitor.result_as_baseline()
+        by_evidence = self._monitor.refusal is not None and self._evidence.evidence.is_known
+        try:
+            baseline = None if by_evidence else self._monitor.result_as_baseline()
+        except RefusalError as refusal:
+            try:
+                baseline, by_evidence = self._evidence.as_baseline(), True
+            except RefusalError as of_moves:
+                raise RefusalError(f"{refusal}; {of_moves}") from None
+        if baseline is None:
+            baseline = self._evidence.as_baseline()
         self._require_no_alarm()
-        return await self._change(self._history.kept_now(baseline))
+        since = self._evidence.evidence.since if by_evidence else None
+        answer = await self._change(self._history.kept_now(baseline, since))
+        return f"{answer} ({self._evidence.source})" if by_evidence else answer
 
     async def restore(self) -> str:
         """Put the baseline in force that the last ``~/set_baseline`` has replaced, and keep it.
@@ -85,7 +106,11 @@ class BaselineInForce:
         return await self._change(self._history.replaced_now(last, _RESTORE))
 
     def _require_no_alarm(self) -> None:
-        found: list[Diagnosis | Finding] = [self._monitor.diagnosis(), *self._monitor.findings]
+        found: list[Diagnosis | Finding] = [
+            self._monitor.diagnosis(),
+            *self._monitor.findings,
+            *self._evidence.findings(),
+        ]
         worst = max(found, key=lambda one: one.level)
         allowed = self._node.get_parameter(BASELINE_IN_ALARM.name).value
         if worst.level >= Level.WARN and not allowed:

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from rclpy.node import Node
 
+from valve_friction_ros.evidence import Move
 from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput
 from valve_friction_ros.history import (
     AlarmRecording,
@@ -24,6 +25,7 @@ from valve_friction_ros.history import (
     alarm_recordings,
     current_trend,
     entry_of,
+    read_moves,
     read_usage,
     valve_histories,
 )
@@ -156,11 +158,14 @@ class HistoryWriter:
             entry = entry_of(monitor, self._valve, *identified, time=found or now)
             await self._written(lambda file: file.add(entry, days))
 
-    def kept_now(self, baseline: Baseline) -> KeptBaseline:
-        """Describe a baseline that is taken from the latest result now."""
+    def kept_now(self, baseline: Baseline, evidence_since: int | None = None) -> KeptBaseline:
+        """Describe a baseline that is taken now: of the latest result, or of moves since a time."""
         now, monitor = self._node.get_clock().now().nanoseconds, self._monitor
-        since = now if monitor.stamp is None else monitor.stamp
-        record = None if monitor.result is None else KeptBaseline.thin(monitor.result.recording)
+        since, record = now if monitor.stamp is None else monitor.stamp, None
+        if evidence_since is not None:
+            since = evidence_since
+        elif monitor.result is not None:
+            record = KeptBaseline.thin(monitor.result.recording)
         replaced, level = monitor.baseline, monitor.diagnosis().level
         return KeptBaseline(baseline, now, since, record, replaced, level=level)
 
@@ -200,6 +205,11 @@ class HistoryWriter:
         """Make a change in the writer's thread, and wait until it is written."""
         with self._failures_remembered():
             await self._written(change)
+
+    def moves(self) -> tuple[Move, ...]:
+        """Read the moves of the valve in service; none without a file."""
+        built = self._monitor.settings.valve
+        return self._tried(lambda file: read_moves(file, self._valve.name, built)) or ()
 
     def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
         """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.

@@ -16,6 +16,7 @@ from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
+from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.identification import Identification
 from valve_friction_ros.nodes.identifier.level_log import LevelLog
@@ -105,8 +106,9 @@ class Identifier(PolledNode):
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
-        self._baseline = BaselineInForce(self, self._monitor, self._history)
         earlier = self._history.prepare()
+        self._evidence = EvidenceWatch(self, self._monitor, self._history)
+        self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
         self._baseline.begin()
         if earlier is not None:
             self._monitor.remember(earlier)
@@ -117,6 +119,7 @@ class Identifier(PolledNode):
         self._alarm = AlarmRecorder(self, self._monitor, self._history, self._usage, workers.files)
         self._watches: tuple[Watch, ...] = (
             WholeValve(self._monitor),
+            self._evidence,
             self._usage,
             ResponseWatch(self),
         )
@@ -141,9 +144,10 @@ class Identifier(PolledNode):
         )
 
     def destroy_node(self) -> None:
-        """Stop the clock's callback, write what was counted, then stop the node."""
+        """Stop the clock's callback, write what waits, then stop the node."""
         self._jump_handle.unregister()
         self._usage.close()
+        self._evidence.close()
         super().destroy_node()
 
     def poll(self) -> None:
@@ -184,6 +188,7 @@ class Identifier(PolledNode):
         self._inputs.take()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
         self._usage.follow_parameters()
+        self._evidence.follow_parameters()
         self._baseline.follow_parameter(changes)
         self._schedule.follow()
 
@@ -191,6 +196,7 @@ class Identifier(PolledNode):
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
         self._inputs.take()
         self._monitor.buffer.clear(cause)
+        self._evidence.forget_samples()
         self.get_logger().warning(
             f"{cause}: the buffer was cleared", throttle_duration_sec=_LOG_EVERY
         )
@@ -260,6 +266,7 @@ class Identifier(PolledNode):
     async def _clear(self) -> str:
         self._inputs.take()
         self._monitor.buffer.clear("on request")
+        self._evidence.forget_samples()
         return "the buffer is empty; estimate and baseline are kept"
 
     async def _reset_usage(self) -> str:

@@ -1,0 +1,77 @@
+"""Weeks of valves in closed-loop service: python -m benchmark.service, or `make service`."""
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+
+from rich.console import Console
+
+from benchmark.service.plants import PLANTS
+from benchmark.service.report import bounds_met, tables
+from benchmark.service.trial import Task, Told, tried
+
+__all__ = ["main"]
+
+_BRIEF = ("low", "high", "graphite", "stick-slip")
+_WIDTH_OF_A_FILE = 150
+_HELD_OUT = 1000
+_STEP_HOURS, _SLOW_HOURS = 12, 40
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="service", description=__doc__)
+    parser.add_argument(
+        "--hours", type=int, default=1000, help="hours without change, over all valves and seeds"
+    )
+    parser.add_argument("--seeds", type=int, default=2, help="services of each valve")
+    parser.add_argument("--brief", action="store_true", help="four valves, not all")
+    parser.add_argument("--plants", nargs="+", choices=[*PLANTS], help="only these valves")
+    parser.add_argument("--held-out", action="store_true", help="seeds not developed with")
+    parser.add_argument("--no-slow", action="store_true", help="leave out friction that creeps up")
+    parser.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (%(default)s)"
+    )
+    return parser
+
+
+def _tasks(options: argparse.Namespace) -> list[Task]:
+    names = options.plants or (_BRIEF if options.brief else tuple(PLANTS))
+    seeds = [one + (_HELD_OUT if options.held_out else 0) for one in range(options.seeds)]
+    steady = math.ceil(options.hours / (len(names) * len(seeds)))
+    courses = [("step", _STEP_HOURS), ("steady", steady)]
+    if not options.no_slow:
+        courses.append(("slow", _SLOW_HOURS))
+    return [
+        Task(name, hours, seed, course)
+        for course, hours in courses
+        for seed in seeds
+        for name in names
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run what was asked for; return 1 if a bound is missed."""
+    options = _parser().parse_args(arguments)
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
+    tasks = _tasks(options)
+    told: list[Told] = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        pending = [pool.submit(tried, task) for task in tasks]
+        try:
+            for future in as_completed(pending):
+                told.append(future.result())
+                task = told[-1].task
+                line = f"{len(told)}/{len(tasks)} {task.plant}, {task.course}, {task.hours} h"
+                console.print(line, highlight=False)
+        except KeyboardInterrupt:  # show what is done
+            pool.shutdown(wait=False, cancel_futures=True)
+    for table in tables(told):
+        console.print(table)
+    return 0 if bounds_met(told, console) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""The motion of a valve in a control loop over hours, sampled as its sensors see it."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmark.reality.plants import laws
+from benchmark.reality.plants.constants import ELEMENTS, Constants
+from benchmark.reality.plants.laws import INNER, V, X
+from benchmark.reality.plants.parameters import Law
+
+__all__ = ["SUMS", "Loop", "new_state", "runner_of"]
+
+SUMS = 2
+"""Sums over the motion: ∫|dx| and ∫|F·dx|."""
+
+_COMMAND, _INTEGRAL, _PRESSURE, _MEASURED = range(4)
+_AT_REST = 5e-4
+"""Longest step while the stem rests well inside its static friction, s."""
+
+_INSIDE = 0.97
+_LOWEST, _HIGHEST = -0.15, 1.15
+
+
+class Loop(NamedTuple):
+    """A PI controller of the position, and the converter that it drives.
+
+    Attributes
+    ----------
+    gain, integral_time : float
+        Of the controller; 1 and s.
+    action_period : float
+        Time between two actions, s.
+    process_lag : float
+        First-order lag of what the controller measures, s.
+    bottom, span : float
+        Pressure at command 0, and its change to command 1, Pa.
+    converter_lag : float
+        First-order lag of the converter, s.
+    """
+
+    gain: float
+    integral_time: float
+    action_period: float
+    process_lag: float
+    bottom: float
+    span: float
+    converter_lag: float
+
+
+def new_state(loop: Loop, opening: float, travel: float) -> NDArray[np.float64]:
+    """Return the state of a valve at rest at an opening, 0 to 1: loop first, then stem."""
+    state = np.zeros(4 + INNER + ELEMENTS)
+    state[_COMMAND] = state[_INTEGRAL] = state[_MEASURED] = opening
+    state[_PRESSURE] = loop.bottom + loop.span * opening
+    state[4 + X] = opening * travel
+    return state
+
+
+@numba.njit(inline="always")
+def _pull(c: Constants, position: float, pressure: float) -> float:
+    place = position / c.travel
+    area = c.area * (1.0 + c.area_change * (place - 0.5))
+    load = c.preload + c.spring * position * (1.0 + 0.5 * c.spring_curve * (place - 1.0))
+    flow = 0.0
+    if c.flow_force != 0.0:
+        flow = c.flow_force * max(place, 0.0) ** c.flow_exponent
+    return area * (pressure - c.pressure_reference) - load - flow
+
+
+def _runner(advance: Callable[..., float], skips: bool) -> Callable[..., Any]:
+    @numba.njit(nogil=True)
+    def run(
+        c: Constants,
+        loop: Loop,
+        scale: float,
+        set_points: NDArray[np.float64],
+        noise: NDArray[np.float64],
+        step: float,
+        sample_period: float,
+        whole: NDArray[np.float64],
+        outputs: NDArray[np.float64],
+        sums: NDArray[np.float64],
+    ) -> None:
+        """Go on from state `whole`; row 0 of `outputs` becomes pressure, row 1 position.
+
+        There is a set point and a noise for each action of the controller.
+        """
+        stem = whole[4:]
+        pressure = whole[_PRESSURE]
+        time, next_action, action = 0.0, 0.0, 0
+        limit = _INSIDE * scale * (1.0 - abs(c.asymmetry)) * c.static * (1.0 - 0.5 * c.along_change)
+        for sample in range(outputs.shape[1]):
+            end = (sample + 1) * sample_period
+            while time < end - 1e-9:
+                if time >= next_action - 1e-9:
+                    error = set_points[action] - whole[_MEASURED] - noise[action]
+                    action += 1
+                    next_action = action * loop.action_period
+                    rate = loop.gain * error / loop.integral_time
+                    integral = whole[_INTEGRAL] + rate * loop.action_period
+                    whole[_INTEGRAL] = min(max(integral, _LOWEST), _HIGHEST)
+                    command = loop.gain * error + whole[_INTEGRAL]
+                    whole[_COMMAND] = min(max(command, _LOWEST), _HIGHEST)
+                pull = _pull(c, stem[X], pressure)
+                now = step
+                if skips and stem[V] == 0.0 and abs(pull) < limit:
+                    now = max(min(_AT_REST, end - time, next_action - time), step)
+                target = loop.bottom + loop.span * whole[_COMMAND]
+                pressure += now / loop.converter_lag * (target - pressure)
+                place = stem[X] / c.travel - 0.5
+                friction = advance(c, stem, pull, scale * (1.0 + place * c.along_change), now)
+                after = stem[X] + now * stem[V]
+                if after < c.lowest or after > c.highest:
+                    after = min(max(after, c.lowest), c.highest)
+                    stem[V] = 0.0
+                moved = abs(after - stem[X])
+                sums[0] += moved
+                sums[1] += abs(friction) * moved
+                stem[X] = after
+                share = now / loop.process_lag
+                whole[_MEASURED] += share * (after / c.travel - whole[_MEASURED])
+                time += now
+            outputs[0, sample], outputs[1, sample] = pressure, stem[X]
+        whole[_PRESSURE] = pressure
+
+    compiled: Callable[..., Any] = run
+    return compiled
+
+
+_RUNNERS: dict[Law, Callable[..., Any]] = {}
+
+
+def runner_of(law: Law) -> Callable[..., Any]:
+    """Return the compiled service of a law of friction; made at the first call."""
+    if law not in _RUNNERS:
+        skips = law in (Law.MOREAU, Law.KARNOPP, Law.LATCHED)
+        _RUNNERS[law] = _runner(getattr(laws, law.value), skips)
+    return _RUNNERS[law]

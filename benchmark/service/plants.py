@@ -1,0 +1,123 @@
+"""The valves in service, their loops and their sensors."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from benchmark.reality.plants import PACKINGS, Friction, Law, Plant, Trend
+from benchmark.reality.plants.parameters import PRESSURE_RANGE
+from benchmark.service.kernel import Loop
+
+__all__ = ["PLANTS", "Duty", "Senses", "ServiceValve"]
+
+
+@dataclass(frozen=True)
+class Senses:
+    """What the sensors make of the true signals.
+
+    Attributes
+    ----------
+    rate : float
+        Samples of each signal in a second.
+    position_noise, pressure_noise : float
+        Standard deviations, m and Pa.
+    position_step, pressure_step : float
+        Steps of the converters, m and Pa; 0: none.
+    jitter : float
+        Standard deviation of the stamps, as a share of the period.
+    lag : float
+        Time by which the stamps of the pressure are late, s.
+    hold : int
+        Samples for which a value of the pressure is repeated; 1: none.
+    """
+
+    rate: float = 40.0
+    position_noise: float = 10e-6
+    pressure_noise: float = 100.0
+    position_step: float = 0.0
+    pressure_step: float = 0.0
+    jitter: float = 0.0
+    lag: float = 0.0
+    hold: int = 1
+
+
+@dataclass(frozen=True)
+class Duty:
+    """What the set point does.
+
+    Attributes
+    ----------
+    step : float
+        Size of a step, share of the range.
+    period : float
+        Time from one step to the next, s.
+    low, high : float
+        Range of the set point; the steps alternate where it is one step wide.
+    """
+
+    step: float = 0.03
+    period: float = 12.0
+    low: float = 0.3
+    high: float = 0.7
+
+
+@dataclass(frozen=True)
+class ServiceValve:
+    """A valve in service: plant, time step (s) of its simulation, loop, set points and sensors."""
+
+    plant: Plant
+    step: float
+    loop: Loop
+    duty: Duty
+    senses: Senses
+
+
+def _loop(gain: float, integral_time: float) -> Loop:
+    low, high = PRESSURE_RANGE
+    return Loop(gain, integral_time, 0.1, 0.3, low, high - low, 0.5)
+
+
+_GRAPHITE = PACKINGS["graphite"]
+_STICKY = replace(
+    _GRAPHITE,
+    friction=Friction(450.0, 900.0, 1.2e4, stribeck_velocity=2e-3),
+)
+_FALLING = replace(_GRAPHITE.friction, stribeck_velocity=3.26e-3)
+_BRISTLES = replace(_FALLING, law=Law.LUGRE, presliding=25e-6)
+_UNEVEN = Friction(600.0, 750.0, 3e4, stribeck_velocity=3e-3, asymmetry=0.1)
+
+_COARSE = Senses(20.0, 15e-6, 300.0, 71e-6, 100.0, jitter=0.1)
+_LATE = Senses(25.0, 10e-6, 150.0, lag=0.03, jitter=0.1)
+_HELD = Senses(50.0, 10e-6, 100.0, 30e-6, hold=4)
+
+PLANTS: Mapping[str, ServiceValve] = MappingProxyType(
+    {
+        "low": ServiceValve(PACKINGS["low"], 5e-5, _loop(1.0, 2.0), Duty(), Senses()),
+        "high": ServiceValve(PACKINGS["high"], 1e-4, _loop(1.5, 2.0), Duty(), Senses()),
+        "graphite": ServiceValve(
+            replace(_GRAPHITE, friction=_FALLING), 2e-5, _loop(2.0, 3.0), Duty(), Senses()
+        ),
+        "stick-slip": ServiceValve(_STICKY, 8e-6, _loop(2.0, 3.0), Duty(), Senses()),
+        "low, coarse": ServiceValve(PACKINGS["low"], 5e-5, _loop(1.0, 2.0), Duty(), _COARSE),
+        "high, late": ServiceValve(PACKINGS["high"], 1e-4, _loop(1.5, 2.0), Duty(), _LATE),
+        "stick-slip, coarse": ServiceValve(_STICKY, 8e-6, _loop(2.0, 3.0), Duty(), _COARSE),
+        "bristles": ServiceValve(
+            replace(_GRAPHITE, friction=_BRISTLES), 4e-5, _loop(2.0, 3.0), Duty(), Senses()
+        ),
+        "uneven, held": ServiceValve(
+            replace(_GRAPHITE, friction=replace(_UNEVEN, along_travel=Trend(0.2))),
+            2e-5,
+            _loop(2.0, 3.0),
+            Duty(low=0.25, high=0.75),
+            _HELD,
+        ),
+        "alternating": ServiceValve(
+            replace(_GRAPHITE, friction=_FALLING),
+            2e-5,
+            _loop(3.0, 3.0),
+            Duty(low=0.485, high=0.515),
+            Senses(),
+        ),
+    }
+)
+"""The paper's packings in closed loop, and what plants add to them."""

@@ -1,0 +1,118 @@
+"""Tables of the services that were tried."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmark.service.trial import Number, Told
+
+__all__ = ["bounds_met", "tables"]
+
+_NAMES = ("sliding_friction", "static_friction", "dead_band")
+_SPREAD = "alternating"
+"""Valve whose set points hardly leave their place: its dead band may be wide, if it says so."""
+
+
+def _errors(numbers: Iterable[Number]) -> tuple[int, int, float, float, float]:
+    """Return how many there are, how many withheld, median and largest error, and coverage."""
+    every = list(numbers)
+    known = [one for one in every if math.isfinite(one.value)]
+    if not known:
+        return len(every), len(every), math.nan, math.nan, math.nan
+    errors = np.array([abs(one.value / one.truth - 1) for one in known])
+    inside = np.mean([abs(one.value - one.truth) <= one.half_width for one in known])
+    return (
+        len(every),
+        len(every) - len(known),
+        float(np.median(errors)),
+        float(errors.max()),
+        float(inside),
+    )
+
+
+def _by_plant(told: Sequence[Told]) -> Iterator[tuple[str, list[Told]]]:
+    for name in dict.fromkeys(one.task.plant for one in told):
+        yield name, [one for one in told if one.task.plant == name]
+
+
+def _hourly(told: Sequence[Told]) -> Table:
+    table = Table(title="numbers of single hours, beside the truth")
+    for column in ("valve", "number", "hours", "withheld", "median", "largest", "inside"):
+        table.add_column(column)
+    for plant, group in _by_plant(told):
+        for name in _NAMES:
+            numbers = [n for one in group for n in one.numbers if n.name == name]
+            count, withheld, median, largest, inside = _errors(numbers)
+            row = (f"{median:.1%}", f"{largest:.1%}", f"{inside:.1%}")
+            table.add_row(plant, name, str(count), str(withheld), *row)
+    return table
+
+
+def _steady(told: Sequence[Told]) -> Table:
+    table = Table(title="without change")
+    for column in ("valve", "hours", "declared changes", "alarms"):
+        table.add_column(column)
+    for plant, group in _by_plant([one for one in told if one.task.course == "steady"]):
+        hours = sum(one.task.hours for one in group)
+        changes, alarms = sum(one.changes for one in group), sum(one.alarms for one in group)
+        table.add_row(plant, str(hours), str(changes), str(alarms))
+    return table
+
+
+def _grown(told: Sequence[Told]) -> Table:
+    table = Table(title="friction grows to 1.5 times")
+    for column in ("valve", "course", "declared [h]", "alarm [h]", "dated", "early", "last error"):
+        table.add_column(column)
+    for course in ("step", "slow"):
+        for plant, group in _by_plant([one for one in told if one.task.course == course]):
+            last = [n for one in group for n in one.late if n.name == "sliding_friction"]
+            table.add_row(
+                plant,
+                course,
+                ", ".join(f"{one.declared:.2f}" for one in group),
+                ", ".join(f"{one.alarmed:.2f}" for one in group),
+                ", ".join(str(one.dated) for one in group) if course == "step" else "",
+                str(sum(one.changes + one.alarms for one in group)),
+                f"{_errors(last)[3]:.1%}",
+            )
+    return table
+
+
+def tables(told: Sequence[Told]) -> list[Table]:
+    """Return errors and coverage, false declarations, and times to declare."""
+    ordered = sorted(told, key=lambda one: (one.task.course, one.task.seed))
+    return [_hourly(ordered), _steady(ordered), _grown(ordered)]
+
+
+def bounds_met(told: Sequence[Told], console: Console) -> bool:
+    """Print each bound and what was reached; return whether all are met."""
+    numbers = {name: [n for one in told for n in one.numbers if n.name == name] for name in _NAMES}
+    spread = [
+        n
+        for one in told
+        for n in one.numbers
+        if n.name == "dead_band" and one.task.plant != _SPREAD
+    ]
+    steady = [one for one in told if one.task.course == "steady"]
+    steps = [one for one in told if one.task.course == "step"]
+    hours = sum(one.task.hours for one in steady)
+    found = (
+        ("sliding friction within 10 %", _errors(numbers["sliding_friction"])[3] <= 0.1),
+        ("dead band within 10 %, where set points leave their place", _errors(spread)[3] <= 0.1),
+        (
+            "at least 95 % inside their intervals",
+            all(_errors(one)[4] >= 0.95 for one in numbers.values()),
+        ),
+        (
+            f"no false declaration in {hours} h, nor before a change",
+            not any(one.changes + one.alarms for one in told),
+        ),
+        ("1.5 times declared within one hour", all(one.declared <= 1.0 for one in steps)),
+        ("1.5 times alarmed within one hour", all(one.alarmed <= 1.0 for one in steps)),
+    )
+    for what, met in found:
+        console.print(f"{'met   ' if met else 'MISSED'} {what}", highlight=False)
+    return all(met for _, met in found)

@@ -1,0 +1,105 @@
+"""Moves in the history."""
+
+import math
+import sqlite3
+from dataclasses import replace
+
+import pytest
+from histories import DAY, OTHER, SECOND, START, VALVE
+from test_file import write_version_2
+
+from valve_friction_ros.evidence import Move
+from valve_friction_ros.history import (
+    HistoryError,
+    HistoryFile,
+    evidence_rows,
+    keep_moves,
+    read_moves,
+)
+from valve_friction_ros.model import Valve
+
+BUILT = Valve(diaphragm_area=0.0445, pressure_reference=41_740.0, travel=0.03)
+
+
+def move(number, start=START):
+    begin = start + 12 * SECOND * number
+    onset = (500.0, 1e-3, 20.0) if number % 2 else ()
+    return Move(begin, begin + SECOND, 1e-3, 2e-3, 500.0 + number, 10.0, 1e-3, *onset)
+
+
+@pytest.fixture
+def history(tmp_path):
+    return HistoryFile(tmp_path / "history.sqlite")
+
+
+def kept(history, built=BUILT, valve=VALVE):
+    return [one.force for one in read_moves(history, valve.name, built)]
+
+
+def test_what_goes_in_comes_out(history):
+    moves = tuple(map(move, range(4)))
+    keep_moves(history, VALVE, BUILT, moves)
+    found = read_moves(history, VALVE.name, BUILT)
+    assert found[1::2] == moves[1::2]
+    assert [math.isnan(one.onset_force) for one in found] == [True, False, True, False]
+    assert replace(found[0], onset_force=0.0) != found[1]
+    assert kept(history, valve=OTHER) == []
+
+
+def test_twice_is_once_and_nothing_is_nothing(history):
+    for _ in range(2):
+        keep_moves(history, VALVE, BUILT, list(map(move, range(3))))
+    keep_moves(history, VALVE, BUILT, [])
+    assert kept(history) == [500.0, 501.0, 502.0]
+
+
+def test_their_number_is_bounded(history, monkeypatch):
+    monkeypatch.setattr(evidence_rows, "MOST_MOVES", 5)
+    keep_moves(history, OTHER, BUILT, [move(0)])
+    for number in range(9):
+        keep_moves(history, VALVE, BUILT, [move(number)])
+    assert kept(history) == [504.0, 505.0, 506.0, 507.0, 508.0]
+    assert kept(history, valve=OTHER) == [500.0]
+
+
+def test_their_age_is_bounded(history):
+    keep_moves(history, VALVE, BUILT, [move(0), move(1, START + DAY)])
+    keep_moves(history, VALVE, BUILT, [move(2, START + 3 * DAY)], days=2.5)
+    assert kept(history) == [501.0, 502.0]
+
+
+def test_a_clock_that_was_set_back(history):
+    keep_moves(history, VALVE, BUILT, list(map(move, range(4))))
+    keep_moves(history, VALVE, BUILT, [replace(move(2), force=7.0)])
+    assert kept(history) == [500.0, 501.0, 7.0]
+
+
+@pytest.mark.parametrize("changes", [{"diaphragm_area": 0.05}, {"pressure_reference": 0.0}])
+def test_forces_of_another_actuator_are_not_read(history, changes):
+    keep_moves(history, VALVE, BUILT, [move(0)])
+    assert kept(history, replace(BUILT, **changes)) == []
+    assert kept(history, replace(BUILT, travel=0.05)) == [500.0]
+
+
+def test_a_machine_without_a_diaphragm(history):
+    driven = Valve()
+    keep_moves(history, VALVE, driven, [move(0)])
+    assert kept(history, driven) == [500.0]
+
+
+def test_an_older_file_is_read_and_extended(history):
+    write_version_2(history)
+    assert read_moves(history, VALVE.name, BUILT) == ()
+    keep_moves(history, VALVE, BUILT, [move(0)])
+    assert kept(history) == [500.0]
+    assert history.valves()
+
+
+def test_a_row_that_holds_no_move(history):
+    keep_moves(history, VALVE, BUILT, [move(0)])
+    connection = sqlite3.connect(history.path)
+    with connection:
+        connection.execute("UPDATE move SET force = 'much'")
+    connection.close()
+    with pytest.raises(HistoryError, match="a row holds no move"):
+        read_moves(history, VALVE.name, BUILT)

@@ -1,0 +1,107 @@
+"""The moves of valves in the history: the evidence that a restart must not lose."""
+
+import math
+import sqlite3
+from collections.abc import Sequence
+
+from valve_friction_ros.evidence import MOST_MOVES, Move
+from valve_friction_ros.history.entry import KeptValve
+from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.rows import valve_id
+from valve_friction_ros.history.schema import HistoryError, reading, writing
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["keep_moves", "read_moves"]
+
+_DAY = 86_400_000_000_000
+_OF_MOVE = (
+    "begin_ns",
+    "end_ns",
+    "start",
+    "stop",
+    "force",
+    "force_rate",
+    "speed",
+    "onset_force",
+    "onset_position",
+    "onset_rate",
+)
+
+
+def keep_moves(
+    file: HistoryFile, valve: KeptValve, built: Valve, moves: Sequence[Move], days: float = 0.0
+) -> None:
+    """Add moves of a valve, oldest first; keeping them twice changes nothing.
+
+    Kept moves that end after these begin go: the clock was set back. So do those that are `days`
+    older than the last one, none for 0, and all but the newest `MOST_MOVES`. Raises HistoryError if
+    they cannot be written.
+    """
+    if not moves:
+        return
+    with writing(file.path) as connection:
+        row = valve_id(connection, valve)
+        connection.execute(
+            "DELETE FROM move WHERE valve_id = ? AND end_ns > ?", (row, moves[0].begin)
+        )
+        columns = ("valve_id", "diaphragm_area", "pressure_reference", *_OF_MOVE)
+        marks = ", ".join("?" * len(columns))
+        connection.executemany(
+            f"INSERT OR REPLACE INTO move ({', '.join(columns)}) VALUES ({marks})",  # noqa: S608
+            [(row, built.diaphragm_area, built.pressure_reference, *_row(one)) for one in moves],
+        )
+        if days > 0:
+            oldest = moves[-1].end - round(days * _DAY)
+            connection.execute("DELETE FROM move WHERE valve_id = ? AND end_ns < ?", (row, oldest))
+        connection.execute(
+            "DELETE FROM move WHERE valve_id = ? AND end_ns <= "
+            "(SELECT end_ns FROM move WHERE valve_id = ? ORDER BY end_ns DESC LIMIT 1 OFFSET ?)",
+            (row, row, MOST_MOVES),
+        )
+
+
+def _row(move: Move) -> tuple[float, ...]:
+    """Return the columns of a move; SQLite stores nan as NULL."""
+    return (
+        move.begin,
+        move.end,
+        move.start,
+        move.stop,
+        move.force,
+        move.force_rate,
+        move.speed,
+        move.onset_force,
+        move.onset_position,
+        move.onset_rate,
+    )
+
+
+def read_moves(file: HistoryFile, valve: str, built: Valve) -> tuple[Move, ...]:
+    """Return the moves of the valve of this name, oldest first.
+
+    Only those are returned whose forces were computed with the area and the pressure reference in
+    force. Raises HistoryError if the file cannot be read; one of an older version holds no moves.
+    """
+    with reading(file.path) as connection:
+        if not _has_moves(connection):
+            return ()
+        rows = connection.execute(
+            f"SELECT {', '.join(_OF_MOVE)} FROM move JOIN valve ON valve.id = valve_id "  # noqa: S608
+            "WHERE name = ? AND diaphragm_area IS ? AND pressure_reference = ? ORDER BY end_ns",
+            (valve, built.diaphragm_area, built.pressure_reference),
+        ).fetchall()
+    try:
+        return tuple(_move(row) for row in rows)
+    except (TypeError, ValueError) as error:
+        raise HistoryError(f"{file.path}: a row holds no move: {error}") from None
+
+
+def _move(row: Sequence[float | None]) -> Move:
+    begin, end, *numbers = row
+    values = [math.nan if one is None else one for one in numbers]
+    return Move(int(begin or 0), int(end or 0), *values)
+
+
+def _has_moves(connection: sqlite3.Connection) -> bool:
+    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'move'"
+    return connection.execute(query).fetchone() is not None
