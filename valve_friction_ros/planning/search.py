@@ -221,7 +221,8 @@ def plan_test(
     Returns
     -------
     StrokePlan
-        The test and its forecasts. It depends on no clock and no chance.
+        The test and its forecasts. It depends on no clock and no chance. The search is local: for
+        another aim it has missed a test whose interval was 26 % narrower.
 
     Raises
     ------
