@@ -6,10 +6,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from histories import START as DAWN
+from histories import VALVE, success
 from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
 from records import quick_record
 
-from valve_friction_ros.history import HistoryFile, alarm_recordings
+from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.history import (
+    AlarmRecording,
+    HistoryFile,
+    KeptBaseline,
+    alarm_recordings,
+    keep_alarm_recording,
+)
 from valve_friction_ros.model import HIGH_FRICTION
 
 NODE = f"{NAMESPACE}/identifier"
@@ -54,7 +63,7 @@ def names(folder):
 
 
 def test_an_alarm_is_recorded(live, tmp_path):
-    node = baseline_set(live, {"alarm_recording": 3.0})
+    baseline_set(live, {"alarm_recording": 3.0})
     client = live.client
     message = client.identified(TIGHT)
     assert client.statuses[-1][1].level == ERROR
@@ -94,18 +103,25 @@ def test_an_alarm_is_recorded(live, tmp_path):
     assert kept.path == path
     assert kept.message.startswith("excess friction")
 
-    # It is named after a restart, whose level is none that has risen.
-    client.watched.clear()
-    node.kill()
-    live.nodes.remove(node)
-    client.statuses.clear()
+
+def test_it_is_named_after_a_restart(live, tmp_path):
+    """The level that a node begins with is none that has risen."""
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    history.add(success(friction=400.0))
+    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), DAWN, DAWN))
+    one = AlarmRecording(DAWN, Level.ERROR, tmp_path / "alarms" / "one", "excess friction")
+    keep_alarm_recording(history, VALVE, one)
     live.start_identifier(FAST)
-    status = client.next_status()
+    status = live.client.next_status()
     assert status.level == ERROR
-    assert values_of(status)["alarm_recording"] == str(path)
-    client.next_status()
-    client.next_status()
-    assert names(path.parent) == [path.name]
+    values = values_of(status)
+    assert values["alarm_recording"] == str(one.path)
+    assert values["alarm_recording [time]"] == "2026-09-21T14:13:20Z"
+    live.client.send_record(TIGHT)
+    live.client.wait_for_buffered(2 * len(TIGHT))
+    live.client.next_status()
+    assert alarm_recordings(history, NODE) == (one,)
+    assert not (tmp_path / "valve_friction_ros" / "alarms").exists()
 
 
 def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):

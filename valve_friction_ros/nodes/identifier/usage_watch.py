@@ -92,7 +92,7 @@ class UsageWatch:
         if samples.stamps.size:
             newest = int(samples.stamps[-1])
             if self._written_stamp is None:
-                self._written_stamp = newest
+                self._written_stamp = int(samples.stamps[0])
             if abs(newest - self._written_stamp) >= _WRITE_EVERY * 1e9:
                 self._written_stamp = newest
                 self._keep()
