@@ -47,3 +47,12 @@ def test_stops_are_found_where_they_are(known, low, high, noise, seat):
     for name, place in (("lower_stop", seat), ("upper_stop", TRAVEL)):
         assert abs(found[name].value - place) <= found[name].half_width
         assert found[name].half_width < 0.01 * TRAVEL
+
+
+def test_a_stem_that_waits_at_the_begin_may_have_come_from_either_side():
+    """It stands at its upper end while the force grows from −F_s to F_s, and is then let down."""
+    force = np.concatenate([np.linspace(-0.9, 0.9, 500), np.linspace(0.9, -4.0, 500)])
+    valve = replace(BENCH_VALVE, diaphragm_area=1.0, pressure_reference=0.0)
+    place = 0.02 + np.minimum(force + 1.0, 0.0) * (np.arange(1000) >= 500) * 1e-3
+    found = stem_reach(Recording(0.01, 1e3 * force, place), valve, 100.0)
+    assert "upper_stop" not in found

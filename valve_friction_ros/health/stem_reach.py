@@ -76,9 +76,12 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
 
 
 def _held(at_end: NDArray[np.bool_], force: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
-    """Return the visits of an end in which the force grows by more than `least` after arrival."""
+    """Return the visits of an end in which the force grows by more than `least` after arrival.
+
+    Nothing is known of the arrival of a visit with which the record begins.
+    """
     held = np.zeros(at_end.size, dtype=np.bool_)
     for begin, end in runs_of(at_end):
-        if np.max(force[begin:end]) - force[begin] > least:
+        if begin > 0 and np.max(force[begin:end]) - force[begin] > least:
             held[begin:end] = True
     return held
