@@ -10,6 +10,7 @@ from valve_friction_ros.health.stem_reach import stem_reach
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, Recording, SineWave, simulate
 
 STICKY = replace(HIGH_FRICTION, static_friction=2 * HIGH_FRICTION.coulomb_friction)
+SLIP = STICKY.static_friction - STICKY.coulomb_friction
 TRAVEL = BENCH_VALVE.travel
 TIME = np.arange(3000) / 100
 
@@ -26,7 +27,7 @@ def record(low, high, seat=0.0, noise=0.0):
     return Recording(0.01, pressure, position)
 
 
-@pytest.mark.parametrize("known", [STICKY.static_friction, math.nan])
+@pytest.mark.parametrize("known", [SLIP, math.nan])
 @pytest.mark.parametrize("noise", [0.0, 40e-6])
 def test_a_stem_that_turns_between_the_stops_meets_none(known, noise):
     found = stem_reach(record(70.0, 160.0, noise=noise), BENCH_VALVE, known)
@@ -35,11 +36,23 @@ def test_a_stem_that_turns_between_the_stops_meets_none(known, noise):
     assert 0.0 < low.value < high.value < TRAVEL
 
 
-@pytest.mark.parametrize("known", [STICKY.static_friction, math.nan])
+@pytest.mark.parametrize(
+    ("known", "low", "high"), [(SLIP, -45.0, 300.0), (math.nan, -250.0, 500.0)]
+)
 @pytest.mark.parametrize("noise", [0.0, 40e-6])
 @pytest.mark.parametrize("seat", [0.0, 2e-3])
-def test_stops_are_found_where_they_are(known, noise, seat):
-    found = stem_reach(record(-45.0, 300.0, seat, noise), BENCH_VALVE, known)
+def test_stops_are_found_where_they_are(known, low, high, noise, seat):
+    """Without a known slip force, only those against which the stem is pressed by far more."""
+    found = stem_reach(record(low, high, seat, noise), BENCH_VALVE, known)
     for name, place in (("lower_stop", seat), ("upper_stop", TRAVEL)):
         assert abs(found[name].value - place) <= found[name].half_width
         assert found[name].half_width < 0.01 * TRAVEL
+
+
+def test_a_stem_that_waits_at_the_begin_may_have_come_from_either_side():
+    """It stands at its upper end while the force grows from −F_s to F_s, and is then let down."""
+    force = np.concatenate([np.linspace(-0.9, 0.9, 500), np.linspace(0.9, -4.0, 500)])
+    valve = replace(BENCH_VALVE, diaphragm_area=1.0, pressure_reference=0.0)
+    place = 0.02 + np.minimum(force + 1.0, 0.0) * (np.arange(1000) >= 500) * 1e-3
+    found = stem_reach(Recording(0.01, 1e3 * force, place), valve, 100.0)
+    assert "upper_stop" not in found

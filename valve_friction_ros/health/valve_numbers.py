@@ -10,7 +10,6 @@ from valve_friction_ros.health.stem_reach import stem_reach
 from valve_friction_ros.identification import (
     CLOCK_OFFSET,
     IMPERFECTIONS_FOUND,
-    SLIDING,
     Parameter,
     Result,
     Verdict,
@@ -52,12 +51,13 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
         if _is_known(one)
     }
     is_described = result.misfit is None or result.misfit.describes
-    holding = _static_friction(known) if is_described else math.nan
-    numbers = sensor_noises(result.recording)
-    numbers |= stem_reach(result.recording, result.valve, holding)
     fit = fit_numbers(known) if is_described else {}
     if fit:
         fit |= _imperfections(result.evidence, known)
+    slip = fit.get("slip_force")
+    largest = math.nan if slip is None else max(slip.value, 0.0) + slip.half_width
+    numbers = sensor_noises(result.recording)
+    numbers |= stem_reach(result.recording, result.valve, largest)
     return numbers | fit
 
 
@@ -80,14 +80,6 @@ def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
 
 def _is_known(one: Parameter) -> bool:
     return one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.half_width >= 0
-
-
-def _static_friction(known: Mapping[str, Measured]) -> float:
-    """Return the largest static friction that there may be, N; nan where no friction is known."""
-    frictions = (
-        known[name] for name in ("static_friction", "coulomb_friction", SLIDING) if name in known
-    )
-    return max((one.value + one.half_width for one in frictions), default=math.nan)
 
 
 def _imperfections(
