@@ -135,14 +135,27 @@ def test_records_go_with_their_baselines(history):
     assert select(history, "SELECT count(*) FROM baseline_record") == [(0,)]
 
 
+OF_VERSION_5 = {
+    "valve",
+    "settings",
+    "identification",
+    "parameter",
+    "baseline",
+    "baseline_record",
+}
+
+
 def make_version_4(history):
-    """Take away what version 5 knows of a baseline: who set it, and what it replaced."""
+    """Take away newer tables, and what version 5 knows of a baseline: its service, its level …"""
     columns = [
         name for (name,) in select(history, "SELECT name FROM pragma_table_info('baseline')")
     ]
     new = [one for one in columns if one.startswith("replaced_")] + ["set_by", "level", "withdrawn"]
     connection = sqlite3.connect(history.path)
     drop = "".join(f"ALTER TABLE baseline DROP COLUMN {name};" for name in new)
+    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
+    newer = {name for (name,) in tables} - OF_VERSION_5
+    drop += "".join(f"DROP TABLE {name};" for name in newer)
     connection.executescript(f"{drop} PRAGMA user_version = 4")
     connection.close()
 
