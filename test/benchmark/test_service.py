@@ -38,12 +38,13 @@ def test_a_good_outcome_meets_the_bounds():
 @pytest.mark.parametrize(
     ("outcome", "words"),
     [
-        (told(changes=1), "no false declaration in 12 h"),
-        (told(alarms=1), "no false declaration in 12 h"),
+        (told(changes=1), "no false declaration"),
+        (told(alarms=1), "no false declaration"),
         (told("step", declared=1.17), "declared within one hour"),
         (told("step", declared=math.nan), "declared within one hour"),
         (told("step", alarmed=math.nan), "alarmed within one hour"),
         (told(numbers=[Number("sliding_friction", 100.0, 111.0, 20.0)]), "friction within 10 %"),
+        (told(numbers=[Number("sliding_friction", 100.0, math.nan, 1.0)]), "friction within 10 %"),
         (told(numbers=[Number("dead_band", 100.0, 88.0, 20.0)]), "dead band within 10 %"),
         (told(numbers=[Number("static_friction", 100.0, 105.0, 4.0)]), "inside their intervals"),
     ],
