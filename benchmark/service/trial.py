@@ -217,9 +217,11 @@ def tried(task: Task) -> Told:
             continue
         hour = count // _PER_HOUR
         scale = course.friction(hour - 1e-6)
-        if scale == course.friction(hour - 1.0):
-            told.numbers += _truths(evidence_of(moves, valve), plant, scale, work / distance)
-        told.late = list(_truths(watched.evidence, plant, scale, work / distance))
+        if distance > 0:  # a stem that stood still has no sliding friction
+            truth = work / distance
+            if scale == course.friction(hour - 1.0):
+                told.numbers += _truths(evidence_of(moves, valve), plant, scale, truth)
+            told.late = list(_truths(watched.evidence, plant, scale, truth))
         moves, work, distance = [], 0.0, 0.0
     if task.course == "step" and (change := watched.evidence.change) is not None:
         begin = _BEGIN + course.at * 3600

@@ -164,6 +164,9 @@ def make_version_4(history):
     new = [one for one in columns if one.startswith("replaced_")] + ["set_by", "level", "withdrawn"]
     connection = sqlite3.connect(history.path)
     drop = "".join(f"ALTER TABLE baseline DROP COLUMN {name};" for name in new)
+    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
+    newer = {name for (name,) in tables} - OF_VERSION_5
+    drop += "".join(f"DROP TABLE {name};" for name in newer)
     connection.executescript(f"{drop} PRAGMA user_version = 4")
     connection.close()
 

@@ -77,6 +77,10 @@ class Balance:
         Mean position of the moves, m.
     onsets : int
         Moves that began at a rest.
+    timing : float
+        Standard deviation of the lag between the signals, s.
+    lag : ndarray of float, shape (p,)
+        Change of the values by a lag of 1 s.
     """
 
     values: NDArray[np.float64]
@@ -86,6 +90,8 @@ class Balance:
     speed: float
     place: float
     onsets: int
+    timing: float
+    lag: NDArray[np.float64]
 
     def number(self, slope: NDArray[np.float64]) -> tuple[float, float]:
         """Return standard error and half width of a number, by its derivatives to the values."""
@@ -195,7 +201,7 @@ def balance_of(
         systematic[SPRING, SPRING] += (_BENT * scale / max(spread, 1e-12)) ** 2
     quantile = float(stats.t.ppf(0.975, max(count - 2, 2)))
     onsets = int(np.isfinite(moves.onset_force).sum())
-    return Balance(values, scatter, systematic, quantile, speed, place, onsets)
+    return Balance(values, scatter, systematic, quantile, speed, place, onsets, timing, lag)
 
 
 def series_of(moves: Moves, travel: float) -> Series | None:

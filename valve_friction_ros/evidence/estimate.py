@@ -29,7 +29,9 @@ from valve_friction_ros.identification import (
     Parameter,
 )
 from valve_friction_ros.identification.trust.calibration import calibrated, calibration_share
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import (
+    WEAK_SHARE,
     Verdict,
     fixed,
     not_identifiable,
@@ -41,7 +43,7 @@ __all__ = ["MOST_MOVES", "Change", "Evidence", "evidence_of"]
 
 MOST_MOVES = 4096
 """Moves of a ledger that are worth keeping: some half a day of a valve that never rests, or weeks
-of a quiet one. Chosen: they are combined in some 30 ms."""
+of a quiet one. Chosen: they are combined in under 0.1 s."""
 
 _NAMES = (
     "coulomb_friction",
@@ -191,14 +193,14 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
             slope[_PLACES[name]] = value
         return slope
 
-    sliding, static, k = values[SLIDING], values[STATIC], values[SPRING]
+    sliding, static, k = (float(values[one]) for one in (SLIDING, STATIC, SPRING))
     numbers = {
         "sliding_friction": (sliding, along(sliding=1.0)),
-        "viscous_friction": (values[SPEED], along(speed=1.0)),
+        "viscous_friction": (float(values[SPEED]), along(speed=1.0)),
         "static_friction": (static, along(static=1.0)),
         "spring_constant": (k, along(spring=1.0)),
         "spring_preload": (
-            values[PRELOAD] - k * balance.place,
+            float(values[PRELOAD]) - k * balance.place,
             along(preload=1.0, spring=-balance.place),
         ),
     }
@@ -207,7 +209,9 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
         slope = along(sliding=1 / k, static=1 / k, spring=-band / k)
         numbers["dead_band"] = (band, slope)
     found = {
-        name: with_verdict(name, float(value), *balance.number(slope))
+        name: with_verdict(
+            name, float(value), *balance.number(slope), _doubt(balance, value, slope)
+        )
         for name, (value, slope) in numbers.items()
     }
     # Kept where it holds zero too: it carries the friction from one speed to another.
@@ -225,6 +229,19 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
     found.setdefault("dead_band", not_identifiable("dead_band", "the valve shows no spring"))
     found["coulomb_friction"] = not_identifiable("coulomb_friction", _COULOMB)
     return found
+
+
+def _doubt(balance: Balance, value: float, slope: NDArray[np.float64]) -> str:
+    """Return that the lag of the signals makes most of a wide interval, or nothing."""
+    _, width = balance.number(slope)
+    lag = 2.0 * balance.timing * abs(float(slope @ balance.lag))
+    if width <= WEAK_SHARE * abs(value) or 2.0 * lag**2 < width**2:
+        return ""
+    return (
+        f"its interval is ±{percentage(width / abs(value))} of its value, most of it by the lag "
+        f"between the signals: state a timing_uncertainty below {balance.timing:g} s if their "
+        "clocks and lags are known"
+    )
 
 
 _PLACES = {

@@ -1,5 +1,6 @@
 """The baseline in force: parameter, services and history all set it here."""
 
+import contextlib
 import math
 from collections.abc import Iterable
 from datetime import datetime, timezone
@@ -74,20 +75,24 @@ class BaselineInForce:
         cannot be a baseline, the sliding friction of the moves in service is taken. Raises
         RefusalError in an alarm, or if neither can be a baseline.
         """
-        by_evidence = self._monitor.refusal is not None and self._evidence.evidence.is_known
-        try:
-            baseline = None if by_evidence else self._monitor.result_as_baseline()
-        except RefusalError as refusal:
-            try:
-                baseline, by_evidence = self._evidence.as_baseline(), True
-            except RefusalError as of_moves:
-                raise RefusalError(f"{refusal}; {of_moves}") from None
-        if baseline is None:
-            baseline = self._evidence.as_baseline()
+        baseline, by_evidence = self._newest()
         self._require_no_alarm()
         since = self._evidence.evidence.since if by_evidence else None
         answer = await self._change(self._history.kept_now(baseline, since))
         return f"{answer} ({self._evidence.source})" if by_evidence else answer
+
+    def _newest(self) -> tuple[Baseline, bool]:
+        """Return what is healthy now, and whether it is of the moves in service."""
+        if self._monitor.refusal is not None:
+            with contextlib.suppress(RefusalError):
+                return self._evidence.as_baseline(), True
+        try:
+            return self._monitor.result_as_baseline(), False
+        except RefusalError as refusal:
+            try:
+                return self._evidence.as_baseline(), True
+            except RefusalError as of_moves:
+                raise RefusalError(f"{refusal}; {of_moves}") from None
 
     async def restore(self) -> str:
         """Put the baseline in force that the last ``~/set_baseline`` has replaced, and keep it.

@@ -27,8 +27,8 @@ from valve_friction_ros.streams import Arrivals
 
 __all__ = ["EvidenceWatch"]
 
-_COMBINE_EVERY = 120_000_000_000
-"""Nanoseconds of stamps from one combination to the next: thousands of moves take 30 ms."""
+_COMBINE_EVERY = 300_000_000_000
+"""Nanoseconds of stamps from one combination to the next: thousands of moves take 0.1 s."""
 
 _WRITE_EVERY = 5.0
 """Time between two writings, s. A killed node loses so much, and a move that has not ended."""

@@ -1,0 +1,68 @@
+"""The benchmark of valves in service: its simulation, and what its tables count."""
+
+import io
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from benchmark.service.plants import PLANTS, Duty
+from benchmark.service.report import bounds_met, tables
+from benchmark.service.service import stretches
+from benchmark.service.trial import Number, Task, Told
+
+
+def told(course="steady", **changes):
+    numbers = [
+        Number(name, 100.0, 104.0, 5.0)
+        for name in ("sliding_friction", "static_friction", "dead_band")
+    ]
+    task = Task("high", 12, 0, course)
+    return replace(Told(task, numbers, declared=0.5, alarmed=0.8, late=numbers), **changes)
+
+
+def judged(*some):
+    out = io.StringIO()
+    met = bounds_met(some, Console(file=out, width=150))
+    return met, out.getvalue()
+
+
+def test_a_good_outcome_meets_the_bounds():
+    met, text = judged(told(), told("step"))
+    assert met, text
+    assert all(table.row_count for table in tables([told(), told("step"), told("slow")]))
+
+
+@pytest.mark.parametrize(
+    ("outcome", "words"),
+    [
+        (told(changes=1), "no false declaration"),
+        (told(alarms=1), "no false declaration"),
+        (told("step", declared=1.17), "declared within one hour"),
+        (told("step", declared=math.nan), "declared within one hour"),
+        (told("step", alarmed=math.nan), "alarmed within one hour"),
+        (told(numbers=[Number("sliding_friction", 100.0, 111.0, 20.0)]), "friction within 10 %"),
+        (told(numbers=[Number("sliding_friction", 100.0, math.nan, 1.0)]), "friction within 10 %"),
+        (told(numbers=[Number("dead_band", 100.0, 88.0, 20.0)]), "dead band within 10 %"),
+        (told(numbers=[Number("static_friction", 100.0, 105.0, 4.0)]), "inside their intervals"),
+    ],
+)
+def test_a_bad_one_misses_its_bound(outcome, words):
+    met, text = judged(told(), told("step"), outcome)
+    assert not met
+    assert any(line.startswith("MISSED") and words in line for line in text.splitlines())
+
+
+def test_the_stem_follows_its_set_points_and_friction_is_that_of_the_plant():
+    valve = PLANTS["high"]
+    duty = Duty()
+    (first, second) = stretches(valve, 1 / 3, 1, lambda _: 1.0, lambda _: 0.0, lambda _: duty)
+    friction = valve.plant.friction
+    for stretch in (first, second):
+        mean = stretch.work / stretch.distance
+        assert friction.coulomb < mean < friction.coulomb + 5e-3 * friction.viscous
+        assert stretch.stamps[0].size == stretch.position.size == 24_000
+        assert np.ptp(stretch.position) > 2 * duty.step * valve.plant.body.travel
+    assert second.stamps[0][0] - first.stamps[0][-1] == pytest.approx(25e6, abs=1)
