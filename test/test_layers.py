@@ -25,12 +25,13 @@ MAY_IMPORT = {
     "streams": _CORE,
     "records": {*_CORE, "streams"},
     "health": {*_CORE, "streams"},
+    "alerts": {*_CORE, "health"},
     "history": _VALVES,
     "figures": _PAGES,
     "reports": {*_PAGES, "figures"},
     "fleet": {*_PAGES, "figures", "reports"},
     "reproduction": {*_PAGES, "figures", "reports"},
-    "nodes": {*_FILES, *_PAGES, "reports"},
+    "nodes": {*_FILES, *_PAGES, "reports", "alerts"},
 }
 # What each inner room may import of its siblings. The files beside inner rooms hold their shared
 # words and what joins them, so both may import each other; no two files do, directly or around.
@@ -56,7 +57,17 @@ ROS_ROOMS = ("nodes", "commands/demo")
 
 # The one arrow up: a result draws itself, and loads the figures when it is asked to.
 UPWARD = {"identification/result.py": {"figures"}}
-CORE = ["model", "signals", "identification", "streams", "records", "health", "history", "fleet"]
+CORE = [
+    "model",
+    "signals",
+    "identification",
+    "streams",
+    "records",
+    "health",
+    "history",
+    "alerts",
+    "fleet",
+]
 
 
 def rooms():

@@ -41,6 +41,8 @@ _IDENTIFIER_ONLY = (
     "report_folder",
     "history_file",
     "history_days",
+    "webhook_url",
+    "webhook_period",
 )
 _OTHER_NODES = (
     "valves",

@@ -12,6 +12,7 @@ from rclpy.parameter import Parameter
 
 from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.alerts import Alerts
 from valve_friction_ros.nodes.identifier.bag_service import saved_bag
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -108,6 +109,7 @@ class Identifier(PolledNode):
             self._monitor.remember(earlier)
             results.publish(earlier, self._monitor)
         self._history.read_trend()
+        self._alerts = Alerts(self, workers.alerts, tag, self._monitor.diagnosis().level)
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
@@ -272,6 +274,7 @@ class Identifier(PolledNode):
                 **self._readiness.values(),
             },
         )
+        self._alerts.follow(status)
         self._level_log.follow(status)
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"

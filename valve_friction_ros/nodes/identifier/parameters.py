@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from valve_friction_ros.alerts import Secrets, Webhook
 from valve_friction_ros.health import Baseline, FrictionLimits, MonitorSettings
 from valve_friction_ros.identification import (
     CALIBRATION,
@@ -34,9 +35,12 @@ __all__ = [
     "REPORT_FOLDER",
     "SAVE_FOLDER",
     "VALVE_TAG",
+    "WEBHOOK_PERIOD",
+    "WEBHOOK_URL",
     "baseline_from",
     "monitor_settings",
     "require_valid",
+    "webhook_from",
 ]
 
 _DEFAULTS = IdentificationSettings()
@@ -101,6 +105,18 @@ PERIOD = ParameterSpec(
     0.0,
     "Time from one scheduled identification to the next [s]; 0: only on demand",
     (0.0, 31_557_600.0),
+)
+WEBHOOK_URL = ParameterSpec(
+    "webhook_url",
+    "",
+    "Address that each change of the level is posted to [-], https, or http to this machine; "
+    "empty: nowhere. No secret belongs into it: everybody on the ROS graph can read it",
+)
+WEBHOOK_PERIOD = ParameterSpec(
+    "webhook_period",
+    60.0,
+    "Least time from one posted change of the level to the next [s]; then the newest level counts",
+    (0.0, 86400.0),
 )
 
 CHANGEABLE = (
@@ -181,6 +197,8 @@ CHANGEABLE = (
     REPORT_FOLDER,
     HISTORY_DAYS,
     PERIOD,
+    WEBHOOK_URL,
+    WEBHOOK_PERIOD,
 )
 """Those that can be changed while the node runs."""
 
@@ -216,8 +234,20 @@ def baseline_from(values: Mapping[str, Any]) -> Baseline | None:
     return None if value is None else Baseline(value)
 
 
+def webhook_from(values: Mapping[str, Any]) -> Webhook | None:
+    """Return the webhook of parameter values, None for none.
+
+    Raises ValueError if its address, or the token in the environment, cannot be used.
+    """
+    if not (url := values[WEBHOOK_URL.name]):
+        return None
+    Secrets.from_environment()
+    return Webhook.at(url)
+
+
 def require_valid(values: Mapping[str, Any]) -> None:
     """Raise ValueError, which names the broken rule, if parameter values break one."""
     settings = monitor_settings(values)
     require_valve_units(settings.valve, settings.identification.fixed)
     baseline_from(values)
+    webhook_from(values)

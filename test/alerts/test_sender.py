@@ -1,0 +1,294 @@
+"""The sender against real servers: good, away, slow, endless, redirecting, untrusted."""
+
+import socket
+import threading
+import time
+
+import pytest
+from webhook_server import (
+    Receiver,
+    answer_for_ever,
+    answer_never,
+    answer_slowly,
+    answer_with,
+    headers_for_ever,
+    no_http,
+    self_signed,
+)
+
+from valve_friction_ros.alerts import (
+    SIGNATURE,
+    Alert,
+    AlertSender,
+    DeliveryError,
+    Secrets,
+    Webhook,
+    post,
+    signature,
+)
+from valve_friction_ros.alerts.sender import WAITS
+from valve_friction_ros.health import Level
+
+SECRETS = Secrets("key", "t0ken")
+LIMIT = 0.5
+PATIENCE = 20.0
+
+
+@pytest.fixture(autouse=True)
+def no_proxies(monkeypatch):
+    for name in ("https_proxy", "HTTPS_PROXY", "all_proxy", "no_proxy", "NO_PROXY"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory):
+    return self_signed(tmp_path_factory.mktemp("certificate"))
+
+
+@pytest.fixture
+def sender():
+    made = AlertSender(SECRETS, waits=[0.01] * 3, limit=LIMIT)
+    yield made
+    made.close()
+
+
+def alert(message="", new=Level.WARN):
+    return Alert("FV-101", "/fv_101/identifier", Level.OK, new, "M", message)
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def failure(url, limit=LIMIT):
+    with pytest.raises(DeliveryError) as failed:
+        post(Webhook.at(url), b"{}", SECRETS, limit)
+    assert "hook" not in str(failed.value)
+    assert "t0ken" not in str(failed.value)
+    return failed.value
+
+
+def test_the_waits_grow_and_end():
+    assert WAITS[:4] == (1.0, 2.0, 4.0, 8.0)
+    assert max(WAITS) == 300.0
+    assert 3000 < sum(WAITS) < 4000
+
+
+def test_an_alert_arrives_once_and_signed(sender):
+    with Receiver() as receiver:
+        outbox = sender.outbox()
+        outbox.address(Webhook.at(receiver.url))
+        sent = alert()
+        outbox.put(sent)
+        wait_until(lambda: outbox.state().delivered)
+        ((path, headers, body),) = receiver.requests
+    assert path == "/hook?valve=1"
+    assert body == sent.body()
+    time_of_signature = int(headers[SIGNATURE].split(",")[0].removeprefix("t="))
+    assert headers[SIGNATURE] == signature("key", body, time_of_signature)
+    assert abs(time_of_signature - time.time()) < PATIENCE
+    assert headers["Authorization"] == "Bearer t0ken"
+    assert headers["Content-Type"] == "application/json"
+    assert outbox.state() == (0, 1, 0, None, None)
+
+
+def test_a_trusted_certificate(certificate, monkeypatch):
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate.with_name("certificate.pem")))
+    with Receiver(certificate) as receiver:
+        post(Webhook.at(receiver.url), b"{}", SECRETS)
+        assert len(receiver.requests) == 1
+        other_name = receiver.url.replace("localhost", "127.0.0.1")
+        error = failure(other_name, PATIENCE)
+        assert len(receiver.requests) == 1
+    assert error.is_final
+    assert "is not trusted" in str(error)
+
+
+def test_an_untrusted_certificate_gets_nothing(certificate):
+    with Receiver(certificate) as receiver:
+        error = failure(receiver.url, PATIENCE)
+        assert receiver.requests == []
+    assert error.is_final
+    assert "SSL_CERT_FILE" in str(error)
+
+
+@pytest.mark.parametrize("answer", [answer_never, answer_slowly, headers_for_ever])
+def test_an_answer_that_does_not_end_in_time(answer):
+    with Receiver(answer=answer) as receiver:
+        begun = time.monotonic()
+        error = failure(receiver.url)
+        assert time.monotonic() - begun < PATIENCE
+    assert not error.is_final
+    assert any(words in str(error) for words in ("within 0.5 s", "answered no HTTP"))
+
+
+def test_a_handshake_that_does_not_end_in_time():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        error = failure(f"https://localhost:{silent.getsockname()[1]}/hook")
+    assert "has not answered within 0.5 s" in str(error)
+
+
+def test_gigabytes_are_not_read():
+    with Receiver(answer=answer_for_ever) as receiver:
+        begun = time.monotonic()
+        post(Webhook.at(receiver.url), b"{}", SECRETS, PATIENCE)
+        assert time.monotonic() - begun < PATIENCE / 2
+
+
+@pytest.mark.parametrize(
+    ("status", "is_final"), [(500, False), (503, False), (429, False), (404, True), (401, True)]
+)
+def test_refusals(status, is_final):
+    with Receiver(answer=answer_with(status)) as receiver:
+        error = failure(receiver.url)
+    assert str(error).endswith(f"answered {status}")
+    assert error.is_final == is_final
+
+
+def test_a_redirect_is_not_followed():
+    with Receiver() as other, Receiver(answer=answer_with(307, Location=other.url)) as receiver:
+        error = failure(receiver.url)
+        assert len(receiver.requests) == 1
+        assert other.requests == []
+    assert error.is_final
+    assert "redirects are not followed" in str(error)
+
+
+def test_another_protocol():
+    with Receiver(answer=no_http) as receiver:
+        assert "answered no HTTP" in str(failure(receiver.url))
+
+
+def test_a_proxy_of_the_environment_serves_other_machines_only(monkeypatch):
+    asked = []
+    with socket.create_server(("127.0.0.1", 0)) as proxy, Receiver() as receiver:
+        port = proxy.getsockname()[1]
+        monkeypatch.setenv("https_proxy", f"http://me:pa%40ss@127.0.0.1:{port}")
+
+        def serve():
+            connection, _ = proxy.accept()
+            with connection:
+                asked.append(connection.recv(65536))
+                connection.sendall(b"HTTP/1.0 403 Forbidden\r\n\r\n")
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        error = failure("https://example.invalid/hook", PATIENCE)
+        thread.join()
+        post(Webhook.at(receiver.url), b"{}", SECRETS, PATIENCE)
+    assert b"CONNECT example.invalid:443" in asked[0]
+    assert b"Basic bWU6cGFAc3M=" in asked[0]
+    assert b"t0ken" not in asked[0]
+    assert "pa" not in str(error).replace("example.invalid", "")
+
+
+def test_what_a_server_misses_it_gets_when_it_is_back():
+    with Receiver() as first:
+        port = first.port
+    sender = AlertSender(SECRETS, waits=[0.05] * 2000, limit=LIMIT)
+    outbox = sender.outbox()
+    outbox.address(Webhook.at(f"http://127.0.0.1:{port}/hook"))
+    one, two = alert("one"), alert("two", Level.ERROR)
+    outbox.put(one)
+    outbox.put(two)
+    wait_until(lambda: outbox.state().problem)
+    assert "refused" in outbox.state().problem
+    with Receiver(port=port, answer=answer_with(500)) as back:
+        wait_until(lambda: len(back.requests) > 2)
+        assert {body["event_id"] for body in back.bodies} == {one.event_id}
+        tried = len(back.requests)
+        back.answer = answer_with(200)
+        wait_until(lambda: outbox.state().delivered == 2)
+        ids = [body["event_id"] for body in back.bodies]
+    assert ids[-1] == two.event_id
+    assert ids.count(two.event_id) == 1
+    assert ids[:-1].count(one.event_id) == len(ids) - 1 >= tried
+    assert outbox.state() == (0, 2, 0, None, None)
+    sender.close()
+
+
+def test_tries_are_bounded_and_the_loss_is_told(sender):
+    with Receiver(answer=answer_with(500)) as receiver:
+        outbox = sender.outbox()
+        outbox.address(Webhook.at(receiver.url))
+        outbox.put(alert())
+        wait_until(lambda: outbox.state().given_up)
+        assert len(receiver.requests) == 4
+        state = outbox.state()
+        assert state.waiting == 0
+        assert "the alert OK → WARN of 2" in state.lost
+        assert "answered 500" in state.lost
+        receiver.answer = answer_with(200)
+        outbox.put(alert())
+        wait_until(lambda: outbox.state().delivered)
+        assert outbox.state() == (0, 1, 1, None, None)
+
+
+def test_the_queue_is_bounded_and_keeps_the_newest():
+    with Receiver(answer=answer_never) as receiver:
+        sender = AlertSender(SECRETS, limit=PATIENCE)
+        outbox = sender.outbox()
+        outbox.address(Webhook.at(receiver.url))
+        alerts = [alert(str(number)) for number in range(150)]
+        outbox.put(alerts[0])
+        wait_until(lambda: receiver.requests)
+        begun = time.monotonic()
+        for one in alerts[1:]:
+            outbox.put(one)
+        assert time.monotonic() - begun < 1.0
+        state = outbox.state()
+        assert (state.waiting, state.given_up) == (100, 50)
+        assert "more than 100 wait" in state.lost
+        sender.close()
+
+
+def test_a_dead_webhook_holds_up_no_other_valve():
+    with Receiver() as away:
+        gone = away.url
+    sender = AlertSender(SECRETS, limit=LIMIT)
+    dead, alive = sender.outbox(), sender.outbox()
+    with Receiver() as receiver:
+        dead.address(Webhook.at(gone))
+        alive.address(Webhook.at(receiver.url))
+        for _ in range(3):
+            dead.put(alert())
+            alive.put(alert())
+        wait_until(lambda: alive.state().delivered == 3)
+    assert dead.state().waiting == 3
+    assert sum(thread.name == "alerts" for thread in threading.enumerate()) >= 1
+    sender.close()
+
+
+def test_valves_share_a_thread_that_begins_with_the_first_alert():
+    def threads():
+        return {one for one in threading.enumerate() if one.name == "alerts" and one.is_alive()}
+
+    before = threads()
+    sender = AlertSender(SECRETS)
+    outboxes = [sender.outbox() for _ in range(5)]
+    with Receiver() as receiver:
+        for outbox in outboxes:
+            outbox.address(Webhook.at(receiver.url))
+        assert threads() <= before
+        for outbox in outboxes:
+            outbox.put(alert())
+        assert len(threads() - before) == 1
+        wait_until(lambda: all(outbox.state().delivered == 1 for outbox in outboxes))
+    sender.close()
+    wait_until(lambda: not threads() - before)
+
+
+def test_without_a_webhook_nothing_waits(sender):
+    outbox = sender.outbox()
+    outbox.put(alert())
+    assert outbox.state().waiting == 0
+    with Receiver(answer=answer_with(500)) as receiver:
+        outbox.address(Webhook.at(receiver.url))
+        outbox.put(alert())
+        wait_until(lambda: receiver.requests)
+        outbox.address(None)
+        assert outbox.state().waiting == 0
+        assert outbox.state().problem is None

@@ -1,0 +1,167 @@
+"""Alerts of an identifier over DDS: one a change, while a receiver is away or misbehaves."""
+
+import time
+
+import pytest
+from live_nodes import NAMESPACE, values_of
+from records import quick_record
+from webhook_server import Receiver, answer_never, answer_with, self_signed
+
+from valve_friction_ros.alerts import SIGNATURE, signature
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.identification import identify
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+
+NODE = f"{NAMESPACE}/identifier"
+OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
+HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
+KNOWN = {"baseline_coulomb_friction": Baseline.of(identify(HEALTHY, BENCH_VALVE)).coulomb_friction}
+SECRETS = {"VALVE_FRICTION_WEBHOOK_SECRET": "k3y", "VALVE_FRICTION_WEBHOOK_TOKEN": "t0ken"}
+
+
+@pytest.fixture(autouse=True)
+def secrets(monkeypatch):
+    for name, value in SECRETS.items():
+        monkeypatch.setenv(name, value)
+
+
+def changes(receiver):
+    return [(body["old_level"], body["new_level"]) for body in receiver.bodies]
+
+
+def require_no_secret(live, node):
+    shown = node.errors + node.output + "".join(map(str, live.client.statuses))
+    assert not any(secret in shown for secret in SECRETS.values())
+
+
+def test_each_change_of_level_is_posted_once(live, tmp_path, monkeypatch):
+    certificate = self_signed(tmp_path)
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate.with_name("certificate.pem")))
+    with Receiver(certificate) as receiver:
+        node = live.start_identifier(
+            {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0, "valve_tag": "FV-101"}
+        )
+        client = live.client
+        client.identified(TIGHT)
+        client.next_status(lambda one: one.level == ERROR, "an alarm")
+        client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
+        client.identified(TIGHT)  # no change
+        client.identified(HEALTHY)
+        client.wait_until(lambda: len(receiver.requests) == 2, "another alert")
+        values = client.status_values(
+            lambda one: values_of(one)["webhook delivered"] == "2", "both delivered"
+        )
+        node.stop()
+        client.watched.clear()
+        assert changes(receiver) == [("OK", "ERROR"), ("ERROR", "OK")]
+        first, second = receiver.bodies
+        assert first["event_id"] != second["event_id"]
+        assert (first["valve"], first["node"], first["ne_107"]) == ("FV-101", NODE, "F")
+        assert first["message"].startswith("excess friction")
+        assert first["friction_ratio"] > 2
+        for _, headers, body in receiver.requests:
+            stamp = int(headers[SIGNATURE].split(",")[0].removeprefix("t="))
+            assert headers[SIGNATURE] == signature("k3y", body, stamp)
+            assert headers["Authorization"] == "Bearer t0ken"
+    assert values["webhook"] == f"https://localhost:{receiver.port}"
+    assert (values["webhook waiting"], values["webhook given up"]) == ("0", "0")
+    require_no_secret(live, node)
+
+
+def test_an_alert_is_delivered_when_the_receiver_is_back(live):
+    with Receiver() as first:
+        url, port = first.url, first.port
+    live.start_identifier({**KNOWN, "webhook_url": url})
+    client = live.client
+    client.identified(TIGHT)
+    status = client.next_status(
+        lambda one: "refused" in values_of(one)["webhook problem"], "a problem"
+    )
+    assert status.level == ERROR
+    assert values_of(status)["webhook waiting"] == "1"
+    with Receiver(port=port) as back:
+        client.next_status(lambda one: values_of(one)["webhook delivered"] == "1", "delivery")
+        assert changes(back) == [("OK", "ERROR")]
+
+
+def test_a_refused_alert_is_upkeep_and_no_alert(live):
+    with Receiver(answer=answer_with(404)) as receiver:
+        node = live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
+        client = live.client
+        client.identified(TIGHT)
+        client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
+        client.identified(HEALTHY)
+        client.wait_until(lambda: len(receiver.requests) == 2, "another alert")
+        status = client.next_status(
+            lambda one: values_of(one)["webhook given up"] == "2", "alerts given up"
+        )
+        assert status.level == WARN
+        assert values_of(status)["NE 107"] == "M"
+        assert "the alert ERROR → OK of 2" in status.message
+        assert f"http://127.0.0.1:{receiver.port} answered 404" in status.message
+        client.next_status()  # the WARN of the webhook itself is not posted
+        client.next_status()
+        assert changes(receiver) == [("OK", "ERROR"), ("ERROR", "OK")]
+        assert client.set_together(f"{NODE}", {"webhook_url": ""}).successful
+        status = client.next_status(lambda one: "webhook" not in values_of(one), "no webhook")
+        assert status.level == OK
+    assert "/hook" not in node.errors
+    require_no_secret(live, node)
+
+
+def test_a_receiver_that_hangs_holds_up_neither_diagnostics_nor_the_end(live):
+    with Receiver(answer=answer_never) as receiver:
+        node = live.start_identifier({**KNOWN, "webhook_url": receiver.url})
+        client = live.client
+        client.identified(TIGHT)
+        client.wait_until(lambda: receiver.requests, "an alert under way")
+        begun = time.monotonic()
+        for _ in range(3):
+            client.next_status()
+        assert time.monotonic() - begun < 6.0
+        client.watched.clear()
+        begun = time.monotonic()
+        node.stop()
+        assert time.monotonic() - begun < 3.0
+
+
+def test_a_flapping_valve_posts_one_change_a_period(live):
+    with Receiver() as receiver:
+        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 3600.0})
+        client = live.client
+        for record, level in ((TIGHT, ERROR), (HEALTHY, OK)) * 2:
+            client.identified(record)
+            client.next_status(lambda one, level=level: one.level == level, "the level")
+        assert changes(receiver) == [("OK", "ERROR")]
+        assert client.set_together(NODE, {"webhook_period": 0.0}).successful
+        client.wait_until(lambda: len(receiver.requests) == 2, "the newest level")
+        assert changes(receiver)[1] == ("ERROR", "OK")
+
+
+def test_silence_of_the_inputs_is_posted_and_a_restart_is_not(live):
+    with Receiver() as receiver:
+        chosen = {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
+        node = live.start_identifier(chosen)
+        client = live.client
+        client.identified(TIGHT)
+        client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
+        client.watched.clear()
+        node.stop()
+        live.nodes.remove(node)
+        client.statuses.clear()
+        live.start_identifier(chosen)
+        assert client.next_status().level == ERROR
+        client.identified(HEALTHY)
+        client.wait_until(lambda: len(receiver.requests) == 2, "another alert")
+        assert client.set_together(NODE, {"input_timeout": 0.5}).successful
+        client.wait_until(lambda: len(receiver.requests) == 3, "silence")
+        assert changes(receiver) == [("OK", "ERROR"), ("ERROR", "OK"), ("OK", "WARN")]
+        assert "no data on" in receiver.bodies[-1]["message"]
+
+
+def test_an_address_that_cannot_be_used_is_refused_without_repeating_it(live):
+    live.start_identifier()
+    refused = live.client.set_together(NODE, {"webhook_url": "http://example.com/s3cret"})
+    assert not refused.successful
+    assert "http to another machine" in refused.reason
+    assert "s3cret" not in refused.reason

@@ -1,0 +1,19 @@
+"""Alerts: a change of a valve's level, told to a webhook; no ROS."""
+
+from valve_friction_ros.alerts.alert import Alert
+from valve_friction_ros.alerts.posting import DeliveryError, post
+from valve_friction_ros.alerts.sender import AlertSender, Outbox, OutboxState
+from valve_friction_ros.alerts.webhook import SIGNATURE, Secrets, Webhook, signature
+
+__all__ = [
+    "SIGNATURE",
+    "Alert",
+    "AlertSender",
+    "Outbox",
+    "OutboxState",
+    "Secrets",
+    "DeliveryError",
+    "Webhook",
+    "post",
+    "signature",
+]

@@ -1,0 +1,217 @@
+"""The thread that sends the alerts of all valves of a process, and the queue of each valve."""
+
+import contextlib
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from itertools import accumulate, repeat
+from typing import NamedTuple
+
+from valve_friction_ros.alerts.alert import Alert
+from valve_friction_ros.alerts.posting import DeliveryError, post
+from valve_friction_ros.alerts.webhook import Secrets, Webhook
+
+__all__ = ["WAITS", "AlertSender", "Outbox", "OutboxState"]
+
+_LONGEST_WAIT = 300.0
+_TRIES = 20
+
+WAITS = tuple(accumulate(repeat(1.0, _TRIES - 1), lambda wait, _: min(2 * wait, _LONGEST_WAIT)))
+"""Times, s, from each failed try to the next: 1, 2, 4 … 300; an hour in all."""
+
+_MOST_WAITING = 100
+"""Alerts of a valve that wait; then the oldest is given up."""
+
+
+class OutboxState(NamedTuple):
+    """The alerts of one valve.
+
+    Attributes
+    ----------
+    waiting, delivered, given_up : int
+        Numbers of alerts; those given up were refused, tried in vain, or had to make room.
+    problem : str or None
+        Why the last try has failed; None if it has not.
+    lost : str or None
+        Which alert was given up, and why, until a later one is delivered.
+    """
+
+    waiting: int
+    delivered: int
+    given_up: int
+    problem: str | None
+    lost: str | None
+
+
+@dataclass(eq=False)
+class _Letter:
+    alert: Alert
+    tries: int = 0
+
+
+class Outbox:
+    """The alerts of one valve, sent in their order: the last one that arrives is the newest."""
+
+    def __init__(
+        self,
+        changed: threading.Condition,
+        waits: tuple[float, ...],
+        wake: Callable[[], None],
+    ) -> None:
+        self._changed, self._waits, self._wake = changed, waits, wake
+        self._letters: deque[_Letter] = deque()
+        self._is_sending = False
+        self._due = 0.0
+        self._webhook: Webhook | None = None
+        self._delivered = self._given_up = 0
+        self._problem: str | None = None
+        self._lost: str | None = None
+
+    def address(self, webhook: Webhook | None) -> None:
+        """Send to this webhook from now on, also what waits; None: drop it, and send nothing."""
+        if webhook == self._webhook:
+            return
+        with self._changed:
+            self._webhook, self._due = webhook, 0.0
+            self._problem = self._lost = None
+            if webhook is None:
+                self._letters.clear()
+            elif self._letters:
+                self._wake()
+
+    def put(self, alert: Alert) -> None:
+        """Have an alert sent; returns at once. Without a webhook it is dropped."""
+        with self._changed:
+            if self._webhook is None:
+                return
+            self._letters.append(_Letter(alert))
+            if len(self._letters) > _MOST_WAITING:
+                oldest = 1 if self._is_sending else 0
+                self._give_up(self._letters[oldest], f"more than {_MOST_WAITING} wait")
+                del self._letters[oldest]
+            self._wake()
+
+    def state(self) -> OutboxState:
+        """Return the numbers of alerts, and what is wrong."""
+        with self._changed:
+            waiting = len(self._letters)
+            return OutboxState(waiting, self._delivered, self._given_up, self._problem, self._lost)
+
+    def due(self) -> float | None:
+        """Return when the next try is due, s of the monotonic clock; None if nothing waits."""
+        return self._due if self._letters else None
+
+    def begin(self) -> tuple[_Letter, Webhook]:
+        """Take what is to be tried now; the caller holds the lock."""
+        assert self._webhook is not None  # noqa: S101 - else nothing waits
+        self._is_sending = True
+        return self._letters[0], self._webhook
+
+    def end(self, letter: _Letter, webhook: Webhook, failure: DeliveryError | None) -> None:
+        """Note how the try has ended; the caller holds the lock."""
+        self._is_sending = False
+        if webhook != self._webhook:
+            return
+        with contextlib.suppress(ValueError):  # dropped meanwhile
+            if failure is None:
+                self._letters.remove(letter)
+                self._delivered += 1
+                self._problem = self._lost = None
+                return
+            place = self._letters.index(letter)
+            self._problem = str(failure)
+            letter.tries += 1
+            if failure.is_final or letter.tries > len(self._waits):
+                del self._letters[place]
+                self._give_up(letter, str(failure))
+            else:
+                self._due = time.monotonic() + self._waits[letter.tries - 1]
+
+    def _give_up(self, letter: _Letter, cause: str) -> None:
+        self._given_up += 1
+        alert = letter.alert
+        self._lost = (
+            f"the alert {alert.old_level.name} → {alert.new_level.name} of "
+            f"{alert.time:%Y-%m-%d %H:%M:%S} UTC was not delivered: {cause}"
+        )
+
+
+class AlertSender:
+    """Sends the alerts of many valves in a thread of its own, which begins with the first one.
+
+    The thread holds up neither its callers nor the end of the process; what waits then is lost.
+
+    Parameters
+    ----------
+    secrets : Secrets, optional
+        By default those of the environment, read at each try.
+    waits : iterable of float
+        Times, s, from each failed try to the next; one try more is made than there are waits.
+    limit : float
+        Longest time of a try, s.
+    """
+
+    def __init__(
+        self, secrets: Secrets | None = None, waits: Iterable[float] = WAITS, limit: float = 10.0
+    ) -> None:
+        self._secrets = secrets
+        self._waits = tuple(waits)
+        self._limit = limit
+        self._changed = threading.Condition()
+        self._outboxes: list[Outbox] = []
+        self._is_closed = False
+        self._thread: threading.Thread | None = None
+
+    def outbox(self) -> Outbox:
+        """Return a new queue, for one valve."""
+        outbox = Outbox(self._changed, self._waits, self._wake)
+        with self._changed:
+            self._outboxes.append(outbox)
+        return outbox
+
+    def _wake(self) -> None:
+        """Have the thread look at the queues; the caller holds the lock."""
+        if self._thread is None and not self._is_closed:
+            self._thread = threading.Thread(target=self._run, name="alerts", daemon=True)
+            self._thread.start()
+        self._changed.notify()
+
+    def close(self) -> None:
+        """Send nothing more; returns at once, while a try may still be under way."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
+
+    def _run(self) -> None:
+        while (outbox := self._next()) is not None:
+            with self._changed:
+                if outbox.due() is None:
+                    continue
+                letter, webhook = outbox.begin()
+            failure = self._failure(letter.alert, webhook)
+            with self._changed:
+                outbox.end(letter, webhook, failure)
+
+    def _next(self) -> Outbox | None:
+        """Wait for the next try, and return its queue; None at the end."""
+        with self._changed:
+            while not self._is_closed:
+                dues = [(due, one) for one in self._outboxes if (due := one.due()) is not None]
+                due, outbox = min(dues, key=lambda pair: pair[0], default=(None, None))
+                wait = None if due is None else due - time.monotonic()
+                if wait is not None and wait <= 0:
+                    return outbox
+                self._changed.wait(wait)
+        return None
+
+    def _failure(self, alert: Alert, webhook: Webhook) -> DeliveryError | None:
+        try:
+            secrets = Secrets.from_environment() if self._secrets is None else self._secrets
+            post(webhook, alert.body(), secrets, self._limit)
+        except DeliveryError as failure:
+            return failure
+        except Exception as bug:  # noqa: BLE001 - the thread serves other valves, too
+            return DeliveryError(f"internal error: {type(bug).__name__}", is_final=True)
+        return None

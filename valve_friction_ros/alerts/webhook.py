@@ -1,0 +1,141 @@
+"""Where alerts go, and by what they are known to be genuine."""
+
+import hashlib
+import hmac
+import ipaddress
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+__all__ = ["SIGNATURE", "Secrets", "Webhook", "signature"]
+
+SIGNATURE = "X-Valve-Friction-Signature"
+"""Header with the signature."""
+
+_SECRET = "VALVE_FRICTION_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
+_TOKEN = "VALVE_FRICTION_WEBHOOK_TOKEN"  # noqa: S105
+
+_PORTS = {"https": 443, "http": 80}
+
+
+@dataclass(frozen=True)
+class Webhook:
+    """The address of a webhook.
+
+    As text it has neither path nor query, which hold secrets of many services.
+
+    Attributes
+    ----------
+    scheme : str
+        ``https``, or ``http`` to this machine.
+    host : str
+        Name or address.
+    port : int
+        Its port.
+    target : str
+        Path and query.
+    """
+
+    scheme: str
+    host: str
+    port: int
+    target: str = field(repr=False)
+
+    @classmethod
+    def at(cls, url: str) -> "Webhook":
+        """Read the address of a webhook.
+
+        Raises ValueError, without the address, if it is none, is not encrypted on its way to
+        another machine, or holds a name or a password.
+        """
+        if not url.isascii() or not url.isprintable() or " " in url:
+            raise ValueError("webhook_url has a space, or a character that is not ASCII: encode it")
+        try:
+            parts = urlsplit(url)
+            host, port = parts.hostname, parts.port
+        except ValueError:
+            host = port = None
+        if not host or parts.scheme not in _PORTS:
+            raise ValueError("webhook_url is no address: write https://host/path")
+        if parts.username is not None or parts.password is not None:
+            raise ValueError(
+                "webhook_url holds a name or a password, which everybody on the ROS graph can "
+                f"read: put a token into the environment variable {_TOKEN}"
+            )
+        if parts.scheme == "http" and not _is_loopback(host):
+            raise ValueError(
+                "webhook_url is http to another machine, where everybody on the way can read and "
+                "change it: write https, or name a relay on this machine"
+            )
+        target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+        return cls(parts.scheme, host, _PORTS[parts.scheme] if port is None else port, target)
+
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether alerts go there by TLS."""
+        return self.scheme == "https"
+
+    @property
+    def is_here(self) -> bool:
+        """Whether it is on this machine."""
+        return _is_loopback(self.host)
+
+    def __str__(self) -> str:
+        """Return scheme, host and port."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}"
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+@dataclass(frozen=True)
+class Secrets:
+    """What the receiver of an alert knows its sender by; never shown.
+
+    Attributes
+    ----------
+    secret : str
+        Key of the signature; empty: no signature.
+    token : str
+        Bearer token; empty: none.
+    """
+
+    secret: str = field(default="", repr=False)
+    token: str = field(default="", repr=False)
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str] = os.environ) -> "Secrets":
+        """Read ``VALVE_FRICTION_WEBHOOK_SECRET`` and ``VALVE_FRICTION_WEBHOOK_TOKEN``.
+
+        Raises ValueError, without the token, if it cannot stand in a header.
+        """
+        secret, token = (environment.get(name, "").strip() for name in (_SECRET, _TOKEN))
+        if not token.isascii() or (token and not token.isprintable()) or " " in token:
+            raise ValueError(f"{_TOKEN} has a space, or a character that is not ASCII: correct it")
+        return cls(secret, token)
+
+    def headers(self, body: bytes, time: int) -> dict[str, str]:
+        """Return the headers that vouch for a body sent at `time`, s since 1970."""
+        headers = {}
+        if self.secret:
+            headers[SIGNATURE] = signature(self.secret, body, time)
+        if self.token:
+            headers["Authorization"] = f"Bearer {self.token}"
+        return headers
+
+
+def signature(secret: str, body: bytes, time: int) -> str:
+    """Sign a body that is sent at `time`, s since 1970 (UTC).
+
+    It is ``t=time,v1=digest``, the digest HMAC-SHA256 of time, a full stop and the body, in
+    hexadecimal digits. A receiver computes the same, compares in constant time, and refuses old
+    times.
+    """
+    signed = f"{time}.".encode() + body
+    return f"t={time},v1={hmac.new(secret.encode(), signed, hashlib.sha256).hexdigest()}"
