@@ -26,12 +26,13 @@ MAY_IMPORT = {
     "records": {*_CORE, "streams"},
     "health": {*_CORE, "streams"},
     "alerts": {*_CORE, "health"},
+    "response": _VALVES,
     "history": _VALVES,
     "figures": _PAGES,
     "reports": {*_PAGES, "figures"},
     "fleet": {*_PAGES, "figures", "reports"},
     "reproduction": {*_PAGES, "figures", "reports"},
-    "nodes": {*_FILES, *_PAGES, "reports", "alerts"},
+    "nodes": {*_FILES, *_PAGES, "reports", "alerts", "response"},
 }
 # What each inner room may import of its siblings. The files beside inner rooms hold their shared
 # words and what joins them, so both may import each other; no two files do, directly or around.

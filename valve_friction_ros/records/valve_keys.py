@@ -41,6 +41,10 @@ _IDENTIFIER_ONLY = (
     "report_folder",
     "history_file",
     "history_days",
+    "command_unit",
+    "deviation_limit",
+    "dead_time_limit",
+    "t86_limit",
     "webhook_url",
     "webhook_period",
 )

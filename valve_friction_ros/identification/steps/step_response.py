@@ -24,7 +24,7 @@ from valve_friction_ros.signals.smoothing import (
     smooth_between,
 )
 
-__all__ = ["Bracket", "StepMetrics", "StepTest", "step_test"]
+__all__ = ["Bracket", "StepMetrics", "StepTest", "first_beyond", "step_test"]
 
 _T63 = -math.expm1(-1.0)
 _T86 = -math.expm1(-2.0)
@@ -247,8 +247,8 @@ def _steady(hold: NDArray[np.float64]) -> float:
     return float(np.mean(hold[-max(round(_SETTLED_SHARE * hold.size), 1) :]))
 
 
-def _first_beyond(response: NDArray[np.float64], level: float) -> float:
-    """Return where a response first reaches a level, in samples; nan if it never does."""
+def first_beyond(response: NDArray[np.float64], level: float) -> float:
+    """Return where a response first reaches a level, in samples, interpolated; nan if never."""
     reached = np.flatnonzero(response >= level)
     if not reached.size:
         return math.nan
@@ -276,7 +276,7 @@ def _metrics(
         response = way * (hold - before)
         change = abs(output_change)
         dead_time, t63, t86 = (
-            period * _first_beyond(response, level)
+            period * first_beyond(response, level)
             for level in (least, _T63 * change, _T86 * change)
         )
         beyond = float(response.max()) - change

@@ -29,6 +29,7 @@ from valve_friction_ros.nodes.identifier.parameters import (
     require_valid,
 )
 from valve_friction_ros.nodes.identifier.report_service import written_report
+from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
 from valve_friction_ros.nodes.identifier.status import (
@@ -98,7 +99,7 @@ class Identifier(PolledNode):
         self._estimate_topic = EstimateTopic(self)
         results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
-        self._watches: tuple[Watch, ...] = ()
+        self._watches: tuple[Watch, ...] = (ResponseWatch(self),)
         waiting = ReentrantCallbackGroup()
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)

@@ -20,11 +20,13 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT, VALVE_PARAMETERS, valve_from
 from valve_friction_ros.records.data_folder import history_file
+from valve_friction_ros.response import ResponseLimits
 
 __all__ = [
     "BASELINE",
     "BASELINE_IN_ALARM",
     "CHANGEABLE",
+    "COMMAND_UNIT",
     "HISTORY_DAYS",
     "HISTORY_FILE",
     "IDENTIFICATION_LIMIT",
@@ -33,13 +35,16 @@ __all__ = [
     "PARAMETERS",
     "PERIOD",
     "REPORT_FOLDER",
+    "RESPONSE_LIMITS",
     "SAVE_FOLDER",
+    "TRAVEL",
     "VALVE_TAG",
     "WEBHOOK_PERIOD",
     "WEBHOOK_URL",
     "baseline_from",
     "monitor_settings",
     "require_valid",
+    "response_limits",
     "webhook_from",
 ]
 
@@ -105,6 +110,35 @@ PERIOD = ParameterSpec(
     0.0,
     "Time from one scheduled identification to the next [s]; 0: only on demand",
     (0.0, 31_557_600.0),
+)
+TRAVEL = "travel"
+"""Name of a parameter of `VALVE_PARAMETERS`."""
+COMMAND_UNIT = ParameterSpec(
+    "command_unit",
+    "m",
+    "Unit of stem_command [-]: m, or % of the travel",
+    choices=("m", "%"),
+)
+RESPONSE_LIMITS = (
+    ParameterSpec(
+        "deviation_limit",
+        0.0,
+        "Median distance of the resting stem from its command that warns [% of the travel]; "
+        "0: none",
+        (0.0, 100.0),
+    ),
+    ParameterSpec(
+        "dead_time_limit",
+        0.0,
+        "Median time from a step of the command to the first movement that warns [s]; 0: none",
+        (0.0, 3600.0),
+    ),
+    ParameterSpec(
+        "t86_limit",
+        0.0,
+        "Median time from a step of the command to 86.5 % of the move that warns [s]; 0: none",
+        (0.0, 3600.0),
+    ),
 )
 WEBHOOK_URL = ParameterSpec(
     "webhook_url",
@@ -197,6 +231,8 @@ CHANGEABLE = (
     REPORT_FOLDER,
     HISTORY_DAYS,
     PERIOD,
+    COMMAND_UNIT,
+    *RESPONSE_LIMITS,
     WEBHOOK_URL,
     WEBHOOK_PERIOD,
 )
@@ -232,6 +268,12 @@ def baseline_from(values: Mapping[str, Any]) -> Baseline | None:
     """Build the baseline that the parameter gives; raises ValueError for an impossible one."""
     value = optional(values[BASELINE.name])
     return None if value is None else Baseline(value)
+
+
+def response_limits(values: Mapping[str, Any]) -> ResponseLimits:
+    """Build the limits of the answer to the command."""
+    deviation, dead_time, t86 = (values[spec.name] for spec in RESPONSE_LIMITS)
+    return ResponseLimits(deviation / 100, dead_time, t86)
 
 
 def webhook_from(values: Mapping[str, Any]) -> Webhook | None:

@@ -1,0 +1,175 @@
+"""The answer of the stem to ``stem_command``, watched in service."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from valve_friction_ros.health import Finding
+from valve_friction_ros.nodes.identifier.parameters import (
+    COMMAND_UNIT,
+    INPUT_TIMEOUT,
+    RESPONSE_LIMITS,
+    TRAVEL,
+    response_limits,
+)
+from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
+from valve_friction_ros.nodes.plumbing.parameters import values_of
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.qos import stream
+from valve_friction_ros.nodes.plumbing.raw_samples import positions_in, readable
+from valve_friction_ros.response import SIZES, ResponseMonitor, ResponseSummary, found
+from valve_friction_ros.streams import Arrivals, Kind, Samples
+
+__all__ = ["ResponseWatch"]
+
+_SILENCE = 1.0
+"""Time without messages, s, after which the quality of service is suspected."""
+
+_EVERY = 0.5
+"""Time, s, of samples that is taken at once: each call costs as much as a thousand samples."""
+
+
+class ResponseWatch:
+    """Follows ``stem_command``; without one it says nothing and keeps nothing."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._polled = PolledSubscription(node, JointState, "stem_command", stream(), raw=True)
+        self._input = InputWatch(node, self._polled.subscription)
+        self._commands: list[Samples] = []
+        self._arrivals: list[Arrivals] = []
+        self._monitor: ResponseMonitor | None = None
+        self._travel = math.nan
+        self._problem = ""
+
+    def take(self, arrivals: Arrivals) -> None:
+        """Take commands, and samples of pressure and stem."""
+        self._take_commands()
+        if self._monitor is None and not self._commands:
+            return
+        self._arrivals.append(arrivals)
+        stamps = [part.stamps for part in self._arrivals if part.stamps.size]
+        if stamps and abs(int(stamps[-1][-1]) - int(stamps[0][0])) >= _EVERY * 1e9:
+            self._work()
+
+    def _take_commands(self) -> None:
+        messages = self._polled.take()
+        if not messages:
+            return
+        self._input.arrived()
+        try:
+            found_in = positions_in([one.message for one in messages], "")
+        except RuntimeError:
+            kept = readable(messages, JointState)
+            found_in = positions_in([one.message for one in kept], "")
+        given = found_in.samples(Kind.POSITION)
+        given = Samples(*(part[np.isfinite(given.values)] for part in given))
+        travel, unit = self._value(TRAVEL), self._value(COMMAND_UNIT.name)
+        metres = given.values * (travel / 100 if unit == "%" else 1.0)
+        # Positioners take a little more than 0 to 100 %.
+        good = np.abs(metres - travel / 2) <= travel
+        self._problem = ""
+        if not good.all():
+            wrong = float(given.values[~good][0])
+            self._problem = f"{wrong:g} {unit} is no place of the stem: check command_unit"
+        if good.any():
+            self._commands.append(Samples(given.stamps[good], metres[good]))
+
+    def _value(self, name: str) -> Any:
+        return self._node.get_parameter(name).value
+
+    def _work(self) -> None:
+        """Hand on what was gathered; another travel, or an empty gathering, begins anew."""
+        travel = float(self._value(TRAVEL))
+        if not math.isfinite(travel):
+            self._commands, self._arrivals, self._monitor = [], [], None
+            return
+        if self._monitor is None or travel != self._travel:
+            self._monitor, self._travel = ResponseMonitor(travel), travel
+        none = Samples(np.empty(0, np.int64), np.empty(0))
+        parts = zip(*(self._commands or [none]), strict=True)
+        command = Samples(*(np.concatenate(part) for part in parts))
+        arrived = Arrivals(*map(np.concatenate, zip(*self._arrivals, strict=True)))
+        self._commands, self._arrivals = [], []
+        self._monitor.take(command, arrived)
+
+    def findings(self) -> Sequence[Finding]:
+        """Return what is wrong with the answers."""
+        self._follow_publishers()
+        if self._monitor is None:
+            return []
+        limits = response_limits(values_of(self._node, RESPONSE_LIMITS))
+        return found(self._monitor.summary, limits, self._monitor.hunting)
+
+    def _follow_publishers(self) -> None:
+        """Follow another quality of service; forget a command that nobody gives any more."""
+        silence = self._input.silence()
+        if silence > _SILENCE:
+            self._polled.follow_publishers()
+        is_silent = silence > self._value(INPUT_TIMEOUT.name)
+        if self._monitor is not None and is_silent and not self._input_is_offered():
+            self._monitor.forget()
+
+    def _input_is_offered(self) -> bool:
+        return bool(self._node.count_publishers(self._input.topic))
+
+    def values(self) -> Mapping[str, str]:
+        """Return the figures of the latest moves."""
+        monitor = self._monitor
+        problem = {"stem_command problem": self._problem} if self._problem else {}
+        if monitor is None:
+            return problem
+        return {
+            **problem,
+            **_deviation_values(monitor),
+            **_move_values(monitor.summary, monitor.left_out),
+        }
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _deviation_values(monitor: ResponseMonitor) -> dict[str, str]:
+    sizes, signed = monitor.deviation()
+    values = {
+        "command deviation mean [%]": _number(100 * signed),
+        "command deviation magnitude [%]": _number(100 * sizes.median),
+        "command deviation 95th percentile [%]": _number(100 * sizes.high),
+    }
+    if (swing := monitor.hunting) is not None:
+        values["hunting period [s]"] = _number(swing.period)
+        values["hunting amplitude [%]"] = _number(100 * swing.amplitude)
+    return values
+
+
+def _move_values(summary: ResponseSummary, left_out: int) -> dict[str, str]:
+    values = {
+        "moves": str(len(summary.moves)),
+        "moves ignored": str(len(summary.ignored)),
+        "changes left out": str(left_out),
+        "largest ignored step [%]": _number(100 * summary.largest_ignored),
+        "smallest answered step [%]": _number(100 * summary.smallest_answered),
+    }
+    for name, spread, scale, unit in (
+        ("dead_time", summary.dead_time, 1, "s"),
+        ("T63", summary.t63, 1, "s"),
+        ("T86", summary.t86, 1, "s"),
+        ("overshoot", summary.overshoot, 100, "%"),
+        ("steady_error", summary.steady_error, 100, "%"),
+    ):
+        values[f"{name} [{unit}]"] = _number(scale * spread.median)
+        values[f"{name} low [{unit}]"] = _number(scale * spread.low)
+        values[f"{name} high [{unit}]"] = _number(scale * spread.high)
+    for (low, high), (moved, count) in zip(pairwise(SIZES), summary.by_size, strict=True):
+        if count:
+            bounds = f"{100 * low:g} to {100 * high:g} %" if high < 1 else f"above {100 * low:g} %"
+            values[f"moved by steps of {bounds}"] = f"{moved} of {count}"
+    for which in ("dead_time", "T86", "deviation"):
+        values[f"{which} cause"] = summary.cause(which.lower()).name.lower()
+    return values

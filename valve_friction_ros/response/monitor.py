@@ -1,0 +1,218 @@
+"""The answers of one valve in service: from samples to moves."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from valve_friction_ros.response.command_steps import Change, CommandHolds
+from valve_friction_ros.response.hunting import Hunting, hunting
+from valve_friction_ros.response.move import Move, evaluated
+from valve_friction_ros.response.summary import ResponseSummary, Spread, summarised
+from valve_friction_ros.streams import Arrivals, Kind, Samples
+from valve_friction_ros.streams.samples import SampleBuffer
+
+__all__ = ["ResponseMonitor"]
+
+_SECOND = 1_000_000_000
+
+_TICK = 10_000_000
+"""Least time between two samples that are kept, ns."""
+
+_SLOW_TICK = 100_000_000
+"""Of those that hunting and deviation are looked for in, ns."""
+
+_LONGEST = 60.0
+"""Time, s, after which a move is over that has not settled."""
+
+_SHORTEST = 1.0
+"""Time, s, for which the command must stand still before and after a step."""
+
+_ANSWER_TIME = 10.0
+"""Time, s, after which a stem that rests under a pressure that rests has ignored a step."""
+
+_FIRST_LOOK, _LOOKS = 2.0, 1.25
+"""When it is first looked whether the stem has settled, s after the step, and how much later each
+time."""
+
+_HUNTING_WINDOW, _HUNTING_PERIOD = 300.0, 5.0
+"""Time that hunting is looked for in, and how often, s."""
+
+_MOST_AHEAD = 10_000
+"""Samples of the command that wait for the stem's; then the oldest are dropped."""
+
+_RECENT = 200
+"""Moves that count."""
+
+_HOUR = 3600
+
+
+class ResponseMonitor:
+    """Follows command, pressure and stem of one valve, in bounded memory.
+
+    Parameters
+    ----------
+    travel : float
+        Travel of the stem, m; finite.
+    """
+
+    def __init__(self, travel: float) -> None:
+        if not 0 < travel < math.inf:
+            raise ValueError("the travel must be finite")
+        self._travel = travel
+        self._moves: deque[Move] = deque(maxlen=_RECENT)
+        self.left_out = 0
+        self._summary = summarised(())
+        self.forget()
+
+    def forget(self) -> None:
+        """Drop the samples, as when a clock goes back; moves are kept."""
+        self._holds = CommandHolds(self._travel)
+        self._ahead: deque[tuple[int, float]] = deque(maxlen=_MOST_AHEAD)
+        self._fast = {kind: SampleBuffer(_LONGEST + 5.0) for kind in _SIGNALS}
+        self._slow = {kind: SampleBuffer(_HUNTING_WINDOW) for kind in _SIGNALS}
+        self._command = math.nan
+        self._steady_since: int | None = None
+        self._change: Change | None = None
+        self._look_at = 0
+        self._hunting_at = 0
+        self._hunting: Hunting | None = None
+        self._away: deque[tuple[float, float]] = deque(maxlen=_HOUR)
+        self._second: list[float] = []
+        self._second_of = 0
+
+    @property
+    def has_command(self) -> bool:
+        """Whether a command has come."""
+        return math.isfinite(self._command)
+
+    @property
+    def hunting(self) -> Hunting | None:
+        """A limit cycle that goes on."""
+        return self._hunting
+
+    @property
+    def summary(self) -> ResponseSummary:
+        """The latest 200 moves."""
+        return self._summary
+
+    def deviation(self) -> tuple[Spread, float]:
+        """Return mean and 95 % quantile in time of the magnitude, and the mean with its sign.
+
+        Of command less position, over the last hour of samples, share of the travel.
+        """
+        if not self._away:
+            return Spread.of(()), math.nan
+        signed, sizes = (np.array(each) for each in zip(*self._away, strict=True))
+        mean, high = float(np.mean(sizes)), float(np.percentile(sizes, 95))
+        return Spread(mean, float(np.min(sizes)), high, sizes.size), float(np.mean(signed))
+
+    def take(self, command: Samples, arrivals: Arrivals) -> None:
+        """Take a command, m, and samples of pressure and stem, which came in the same time."""
+        if self._goes_back(command, arrivals):
+            self.forget()
+        for kind in _SIGNALS:
+            self._keep(kind, arrivals.samples(kind))
+        newest = self._fast[Kind.POSITION].last_stamp
+        self._ahead.extend(zip(*(part.tolist() for part in command), strict=True))
+        changes = self._taken_command(newest)
+        for change in changes:
+            self._follow(change)
+        if newest is not None and self.has_command:
+            self._look(newest)
+
+    def _taken_command(self, newest: int | None) -> list[Change]:
+        """Take the command up to the newest sample of the stem; what is ahead of it waits."""
+        due: list[tuple[int, float]] = []
+        while newest is not None and self._ahead and self._ahead[0][0] <= newest:
+            due.append(self._ahead.popleft())
+        changes: list[Change] = []
+        if due:
+            stamps, values = (np.array(part) for part in zip(*due, strict=True))
+            inside = np.clip(values, 0.0, self._travel)
+            changes += self._holds.take(Samples(stamps, inside))
+            self._command = float(inside[-1])
+            if self._steady_since is None:
+                self._steady_since = int(stamps[0])
+        if newest is not None:
+            changes += self._holds.advance(newest)
+        return changes
+
+    def _goes_back(self, command: Samples, arrivals: Arrivals) -> bool:
+        stem = arrivals.samples(Kind.POSITION)
+        last = self._fast[Kind.POSITION].last_stamp
+        stamps = (stem.stamps, command.stamps)
+        return any(bool((np.diff(each) < 0).any()) for each in stamps) or (
+            last is not None and stem.stamps.size > 0 and int(stem.stamps[0]) < last
+        )
+
+    def _keep(self, kind: Kind, samples: Samples) -> None:
+        good = np.isfinite(samples.values)
+        stamps, values = samples.stamps[good], samples.values[good]
+        for buffers, tick in ((self._fast, _TICK), (self._slow, _SLOW_TICK)):
+            last = buffers[kind].last_stamp
+            ticks = stamps // tick
+            first = np.diff(ticks, prepend=-1 if last is None else last // tick) > 0
+            if first.any():
+                chosen = Samples(stamps[first], values[first])
+                if buffers is self._slow and kind is Kind.POSITION:
+                    self._deviate(chosen)
+                buffers[kind].extend(chosen)
+
+    def _deviate(self, stem: Samples) -> None:
+        if not self.has_command:
+            return
+        for stamp, value in zip(stem.stamps.tolist(), stem.values.tolist(), strict=True):
+            if stamp // _SECOND != self._second_of and self._second:
+                signed = float(np.mean(self._second))
+                self._away.append((signed, float(np.mean(np.abs(self._second)))))
+                self._second.clear()
+            self._second_of = stamp // _SECOND
+            self._second.append((self._command - value) / self._travel)
+
+    def _follow(self, change: Change) -> None:
+        """End the move under way, and begin another one."""
+        self._end(change.stamp)
+        self._steady_since, self._hunting = change.stamp, None
+        if change.is_step and change.held >= _SHORTEST:
+            self._change = change
+            self._look_at = change.stamp + round(_FIRST_LOOK * _SECOND)
+        else:
+            self.left_out += 1
+
+    def _end(self, stamp: int) -> None:
+        change, self._change = self._change, None
+        if change is None:
+            return
+        long_enough = (stamp - change.stamp) / 1e9 >= _SHORTEST
+        move = self._move(change, stamp) if long_enough else None
+        if move is None:
+            self.left_out += 1
+            return
+        self._moves.append(move)
+        self._summary = summarised(tuple(self._moves))
+
+    def _move(self, change: Change, end: int) -> Move | None:
+        stem, pressure = (self._fast[kind].samples() for kind in (Kind.POSITION, Kind.PRESSURE))
+        return evaluated(change, stem, pressure, end, self._travel)
+
+    def _look(self, newest: int) -> None:
+        """See whether the move under way has settled, and whether the stem hunts."""
+        change = self._change
+        if change is not None and newest >= self._look_at:
+            elapsed = (newest - change.stamp) / 1e9
+            self._look_at = change.stamp + round(_LOOKS * elapsed * _SECOND)
+            move, enough = self._move(change, newest), _LONGEST
+            if move is not None and move.settled:
+                enough = 0.0 if move.moved else _ANSWER_TIME
+            if elapsed >= enough:
+                self._end(newest)
+        if newest >= self._hunting_at and self._steady_since is not None:
+            self._hunting_at = newest + round(_HUNTING_PERIOD * _SECOND)
+            stem, pressure = self._slow[Kind.POSITION], self._slow[Kind.PRESSURE]
+            self._hunting = hunting(
+                stem.samples(), pressure.samples(), self._steady_since, self._travel
+            )
+
+
+_SIGNALS = (Kind.PRESSURE, Kind.POSITION)
