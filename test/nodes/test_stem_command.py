@@ -61,7 +61,7 @@ def test_moves_in_service(live, unit, scale):
     assert float(values["T86 [s]"]) == pytest.approx(2.0, abs=0.1)
     assert abs(float(values["steady_error [%]"])) < 0.1
     assert float(values["command deviation 95th percentile [%]"]) < 12.0
-    assert values["dead_time cause"] == "late"
+    assert values["dead_time cause"] == "unknown"  # three slow moves are too few
     assert client.set_together(NODE, {"dead_time_limit": 0.8}).successful
     status = client.next_status(lambda one: one.level == WARN, "a late stem")
     assert values_of(status)["NE 107"] == "M"
@@ -84,8 +84,8 @@ def test_commands_that_are_none_do_no_harm(live):
     publisher = live.client.node.create_publisher(JointState, f"{NAMESPACE}/stem_command", STREAM)
     live.client.wait_until(publisher.get_subscription_count, "a subscription to the command")
     stamps, pressure, position = answer(0.5, 0.5)
-    for position in ([], [math.nan], [1e300]):
-        publisher.publish(JointState(position=position))
+    for command in ([], [math.nan], [1e300]):
+        publisher.publish(JointState(position=command))
     live.client.send((stamps, pressure), (stamps, position))
     live.client.wait_for_buffered(2 * stamps.size)
     status = live.client.next_status()

@@ -123,7 +123,7 @@ class ResponseSummary:
     def cause(self, which: str, limit: float = 0.0) -> Cause:
         """Return what is to blame for the `dead_time`, the `t86` or the `deviation`.
 
-        The slow half of the moves is asked, and of it those beyond the limit.
+        The moves beyond the limit are asked; without a limit, the slower half.
         """
         slope = self.travel_per_pressure
         if which == "deviation":
@@ -132,7 +132,7 @@ class ResponseSummary:
             "dead_time": (self.dead_time, late_cause),
             "t86": (self.t86, slow_cause),
         }[which]
-        least = max(limit, spread.median)
+        least = limit if limit > 0 else spread.median
         slow = [
             m
             for m in self.moves

@@ -68,6 +68,7 @@ class ResponseWatch:
             kept = readable(messages, JointState)
             found_in = positions_in([one.message for one in kept], "")
         given = found_in.samples(Kind.POSITION)
+        given = Samples(*(part[np.isfinite(given.values)] for part in given))
         travel, unit = self._value(TRAVEL), self._value(COMMAND_UNIT.name)
         metres = given.values * (travel / 100 if unit == "%" else 1.0)
         # Positioners take a little more than 0 to 100 %.
