@@ -41,6 +41,7 @@ _IDENTIFIER_ONLY = (
     "report_folder",
     "history_file",
     "history_days",
+    "number_topics",
     "command_unit",
     "deviation_limit",
     "dead_time_limit",
