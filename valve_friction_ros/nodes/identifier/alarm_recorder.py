@@ -23,14 +23,14 @@ from valve_friction_ros.nodes.identifier.alarm_folder import (
 )
 from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import (
+from valve_friction_ros.nodes.identifier.report_service import report_writer
+from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_FOLDER,
     ALARM_MEGABYTES,
     ALARM_PAUSE,
     ALARM_RECORDING,
     ALARM_RECORDINGS,
 )
-from valve_friction_ros.nodes.identifier.report_service import report_writer
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name

@@ -8,7 +8,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.alerts import Alert, AlertSender
 from valve_friction_ros.health import Level, StatusSignal
-from valve_friction_ros.nodes.identifier.parameters import (
+from valve_friction_ros.nodes.identifier.service_parameters import (
     WEBHOOK_PERIOD,
     WEBHOOK_URL,
     webhook_from,

@@ -10,9 +10,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros.health import Finding
-from valve_friction_ros.nodes.identifier.parameters import (
+from valve_friction_ros.nodes.identifier.parameters import INPUT_TIMEOUT
+from valve_friction_ros.nodes.identifier.service_parameters import (
     COMMAND_UNIT,
-    INPUT_TIMEOUT,
     RESPONSE_LIMITS,
     TRAVEL,
     response_limits,

@@ -13,7 +13,7 @@ from valve_friction_ros.health import Finding, FrictionMonitor, Level, StatusSig
 from valve_friction_ros.history import HistoryError, HistoryFile, keep_renewal, keep_usage
 from valve_friction_ros.history.usage_rows import read_usage
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import (
+from valve_friction_ros.nodes.identifier.service_parameters import (
     AIR_TO,
     COUNTING_DEAD_BAND,
     REVERSAL_LIMIT,
