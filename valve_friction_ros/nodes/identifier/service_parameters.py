@@ -1,4 +1,4 @@
-"""Parameters of the identifier for the valve in service: changes, command, alerts, usage, alarms."""
+"""Parameters of the identifier for a valve in service: changes, command, alerts, usage, alarms."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
