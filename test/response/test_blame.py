@@ -28,7 +28,8 @@ WRONG = {
         ("setting", "deviation", None),
     ],
 )
-def test_blame_is_never_wrong(fault, which, cause):
+def test_one_case_of_each_fault(fault, which, cause):
+    """No side is blamed wrongly; one case guards the rule, shares need many drawn ones."""
     case = case_of(fault, 1000)
     record = simulated(case, 1000, steps(np.random.default_rng([1000, 3]), 30, 0.1))
     monitor = ResponseMonitor(TRAVEL)
