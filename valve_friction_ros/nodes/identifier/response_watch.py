@@ -33,6 +33,12 @@ _SILENCE = 1.0
 _EVERY = 0.5
 """Time, s, of samples that is taken at once: each call costs as much as a thousand samples."""
 
+_MOST_WAITING = 20_000
+"""Samples that are taken at once at most, whatever their stamps."""
+
+_NO_COMMAND = Samples(np.empty(0, np.int64), np.empty(0))
+_NOTHING_ARRIVED = Arrivals(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0))
+
 
 class ResponseWatch:
     """Follows ``stem_command``; without one it says nothing and keeps nothing."""
@@ -41,20 +47,35 @@ class ResponseWatch:
         self._node = node
         self._polled = PolledSubscription(node, JointState, "stem_command", stream(), raw=True)
         self._input = InputWatch(node, self._polled.subscription)
-        self._commands: list[Samples] = []
-        self._arrivals: list[Arrivals] = []
+        self._drop()
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
-        self._problem = ""
+        self._problem = self._standing = ""
+
+    def _drop(self) -> None:
+        """Drop what was gathered."""
+        self._commands: list[Samples] = []
+        self._arrivals: list[Arrivals] = []
+        self._held = 0
 
     def take(self, arrivals: Arrivals) -> None:
         """Take commands, and samples of pressure and stem."""
         self._take_commands()
         if self._monitor is None and not self._commands:
             return
-        self._arrivals.append(arrivals)
-        stamps = [part.stamps for part in self._arrivals if part.stamps.size]
-        if stamps and abs(int(stamps[-1][-1]) - int(stamps[0][0])) >= _EVERY * 1e9:
+        if arrivals.stamps.size:
+            self._arrivals.append(arrivals)
+            self._held += arrivals.stamps.size
+        elapsed = 0
+        if self._arrivals:
+            elapsed = abs(int(self._arrivals[-1].stamps[-1]) - int(self._arrivals[0].stamps[0]))
+        if elapsed >= _EVERY * 1e9 or self._held >= _MOST_WAITING:
+            self._standing = ""
+            if not elapsed:
+                self._standing = (
+                    f"the stamps of {self._held} samples stand still: fill header.stamp, or let "
+                    "the simulated time go on"
+                )
             self._work()
 
     def _take_commands(self) -> None:
@@ -79,6 +100,7 @@ class ResponseWatch:
             self._problem = f"{wrong:g} {unit} is no place of the stem: check command_unit"
         if good.any():
             self._commands.append(Samples(given.stamps[good], metres[good]))
+            self._held += int(good.sum())
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(name).value
@@ -87,15 +109,16 @@ class ResponseWatch:
         """Hand on what was gathered; another travel, or an empty gathering, begins anew."""
         travel = float(self._value(TRAVEL))
         if not math.isfinite(travel):
-            self._commands, self._arrivals, self._monitor = [], [], None
+            self._drop()
+            self._monitor = None
             return
         if self._monitor is None or travel != self._travel:
             self._monitor, self._travel = ResponseMonitor(travel), travel
-        none = Samples(np.empty(0, np.int64), np.empty(0))
-        parts = zip(*(self._commands or [none]), strict=True)
+        parts = zip(*(self._commands or [_NO_COMMAND]), strict=True)
         command = Samples(*(np.concatenate(part) for part in parts))
-        arrived = Arrivals(*map(np.concatenate, zip(*self._arrivals, strict=True)))
-        self._commands, self._arrivals = [], []
+        parts = zip(*(self._arrivals or [_NOTHING_ARRIVED]), strict=True)
+        arrived = Arrivals(*map(np.concatenate, parts))
+        self._drop()
         self._monitor.take(command, arrived)
 
     def findings(self) -> Sequence[Finding]:
@@ -121,7 +144,8 @@ class ResponseWatch:
     def values(self) -> Mapping[str, str]:
         """Return the figures of the latest moves."""
         monitor = self._monitor
-        problem = {"stem_command problem": self._problem} if self._problem else {}
+        why = self._problem or self._standing
+        problem = {"stem_command problem": why} if why else {}
         if monitor is None:
             return problem
         return {

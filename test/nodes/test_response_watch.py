@@ -1,0 +1,86 @@
+"""Commands that cannot be used: bounded memory, and the reason."""
+
+import tracemalloc
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from valve_friction_ros.nodes.identifier import response_watch
+from valve_friction_ros.streams import Arrivals, Kind
+
+SECOND = 10**9
+START = 1_700_000_000 * SECOND
+MOST = 2_000_000
+"""Bytes; 450 polls that are kept for ever take four times as many."""
+
+
+class Bench:
+    """A watch without a graph; `unit` and `travel` are its parameters."""
+
+    def __init__(self, monkeypatch, unit="m", travel=0.02):
+        values = {"command_unit": unit, "travel": travel, "input_timeout": 3.0}
+        values |= {"deviation_limit": 0.0, "dead_time_limit": 0.0, "t86_limit": 0.0}
+        self.queue, self.now = [], 0.0
+        polled = SimpleNamespace(
+            subscription=None, take=self._taken, follow_publishers=lambda: None
+        )
+        watched = SimpleNamespace(arrived=lambda: None, silence=lambda: 0.0, topic="stem_command")
+        monkeypatch.setattr(response_watch, "PolledSubscription", lambda *_, **__: polled)
+        monkeypatch.setattr(response_watch, "InputWatch", lambda *_: watched)
+        monkeypatch.setattr(response_watch, "monotonic", lambda: self.now, raising=False)
+        node = SimpleNamespace(get_parameter=lambda name: SimpleNamespace(value=values[name]))
+        monkeypatch.setattr(
+            response_watch, "values_of", lambda _, specs: {s.name: values[s.name] for s in specs}
+        )
+        self.watch = response_watch.ResponseWatch(node)
+
+    def _taken(self):
+        taken, self.queue = self.queue, []
+        return taken
+
+    def command(self, value, stamp):
+        message = JointState(name=["stem"], position=[value])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
+        self.queue.append(SimpleNamespace(message=serialize_message(message)))
+
+    def poll(self, stamps, place=0.01):
+        count = len(stamps)
+        kinds = np.tile(np.array([Kind.PRESSURE, Kind.POSITION], np.uint8), count)
+        values = np.tile(np.array([1e5, place]), count)
+        self.watch.take(Arrivals(kinds, np.repeat(np.asarray(stamps, np.int64), 2), values))
+
+    def serve(self, seconds, value=0.01, ahead=0):
+        """Command and stem at 10 Hz."""
+        for tenth in range(round(10 * seconds)):
+            stamp = START + round(1e9 * self.now)
+            self.command(value, stamp + ahead)
+            self.poll([stamp])
+            self.now += 0.1
+            if tenth % 10 == 0:
+                self.watch.findings()
+
+    @property
+    def problem(self):
+        return self.watch.values().get("stem_command problem", "")
+
+
+@pytest.mark.parametrize("stem_comes", [True, False])
+def test_memory_is_bounded_where_time_stands_still(monkeypatch, stem_comes):
+    bench = Bench(monkeypatch)
+    stamps = np.zeros(500 if stem_comes else 0)
+    bench.command(0.01, 0)
+    command = bench.queue[:]
+    bench.poll(stamps)
+    tracemalloc.start()
+    for _ in range(450):
+        bench.queue = command * (1 if stem_comes else 50)
+        bench.poll(stamps)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert held < MOST
+    assert "stand still: fill header.stamp" in bench.problem
+    bench.serve(2.0)
+    assert bench.problem == ""
