@@ -262,6 +262,41 @@ def test_a_dead_webhook_holds_up_no_other_valve():
     sender.close()
 
 
+def test_a_silent_host_of_many_valves_takes_one_try_a_round():
+    """At a try for each, 30 valves would hold up the last one by 15 s."""
+    sender = AlertSender(SECRETS, waits=[3600.0], limit=LIMIT)
+    silent = [sender.outbox() for _ in range(30)]
+    alive = sender.outbox()
+    with Receiver(answer=answer_never) as dead, Receiver() as receiver:
+        for number, outbox in enumerate(silent):
+            outbox.address(Webhook.at(f"{dead.url}/{number}"))
+            outbox.put(alert())
+        alive.address(Webhook.at(receiver.url))
+        begun = time.monotonic()
+        alive.put(alert())
+        wait_until(lambda: alive.state().delivered == 1)
+        assert time.monotonic() - begun < 10 * LIMIT
+        wait_until(lambda: all(one.state().problem for one in silent))
+        assert len(dead.requests) == 1
+    assert {one.state().waiting for one in silent} == {1}
+    sender.close()
+
+
+def test_one_slow_path_of_a_host_starves_no_other():
+    def answer(handler):
+        (answer_never if "slow" in handler.path else answer_with(200))(handler)
+
+    sender = AlertSender(SECRETS, waits=[0.01] * 5, limit=LIMIT)
+    slow, quick = sender.outbox(), sender.outbox()
+    with Receiver(answer=answer) as receiver:
+        for outbox, path in ((slow, "slow"), (quick, "quick")):
+            outbox.address(Webhook.at(f"{receiver.url}/{path}"))
+            outbox.put(alert())
+        wait_until(lambda: slow.state().given_up == 1)
+        assert quick.state()[:3] == (0, 1, 0)
+    sender.close()
+
+
 def test_valves_share_a_thread_that_begins_with_the_first_alert():
     def threads():
         return {one for one in threading.enumerate() if one.name == "alerts" and one.is_alive()}

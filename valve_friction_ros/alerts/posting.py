@@ -26,11 +26,14 @@ class DeliveryError(Exception):
     ----------
     is_final : bool
         Whether another try would end alike, until somebody changes something.
+    is_answered : bool
+        Whether the host has answered; else the next letter to it would fare alike.
     """
 
-    def __init__(self, cause: str, is_final: bool = False) -> None:
+    def __init__(self, cause: str, is_final: bool = False, is_answered: bool = True) -> None:
         super().__init__(cause)
         self.is_final = is_final
+        self.is_answered = is_answered
 
 
 class _Connection(http.client.HTTPConnection):
@@ -151,7 +154,7 @@ def _delivery_error(
     webhook: Webhook, error: Exception, is_late: bool, limit: float
 ) -> DeliveryError:
     if is_late or isinstance(error, TimeoutError):
-        return DeliveryError(f"{webhook} has not answered within {limit:g} s")
+        return DeliveryError(f"{webhook} has not answered within {limit:g} s", is_answered=False)
     if isinstance(error, ssl.SSLCertVerificationError):
         return DeliveryError(
             f"the certificate of {webhook} is not trusted: {error.verify_message}: correct the "
@@ -159,5 +162,6 @@ def _delivery_error(
             is_final=True,
         )
     if isinstance(error, OSError):
-        return DeliveryError(f"{webhook}: {error.strerror or type(error).__name__}")
+        cause = error.strerror or type(error).__name__
+        return DeliveryError(f"{webhook}: {cause}", is_answered=False)
     return DeliveryError(f"{webhook} answered no HTTP ({type(error).__name__})")

@@ -63,7 +63,7 @@ class Outbox:
         self._changed, self._waits, self._wake = changed, waits, wake
         self._letters: deque[_Letter] = deque()
         self._is_sending = False
-        self._due = 0.0
+        self._due = self._tried = 0.0
         self._webhook: Webhook | None = None
         self._delivered = self._given_up = 0
         self._problem: str | None = None
@@ -99,6 +99,11 @@ class Outbox:
             waiting = len(self._letters)
             return OutboxState(waiting, self._delivered, self._given_up, self._problem, self._lost)
 
+    @property
+    def tried(self) -> float:
+        """When it was tried last, s of the monotonic clock."""
+        return self._tried
+
     def due(self) -> float | None:
         """Return when the next try is due, s of the monotonic clock; None if nothing waits."""
         return self._due if self._letters else None
@@ -106,8 +111,13 @@ class Outbox:
     def begin(self) -> tuple[_Letter, Webhook]:
         """Take what is to be tried now; the caller holds the lock."""
         assert self._webhook is not None  # noqa: S101 - else nothing waits
-        self._is_sending = True
+        self._is_sending, self._tried = True, time.monotonic()
         return self._letters[0], self._webhook
+
+    def skip(self, failure: DeliveryError) -> None:
+        """Count a try that would fail as another valve's has; the caller holds the lock."""
+        if self._webhook is not None:
+            self.end(self._letters[0], self._webhook, failure)
 
     def end(self, letter: _Letter, webhook: Webhook, failure: DeliveryError | None) -> None:
         """Note how the try has ended; the caller holds the lock."""
@@ -128,6 +138,11 @@ class Outbox:
                 self._give_up(letter, str(failure))
             else:
                 self._due = time.monotonic() + self._waits[letter.tries - 1]
+
+    def is_due_at(self, place: tuple[str, str, int], now: float) -> bool:
+        """Return whether a try at a scheme, host and port is due; the caller holds the lock."""
+        webhook, due = self._webhook, self.due()
+        return webhook is not None and webhook.place == place and due is not None and due <= now
 
     def _give_up(self, letter: _Letter, cause: str) -> None:
         self._given_up += 1
@@ -193,17 +208,29 @@ class AlertSender:
             failure = self._failure(letter.alert, webhook)
             with self._changed:
                 outbox.end(letter, webhook, failure)
+                if failure is not None and not failure.is_answered:
+                    self._fail_together(webhook, failure)
+
+    def _fail_together(self, webhook: Webhook, failure: DeliveryError) -> None:
+        """Count the failure as a try of all that is due at a host that does not answer.
+
+        So a dead host of many valves holds up the others by one try a round.
+        """
+        now = time.monotonic()
+        for outbox in self._outboxes:
+            if outbox.is_due_at(webhook.place, now):
+                outbox.skip(failure)
 
     def _next(self) -> Outbox | None:
         """Wait for the next try, and return its queue; None at the end."""
         with self._changed:
             while not self._is_closed:
                 dues = [(due, one) for one in self._outboxes if (due := one.due()) is not None]
-                due, outbox = min(dues, key=lambda pair: pair[0], default=(None, None))
-                wait = None if due is None else due - time.monotonic()
-                if wait is not None and wait <= 0:
-                    return outbox
-                self._changed.wait(wait)
+                now = time.monotonic()
+                if ready := [one for due, one in dues if due <= now]:
+                    return min(ready, key=lambda one: one.tried)
+                first = min((due for due, _ in dues), default=None)
+                self._changed.wait(None if first is None else first - now)
         return None
 
     def _failure(self, alert: Alert, webhook: Webhook) -> DeliveryError | None:

@@ -72,6 +72,11 @@ class Webhook:
         return cls(parts.scheme, host, _PORTS[parts.scheme] if port is None else port, target)
 
     @property
+    def place(self) -> tuple[str, str, int]:
+        """Scheme, host and port."""
+        return self.scheme, self.host, self.port
+
+    @property
     def is_encrypted(self) -> bool:
         """Whether alerts go there by TLS."""
         return self.scheme == "https"
