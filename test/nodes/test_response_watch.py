@@ -1,5 +1,6 @@
 """Commands that cannot be used: bounded memory, and the reason."""
 
+import math
 import tracemalloc
 from types import SimpleNamespace
 
@@ -84,3 +85,39 @@ def test_memory_is_bounded_where_time_stands_still(monkeypatch, stem_comes):
     assert "stand still: fill header.stamp" in bench.problem
     bench.serve(2.0)
     assert bench.problem == ""
+
+
+@pytest.mark.parametrize(
+    ("parameters", "value", "ahead", "said"),
+    [
+        ({}, 0.01, 3600, "s ahead of those of stem_state: synchronise the clocks"),
+        ({}, 0.01, -3600, "s behind those of stem_state: synchronise the clocks"),
+        ({}, 50.0, 0, "50 m is no place of the stem: check command_unit"),
+        ({}, math.nan, 0, "a command holds no number"),
+        ({"travel": math.inf}, 0.01, 0, "the travel of the valve is not known: set travel"),
+        ({"travel": math.inf, "unit": "%"}, 50.0, 0, "the travel of the valve is not known"),
+    ],
+)
+def test_commands_that_cannot_be_used(monkeypatch, parameters, value, ahead, said):
+    bench = Bench(monkeypatch, **parameters)
+    bench.serve(30.0, value, ahead * SECOND)
+    assert said in bench.problem
+    assert bench.watch.findings() == []
+    bench.serve(35.0, value, ahead * SECOND)
+    (finding,) = bench.watch.findings()
+    assert (finding.level, finding.status_signal.value) == (1, "C")
+    assert finding.message.startswith("no command of stem_command can be used: ")
+    assert said in finding.message
+    if not parameters:
+        bench.serve(3.0)
+        assert bench.problem == ""
+        assert bench.watch.findings() == []
+
+
+def test_commands_of_which_some_can_be_used(monkeypatch):
+    bench = Bench(monkeypatch)
+    for _ in range(70):
+        bench.serve(0.5)
+        bench.serve(0.5, 50.0)
+    assert bench.watch.findings() == []
+    assert "50 m is no place" in bench.problem

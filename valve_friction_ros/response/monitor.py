@@ -41,6 +41,9 @@ _HUNTING_WINDOW, _HUNTING_PERIOD = 300.0, 5.0
 _MOST_AHEAD = 10_000
 """Samples of the command that wait for the stem's; then the oldest are dropped."""
 
+_AHEAD, _BEHIND = 10.0, 60.0
+"""Time, s, by which no clock of a command is ahead of that of the stem, or behind it."""
+
 _RECENT = 200
 """Moves that count."""
 
@@ -71,6 +74,7 @@ class ResponseMonitor:
         self._ahead: deque[tuple[int, float]] = deque(maxlen=_MOST_AHEAD)
         self._fast = {kind: SampleBuffer(_LONGEST + 5.0) for kind in _SIGNALS}
         self._slow = {kind: SampleBuffer(_HUNTING_WINDOW) for kind in _SIGNALS}
+        self._offset = 0.0
         self._command = math.nan
         self._steady_since: int | None = None
         self._change: Change | None = None
@@ -85,6 +89,14 @@ class ResponseMonitor:
     def has_command(self) -> bool:
         """Whether a command has come."""
         return math.isfinite(self._command)
+
+    @property
+    def clock_offset(self) -> float:
+        """Time, s, that the latest command is ahead of the stem; below zero: behind; 0: neither.
+
+        A command more than 10 s ahead waits, and one more than 60 s behind finds no samples.
+        """
+        return self._offset
 
     @property
     def hunting(self) -> Hunting | None:
@@ -111,15 +123,30 @@ class ResponseMonitor:
         """Take a command, m, and samples of pressure and stem, which came in the same time."""
         if self._goes_back(command, arrivals):
             self.forget()
+        before = self._fast[Kind.POSITION].last_stamp
         for kind in _SIGNALS:
             self._keep(kind, arrivals.samples(kind))
         newest = self._fast[Kind.POSITION].last_stamp
+        if command.stamps.size and self._ahead and int(command.stamps[0]) < self._ahead[-1][0]:
+            self._ahead.clear()  # its clock was corrected
         self._ahead.extend(zip(*(part.tolist() for part in command), strict=True))
         changes = self._taken_command(newest)
+        self._compare_clocks(command, before, newest)
         for change in changes:
             self._follow(change)
         if newest is not None and self.has_command:
             self._look(newest)
+
+    def _compare_clocks(self, command: Samples, before: int | None, newest: int | None) -> None:
+        """Note whether the latest command is far ahead of the stem, or behind it."""
+        if newest is None or not (command.stamps.size or self._offset > 0):
+            return
+        last = self._ahead[-1][0] if self._ahead else newest
+        ahead = (last - newest) / 1e9
+        behind = 0.0
+        if before is not None and command.stamps.size:
+            behind = (before - int(command.stamps[-1])) / 1e9
+        self._offset = ahead if ahead > _AHEAD else -behind if behind > _BEHIND else 0.0
 
     def _taken_command(self, newest: int | None) -> list[Change]:
         """Take the command up to the newest sample of the stem; what is ahead of it waits."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros.health import Finding
+from valve_friction_ros.nodes.identifier.command_trouble import CommandTrouble
 from valve_friction_ros.nodes.identifier.parameters import INPUT_TIMEOUT
 from valve_friction_ros.nodes.identifier.service_parameters import (
     COMMAND_UNIT,
@@ -50,7 +52,8 @@ class ResponseWatch:
         self._drop()
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
-        self._problem = self._standing = ""
+        self._trouble = CommandTrouble()
+        self._standing = self._wrong = ""
 
     def _drop(self) -> None:
         """Drop what was gathered."""
@@ -90,17 +93,26 @@ class ResponseWatch:
             found_in = positions_in([one.message for one in kept], "")
         given = found_in.samples(Kind.POSITION)
         given = Samples(*(part[np.isfinite(given.values)] for part in given))
-        travel, unit = self._value(TRAVEL), self._value(COMMAND_UNIT.name)
-        metres = given.values * (travel / 100 if unit == "%" else 1.0)
-        # Positioners take a little more than 0 to 100 %.
-        good = np.abs(metres - travel / 2) <= travel
-        self._problem = ""
-        if not good.all():
-            wrong = float(given.values[~good][0])
-            self._problem = f"{wrong:g} {unit} is no place of the stem: check command_unit"
+        travel, unit = float(self._value(TRAVEL)), self._value(COMMAND_UNIT.name)
+        wrong = ""
+        metres, good = given.values, np.zeros(given.values.size, bool)
+        if not math.isfinite(travel):
+            wrong = "the travel of the valve is not known: set travel"
+        elif not good.size:
+            wrong = "a command holds no number"
+        else:
+            metres = metres * (travel / 100 if unit == "%" else 1.0)
+            # Positioners take a little more than 0 to 100 %.
+            good = np.abs(metres - travel / 2) <= travel
+            if not good.all():
+                place = float(given.values[~good][0])
+                wrong = f"{place:g} {unit} is no place of the stem: check command_unit"
         if good.any():
             self._commands.append(Samples(given.stamps[good], metres[good]))
             self._held += int(good.sum())
+            self._wrong = wrong
+        else:
+            self._trouble.take(wrong, False, monotonic())
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(name).value
@@ -120,14 +132,18 @@ class ResponseWatch:
         arrived = Arrivals(*map(np.concatenate, parts))
         self._drop()
         self._monitor.take(command, arrived)
+        if command.stamps.size:
+            why = self._standing or _clock_problem(self._monitor.clock_offset)
+            self._trouble.take(why or self._wrong, not why, monotonic())
 
     def findings(self) -> Sequence[Finding]:
         """Return what is wrong with the answers."""
         self._follow_publishers()
-        if self._monitor is None:
-            return []
-        limits = response_limits(values_of(self._node, RESPONSE_LIMITS))
-        return found(self._monitor.summary, limits, self._monitor.hunting)
+        findings = self._trouble.findings()
+        if self._monitor is not None:
+            limits = response_limits(values_of(self._node, RESPONSE_LIMITS))
+            findings += found(self._monitor.summary, limits, self._monitor.hunting)
+        return findings
 
     def _follow_publishers(self) -> None:
         """Follow another quality of service; forget a command that nobody gives any more."""
@@ -135,7 +151,10 @@ class ResponseWatch:
         if silence > _SILENCE:
             self._polled.follow_publishers()
         is_silent = silence > self._value(INPUT_TIMEOUT.name)
-        if self._monitor is not None and is_silent and not self._input_is_offered():
+        if not is_silent or self._input_is_offered():
+            return
+        self._trouble.forget()
+        if self._monitor is not None:
             self._monitor.forget()
 
     def _input_is_offered(self) -> bool:
@@ -144,7 +163,7 @@ class ResponseWatch:
     def values(self) -> Mapping[str, str]:
         """Return the figures of the latest moves."""
         monitor = self._monitor
-        why = self._problem or self._standing
+        why = self._standing or self._trouble.problem
         problem = {"stem_command problem": why} if why else {}
         if monitor is None:
             return problem
@@ -153,6 +172,17 @@ class ResponseWatch:
             **_deviation_values(monitor),
             **_move_values(monitor.summary, monitor.left_out),
         }
+
+
+def _clock_problem(offset: float) -> str:
+    """Say by how many seconds the command is ahead of the stem, or behind it, if it is."""
+    if not offset:
+        return ""
+    side = "ahead of" if offset > 0 else "behind"
+    return (
+        f"its stamps are {abs(offset):.4g} s {side} those of stem_state: synchronise the clocks, "
+        "and fill header.stamp"
+    )
 
 
 def _number(value: float) -> str:
