@@ -1,6 +1,7 @@
 """Streams of samples: what arrives, what is buffered, and the uniform record of both; no ROS."""
 
 from valve_friction_ros.streams.arrivals import COLUMNS, Arrivals, Kind, rows_arrived
+from valve_friction_ros.streams.dates import utc
 from valve_friction_ros.streams.record_buffer import Complaints, RecordBuffer, Snapshot
 from valve_friction_ros.streams.samples import Samples, nanoseconds
 from valve_friction_ros.streams.uniform_grid import uniform_recording
@@ -16,4 +17,5 @@ __all__ = [
     "nanoseconds",
     "rows_arrived",
     "uniform_recording",
+    "utc",
 ]

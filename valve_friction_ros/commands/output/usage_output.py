@@ -3,7 +3,6 @@
 import csv
 import io
 from collections.abc import Sequence
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.history import AlarmRecording, KeptValve
 from valve_friction_ros.outside_text import harmless, printable
 from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.streams import utc
 from valve_friction_ros.usage import BINS, DAY, Usage, UsedDay, ValveUsage
 
 __all__ = [
@@ -27,11 +27,11 @@ _HOUR = 3600e9
 
 
 def _date(time: int) -> str:
-    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d}"
+    return f"{utc(time):%Y-%m-%d}"
 
 
 def _time(time: int) -> str:
-    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%dT%H:%M:%SZ}"
+    return f"{utc(time):%Y-%m-%dT%H:%M:%SZ}"
 
 
 def usage_as_json(usage: ValveUsage) -> dict[str, Any] | None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timezone
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -18,6 +17,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING
+from valve_friction_ros.streams import utc
 
 __all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
 
@@ -76,12 +76,12 @@ def _baseline_values(baseline: Baseline | None) -> dict[str, str]:
 
 
 def _date(time: int) -> str:
-    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d}"
+    return f"{utc(time):%Y-%m-%d}"
 
 
 def _time(time: int) -> str:
     """Write a time, ns since 1970, by ISO 8601, as UTC."""
-    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%dT%H:%M:%S.%fZ}"
+    return f"{utc(time):%Y-%m-%dT%H:%M:%S.%fZ}"
 
 
 def trend_values(trend: Trend | None) -> dict[str, str]:
