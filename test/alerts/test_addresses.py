@@ -90,3 +90,14 @@ def test_an_alert_as_json():
     other = Alert("FV-101", "/fv/identifier", Level.OK, Level.ERROR, "F", "excess µ", float("nan"))
     assert other.event_id != alert.event_id
     assert json.loads(other.body())["friction_ratio"] is None
+
+
+def test_an_address_of_the_environment():
+    name = "VALVE_FRICTION_WEBHOOK_URL"
+    assert Webhook.from_environment({}) is None
+    found = Webhook.from_environment({name: " https://example.com/s3cret "})
+    assert found == Webhook.at("https://example.com/s3cret")
+    assert "s3cret" not in str(found) + repr(found)
+    with pytest.raises(ValueError, match=f"^{name} is http to another machine") as refused:
+        Webhook.from_environment({name: "http://example.com/s3cret"})
+    assert "s3cret" not in str(refused.value)

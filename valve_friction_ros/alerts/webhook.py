@@ -13,6 +13,7 @@ __all__ = ["SIGNATURE", "Secrets", "Webhook", "signature"]
 SIGNATURE = "X-Valve-Friction-Signature"
 """Header with the signature."""
 
+_URL = "VALVE_FRICTION_WEBHOOK_URL"
 _SECRET = "VALVE_FRICTION_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
 _TOKEN = "VALVE_FRICTION_WEBHOOK_TOKEN"  # noqa: S105
 
@@ -43,33 +44,39 @@ class Webhook:
     target: str = field(repr=False)
 
     @classmethod
-    def at(cls, url: str) -> "Webhook":
-        """Read the address of a webhook.
+    def at(cls, url: str, name: str = "webhook_url") -> "Webhook":
+        """Read the address of a webhook; `name` is what errors call it.
 
         Raises ValueError, without the address, if it is none, is not encrypted on its way to
         another machine, or holds a name or a password.
         """
         if not url.isascii() or not url.isprintable() or " " in url:
-            raise ValueError("webhook_url has a space, or a character that is not ASCII: encode it")
+            raise ValueError(f"{name} has a space, or a character that is not ASCII: encode it")
         try:
             parts = urlsplit(url)
             host, port = parts.hostname, parts.port
         except ValueError:
             host = port = None
         if not host or parts.scheme not in _PORTS:
-            raise ValueError("webhook_url is no address: write https://host/path")
+            raise ValueError(f"{name} is no address: write https://host/path")
         if parts.username is not None or parts.password is not None:
             raise ValueError(
-                "webhook_url holds a name or a password, which everybody on the ROS graph can "
+                f"{name} holds a name or a password, which everybody on the ROS graph can "
                 f"read: put a token into the environment variable {_TOKEN}"
             )
         if parts.scheme == "http" and not _is_loopback(host):
             raise ValueError(
-                "webhook_url is http to another machine, where everybody on the way can read and "
+                f"{name} is http to another machine, where everybody on the way can read and "
                 "change it: write https, or name a relay on this machine"
             )
         target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
         return cls(parts.scheme, host, _PORTS[parts.scheme] if port is None else port, target)
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str] = os.environ) -> "Webhook | None":
+        """Read ``VALVE_FRICTION_WEBHOOK_URL``, if it is set; raises ValueError like `at`."""
+        url = environment.get(_URL, "").strip()
+        return cls.at(url, _URL) if url else None
 
     @property
     def place(self) -> tuple[str, str, int]:

@@ -64,7 +64,8 @@ WEBHOOK_URL = ParameterSpec(
     "webhook_url",
     "",
     "Address that each change of the level is posted to [-], https, or http to this machine; "
-    "empty: nowhere. No secret belongs into it: everybody on the ROS graph can read it",
+    "empty: that of the environment, VALVE_FRICTION_WEBHOOK_URL, or nowhere. No secret belongs "
+    "into it: everybody on the ROS graph can read it",
 )
 WEBHOOK_PERIOD = ParameterSpec(
     "webhook_period",
@@ -158,11 +159,12 @@ def response_limits(values: Mapping[str, Any]) -> ResponseLimits:
 
 
 def webhook_from(values: Mapping[str, Any]) -> Webhook | None:
-    """Return the webhook of parameter values, None for none.
+    """Return the webhook of parameter values, else of the environment; None for none.
 
     Raises ValueError if its address, or the token in the environment, cannot be used.
     """
-    if not (url := values[WEBHOOK_URL.name]):
-        return None
-    Secrets.from_environment()
-    return Webhook.at(url)
+    url = values[WEBHOOK_URL.name]
+    webhook = Webhook.at(url) if url else Webhook.from_environment()
+    if webhook is not None:
+        Secrets.from_environment()
+    return webhook
