@@ -14,7 +14,9 @@ from valve_friction_ros.history import (
     alarm_recordings,
     keep_alarm_recording,
     keep_renewal,
+    keep_told_level,
     keep_usage,
+    read_told_level,
     read_usage,
     schema,
     valve_histories,
@@ -85,9 +87,16 @@ def test_alarm_recordings(history):
     assert alarms[0].to_dict()["level"] == "WARN"
 
 
+def test_the_told_level_is_the_last(history):
+    keep_told_level(history, VALVE, Level.ERROR)
+    keep_told_level(history, VALVE, Level.WARN)
+    assert read_told_level(history, VALVE.name) == Level.WARN
+    assert read_told_level(history, OTHER.name) is None
+
+
 def make_version_5(history):
     connection = sqlite3.connect(history.path)
-    for table in ("usage", "packing_renewal", "alarm_recording"):
+    for table in ("usage", "packing_renewal", "alarm_recording", "told_level"):
         connection.execute(f"DROP TABLE {table}")
     connection.execute("PRAGMA user_version = 5")
     connection.commit()
@@ -106,6 +115,7 @@ def test_a_file_of_version_5_is_read_and_extended(history):
     make_version_5(history)
     assert read_usage(history, VALVE.name).days == ()
     assert alarm_recordings(history, VALVE.name) == ()
+    assert read_told_level(history, VALVE.name) is None
     assert len(valve_histories(history, (VALVE,), 0, START + 1)) == 1
     assert version(history) == 5
     keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
@@ -120,11 +130,13 @@ def test_a_file_of_version_5_is_read_and_extended(history):
         ("usage SET histogram_ns = '[1]'", read_usage),
         ("usage SET reversals = 'many'", read_usage),
         ("alarm_recording SET level = 7", alarm_recordings),
+        ("told_level SET level = 7", read_told_level),
     ],
 )
 def test_rows_that_hold_nothing(history, change, read):
     keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
     keep_alarm_recording(history, VALVE, AlarmRecording(START, Level.WARN, Path("/a"), "x"))
+    keep_told_level(history, VALVE, Level.WARN)
     connection = sqlite3.connect(history.path)
     connection.executescript(f"PRAGMA ignore_check_constraints = ON; UPDATE {change}")
     connection.close()

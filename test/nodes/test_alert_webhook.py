@@ -8,9 +8,11 @@ from records import quick_record
 from webhook_server import Receiver, answer_never, answer_with, self_signed
 
 from valve_friction_ros.alerts import SIGNATURE, signature
-from valve_friction_ros.health import Baseline
+from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.history import HistoryFile, KeptValve, keep_usage, read_told_level
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+from valve_friction_ros.usage import BINS, Usage, UsedDay
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -165,3 +167,77 @@ def test_an_address_that_cannot_be_used_is_refused_without_repeating_it(live):
     assert not refused.successful
     assert "http to another machine" in refused.reason
     assert "s3cret" not in refused.reason
+
+
+@pytest.fixture
+def history(tmp_path):
+    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
+    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+
+
+def killed(live, node):
+    """End a node by kill -9; what comes now is of the next one."""
+    live.client.watched.clear()
+    node.kill()
+    live.nodes.remove(node)
+    live.client.statuses.clear()
+
+
+def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
+    """A packing whose life is over, known from the history at each start; no level of friction."""
+    used = UsedDay(20_000, 0, Usage(1.0, 50, 2, (10**9, *[0] * (BINS - 1))))
+    history.path.parent.mkdir(parents=True, exist_ok=True)
+    keep_usage(history, KeptValve(NODE, "FV-101"), "run", [used])
+    with Receiver() as receiver:
+        chosen = {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0}
+        client = live.client
+        for _ in range(2):
+            node = live.start_identifier({**chosen, "reversal_limit": 20.0})
+            assert client.next_status().level == WARN
+            client.wait_until(lambda: read_told_level(history, NODE) == Level.WARN, "the level")
+            client.next_status()
+            killed(live, node)
+        live.start_identifier({**chosen, "reversal_limit": 20.0})
+        client.identified(HEALTHY)
+        assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
+        assert client.trigger("set_baseline").success
+        assert receiver.requests == []
+        assert history.baseline(NODE).level == Level.WARN
+        for limit, count in ((0.0, 1), (20.0, 2)):
+            assert client.set_together(NODE, {"reversal_limit": limit}).successful
+            client.wait_until(lambda count=count: len(receiver.requests) == count, "an alert")
+        assert changes(receiver) == [("WARN", "OK"), ("OK", "WARN")]
+        healthy, old = receiver.bodies
+    assert healthy["friction_ratio"] == pytest.approx(1.0, abs=0.1)
+    assert old["friction_ratio"] is None
+
+
+def test_what_waited_at_a_kill_is_told_after_the_restart(live, history):
+    with Receiver() as first:
+        url, port = first.url, first.port
+    chosen = {**KNOWN, "webhook_url": url, "webhook_period": 0.0}
+    node = live.start_identifier(chosen)
+    client = live.client
+    client.identified(TIGHT)
+    client.next_status(lambda one: values_of(one).get("webhook waiting") == "1", "a waiting alert")
+    killed(live, node)
+    with Receiver(port=port) as back:
+        node = live.start_identifier(chosen)
+        client.wait_until(lambda: back.requests, "the alert that waited")
+        client.wait_until(lambda: read_told_level(history, NODE) == Level.ERROR, "the told level")
+        killed(live, node)
+        live.start_identifier(chosen)
+        client.next_status()
+        client.next_status()
+        assert changes(back) == [("OK", "ERROR")]
+
+
+def test_an_address_of_the_environment_is_not_shown(live, monkeypatch):
+    with Receiver() as receiver:
+        monkeypatch.setenv("VALVE_FRICTION_WEBHOOK_URL", receiver.url)
+        node = live.start_identifier({**KNOWN, "webhook_period": 0.0})
+        live.client.identified(TIGHT)
+        live.client.wait_until(lambda: receiver.requests, "an alert")
+        values = live.client.last_values()
+        assert values["webhook"] == f"http://127.0.0.1:{receiver.port}"
+    assert "/hook" not in node.errors + node.output + "".join(map(str, live.client.statuses))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from valve_friction_ros.alerts.alert import Alert
 from valve_friction_ros.alerts.posting import DeliveryError, post
 from valve_friction_ros.alerts.webhook import Secrets, Webhook
+from valve_friction_ros.health import Level
 
 __all__ = ["WAITS", "AlertSender", "Outbox", "OutboxState"]
 
@@ -36,6 +37,8 @@ class OutboxState(NamedTuple):
         Why the last try has failed; None if it has not.
     lost : str or None
         Which alert was given up, and why, until a later one is delivered.
+    settled : Level or None
+        The level of the alert that was delivered or given up last; None without any.
     """
 
     waiting: int
@@ -43,6 +46,7 @@ class OutboxState(NamedTuple):
     given_up: int
     problem: str | None
     lost: str | None
+    settled: Level | None = None
 
 
 @dataclass(eq=False)
@@ -68,6 +72,7 @@ class Outbox:
         self._delivered = self._given_up = 0
         self._problem: str | None = None
         self._lost: str | None = None
+        self._settled: Level | None = None
 
     def address(self, webhook: Webhook | None) -> None:
         """Send to this webhook from now on, also what waits; None: drop it, and send nothing."""
@@ -97,7 +102,8 @@ class Outbox:
         """Return the numbers of alerts, and what is wrong."""
         with self._changed:
             waiting = len(self._letters)
-            return OutboxState(waiting, self._delivered, self._given_up, self._problem, self._lost)
+            counts = waiting, self._delivered, self._given_up
+            return OutboxState(*counts, self._problem, self._lost, self._settled)
 
     @property
     def tried(self) -> float:
@@ -128,6 +134,7 @@ class Outbox:
             if failure is None:
                 self._letters.remove(letter)
                 self._delivered += 1
+                self._settled = letter.alert.new_level
                 self._problem = self._lost = None
                 return
             place = self._letters.index(letter)
@@ -147,6 +154,7 @@ class Outbox:
     def _give_up(self, letter: _Letter, cause: str) -> None:
         self._given_up += 1
         alert = letter.alert
+        self._settled = alert.new_level
         self._lost = (
             f"the alert {alert.old_level.name} → {alert.new_level.name} of "
             f"{alert.time:%Y-%m-%d %H:%M:%S} UTC was not delivered: {cause}"

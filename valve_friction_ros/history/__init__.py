@@ -15,6 +15,7 @@ from valve_friction_ros.history.entry import (
 )
 from valve_friction_ros.history.evidence_rows import keep_moves, read_moves
 from valve_friction_ros.history.file import HistoryError, HistoryFile
+from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
 from valve_friction_ros.history.usage_rows import keep_renewal, keep_usage, read_usage
 from valve_friction_ros.history.valve_history import ValveHistory, current_trend, valve_histories
@@ -38,8 +39,10 @@ __all__ = [
     "keep_alarm_recording",
     "keep_moves",
     "keep_renewal",
+    "keep_told_level",
     "keep_usage",
     "read_moves",
+    "read_told_level",
     "read_usage",
     "trend_of",
     "trended",

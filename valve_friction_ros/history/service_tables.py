@@ -1,6 +1,6 @@
-"""The tables of the valve in service: its usage, and the recordings of its alarms."""
+"""The tables of the valve in service: its usage, recordings of its alarms, its told level."""
 
-__all__ = ["ALARM_RECORDINGS", "USAGE"]
+__all__ = ["ALARM_RECORDINGS", "TOLD_LEVEL", "USAGE"]
 
 USAGE = """
 CREATE TABLE usage (
@@ -34,3 +34,11 @@ CREATE TABLE alarm_recording (
 ) WITHOUT ROWID;
 """
 """A row for each alarm that was recorded."""
+
+TOLD_LEVEL = """
+CREATE TABLE told_level (
+    valve_id INTEGER PRIMARY KEY REFERENCES valve,
+    level INTEGER NOT NULL CHECK (level BETWEEN 0 AND 2)
+);
+"""
+"""The level of each valve that its alerts have told last."""

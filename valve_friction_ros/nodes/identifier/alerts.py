@@ -7,7 +7,8 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from valve_friction_ros.alerts import Alert, AlertSender
-from valve_friction_ros.health import Level, StatusSignal
+from valve_friction_ros.health import Diagnosis, Level, StatusSignal
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.service_parameters import (
     WEBHOOK_PERIOD,
     WEBHOOK_URL,
@@ -23,16 +24,18 @@ _NE_107 = "NE 107"
 class Alerts:
     """Follows the diagnostics of a valve, posts each change of level, and says what went wrong.
 
-    It begins with the level that is kept, so that a restart alone is no change.
+    It begins with the level that the history says was told last: so a restart alone is no change,
+    and what waited when the process was killed is told. Without one it begins with the first
+    level. After a restart `webhook_period` goes by first, in which inputs come and levels settle.
     """
 
-    def __init__(self, node: Node, sender: AlertSender, tag: str, level: Level) -> None:
-        self._node, self._tag = node, tag
+    def __init__(self, node: Node, sender: AlertSender, history: HistoryWriter) -> None:
+        self._node, self._history = node, history
         self._outbox = sender.outbox()
-        self._told = level
-        self._told_at = -math.inf
+        self._told = self._kept = history.told_level()
+        self._told_at = -math.inf if self._told is None else time.monotonic()
 
-    def follow(self, status: DiagnosticStatus) -> None:
+    def follow(self, status: DiagnosticStatus, diagnosis: Diagnosis) -> None:
         """Post the level of a status if it has changed; then add to it what became of alerts.
 
         What is wrong with the alerts themselves raises the level afterwards, and is not posted.
@@ -44,26 +47,40 @@ class Alerts:
         if webhook is None:
             self._told, self._told_at = level, -math.inf
             return
+        if self._told is None:
+            self._told = level
+            self._keep(level)
         now = time.monotonic()
         if level != self._told and now - self._told_at >= period:
-            self._outbox.put(self._alert(status, level))
+            self._outbox.put(self._alert(status, self._told, level, diagnosis))
             self._told, self._told_at = level, now
         self._mark(status, str(webhook))
 
-    def _alert(self, status: DiagnosticStatus, level: Level) -> Alert:
+    def _keep(self, level: Level) -> None:
+        """Keep the level that was told last, unless it is kept."""
+        if level != self._kept:
+            self._kept = level
+            self._history.keep_told_level(level)
+
+    def _alert(
+        self, status: DiagnosticStatus, old: Level, new: Level, diagnosis: Diagnosis
+    ) -> Alert:
         values = {entry.key: entry.value for entry in status.values}
+        ratio = float(values.get("friction_ratio", math.nan))
         return Alert(
-            valve=self._tag,
+            valve=self._history.valve.tag,
             node=self._node.get_fully_qualified_name(),
-            old_level=self._told,
-            new_level=level,
+            old_level=old,
+            new_level=new,
             ne_107=values[_NE_107],
             message=status.message,
-            friction_ratio=float(values.get("friction_ratio", math.nan)),
+            friction_ratio=ratio if diagnosis.level == new else None,
         )
 
     def _mark(self, status: DiagnosticStatus, place: str) -> None:
         state = self._outbox.state()
+        if state.settled is not None:
+            self._keep(state.settled)
         values = {
             "webhook": place,
             "webhook delivered": str(state.delivered),

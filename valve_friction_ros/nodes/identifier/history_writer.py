@@ -12,7 +12,7 @@ from typing import TypeVar
 from rclpy.node import Node
 
 from valve_friction_ros.evidence import Move
-from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput
+from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput, Level
 from valve_friction_ros.history import (
     AlarmRecording,
     HistoryEntry,
@@ -25,7 +25,9 @@ from valve_friction_ros.history import (
     alarm_recordings,
     current_trend,
     entry_of,
+    keep_told_level,
     read_moves,
+    read_told_level,
     read_usage,
     valve_histories,
 )
@@ -49,6 +51,11 @@ class HistoryWriter:
     """Writes to the history in a thread of its own, so that no slow disk holds up the node.
 
     What could not be written waits, and is tried again with what comes next.
+
+    Attributes
+    ----------
+    found_level : Level
+        The most severe level of what the watches find on the valve; the node sets it.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor, tag: str) -> None:
@@ -69,6 +76,7 @@ class HistoryWriter:
         self._baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
         self._under_way: list[Future[None]] = []
+        self.found_level = Level.OK
 
     @property
     def valve(self) -> KeptValve:
@@ -166,7 +174,7 @@ class HistoryWriter:
             since = evidence_since
         elif monitor.result is not None:
             record = KeptBaseline.thin(monitor.result.recording)
-        replaced, level = monitor.baseline, monitor.diagnosis().level
+        replaced, level = monitor.baseline, self._level()
         return KeptBaseline(baseline, now, since, record, replaced, level=level)
 
     def replaced_now(self, last: KeptBaseline, by: str) -> KeptBaseline:
@@ -182,9 +190,13 @@ class HistoryWriter:
             time=self._node.get_clock().now().nanoseconds,
             replaced=last.baseline,
             by=by,
-            level=self._monitor.diagnosis().level,
+            level=self._level(),
             withdrawn=last.replaced is None,
         )
+
+    def _level(self) -> Level:
+        """Return the level of the valve, with what is found on it."""
+        return max(self._monitor.diagnosis().level, self.found_level)
 
     async def keep_baseline(self, kept: KeptBaseline) -> None:
         """Keep a baseline that is in force from now on, or none."""
@@ -195,6 +207,15 @@ class HistoryWriter:
     def usage(self) -> ValveUsage | None:
         """Read what the valve has done; None without a file, or where it cannot be read."""
         return self._tried(lambda file: read_usage(file, self._valve.name))
+
+    def told_level(self) -> Level | None:
+        """Read the level that was told last, if any."""
+        return self._tried(lambda file: read_told_level(file, self._valve.name))
+
+    def keep_told_level(self, level: Level) -> None:
+        """Keep the level that was told last, soon."""
+        valve = self._valve
+        self.keep_soon(lambda file: keep_told_level(file, valve, level))
 
     def last_alarm(self) -> AlarmRecording | None:
         """Read the latest recording of an alarm, if any."""

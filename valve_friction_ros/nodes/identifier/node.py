@@ -10,7 +10,7 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import FrictionMonitor, by_severity
+from valve_friction_ros.health import FrictionMonitor, Level, by_severity
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
@@ -114,7 +114,7 @@ class Identifier(PolledNode):
             self._monitor.remember(earlier)
             results.publish(earlier, self._monitor)
         self._history.read_trend()
-        self._alerts = Alerts(self, workers.alerts, tag, self._monitor.diagnosis().level)
+        self._alerts = Alerts(self, workers.alerts, self._history)
         self._usage = UsageWatch(self, self._monitor, self._history)
         self._alarm = AlarmRecorder(self, self._monitor, self._history, self._usage, workers.files)
         self._watches: tuple[Watch, ...] = (
@@ -286,6 +286,7 @@ class Identifier(PolledNode):
         self._inputs.follow_publishers()
         now = self.get_clock().now()
         findings = [finding for watch in self._watches for finding in watch.findings()]
+        self._history.found_level = max((one.level for one in findings), default=Level.OK)
         estimate = estimate_status(
             self._monitor,
             self._status_name,
@@ -309,7 +310,7 @@ class Identifier(PolledNode):
                 **self._readiness.values(),
             },
         )
-        self._alerts.follow(status)
+        self._alerts.follow(status, self._monitor.diagnosis())
         self._level_log.follow(status)
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"
