@@ -1,5 +1,6 @@
 """Usage and alarm recordings in the history: kept once, in all and since the renewal."""
 
+import re
 import sqlite3
 from pathlib import Path
 
@@ -96,7 +97,7 @@ def test_the_told_level_is_the_last(history):
 
 def make_version_5(history):
     connection = sqlite3.connect(history.path)
-    for table in ("usage", "packing_renewal", "alarm_recording", "told_level"):
+    for table in re.findall(r"CREATE TABLE (\w+)", ";".join(schema._STEPS[5])):
         connection.execute(f"DROP TABLE {table}")
     connection.execute("PRAGMA user_version = 5")
     connection.commit()
