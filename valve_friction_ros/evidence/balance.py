@@ -29,7 +29,7 @@ _EPOCH = 3600.0
 """Time, s, over which the preload stays the same: temperature and sensors drift over longer."""
 
 _MOST_EPOCHS = 60
-"""Their number is bounded, so that months of a quiet valve cost no more than hours of a busy one."""
+"""Their number is bounded: months of a quiet valve cost no more than hours of a busy one."""
 
 _SPEED, _ALONG, _DRIFT = 1.0, 0.5, 0.2
 """Standard deviations of what friction may change by with the speed, at the mean speed, and along

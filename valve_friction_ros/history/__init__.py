@@ -13,7 +13,12 @@ from valve_friction_ros.history.entry import (
     entry_of,
     trended,
 )
-from valve_friction_ros.history.evidence_rows import keep_moves, read_moves
+from valve_friction_ros.history.evidence_rows import (
+    keep_moves,
+    keep_reference,
+    read_moves,
+    read_reference,
+)
 from valve_friction_ros.history.file import HistoryError, HistoryFile
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
 from valve_friction_ros.history.usage_rows import keep_renewal, keep_usage, read_usage
@@ -37,9 +42,11 @@ __all__ = [
     "entry_of",
     "keep_alarm_recording",
     "keep_moves",
+    "keep_reference",
     "keep_renewal",
     "keep_usage",
     "read_moves",
+    "read_reference",
     "read_usage",
     "trend_of",
     "trended",
