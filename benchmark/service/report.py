@@ -64,7 +64,16 @@ def _steady(told: Sequence[Told]) -> Table:
 
 def _grown(told: Sequence[Told]) -> Table:
     table = Table(title="friction grows to 1.5 times")
-    for column in ("valve", "course", "declared [h]", "alarm [h]", "without baseline [h]", "dated", "early", "last error"):
+    for column in (
+        "valve",
+        "course",
+        "declared [h]",
+        "alarm [h]",
+        "without baseline [h]",
+        "dated",
+        "early",
+        "last error",
+    ):
         table.add_column(column)
     for course in ("step", "slow"):
         for plant, group in _by_plant([one for one in told if one.task.course == course]):

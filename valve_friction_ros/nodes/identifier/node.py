@@ -107,7 +107,7 @@ class Identifier(PolledNode):
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
         earlier = self._history.prepare()
-        evidence = EvidenceWatch(self, self._monitor, self._history, workers.identify)
+        evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
         self._evidence = evidence
         self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
         self._baseline.begin()
