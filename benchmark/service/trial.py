@@ -15,8 +15,10 @@ from valve_friction_ros.health import (
     Baseline,
     FrictionLimits,
     Level,
+    Reference,
     baseline_by_evidence,
     diagnosis_by_evidence,
+    reference_by_evidence,
 )
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.valve import Valve
@@ -67,6 +69,8 @@ class Told:
     declared, alarmed : float
         Hours from the change of friction until it was declared, and until the level rose; nan
         where it was not. For slow growth, from when it has reached 1.5.
+    alarmed_by_reference : float
+        As `alarmed`, of a valve without a baseline, by what its moves said first.
     dated : bool or None
         Whether the change lies in its interval.
     late : list of Number
@@ -79,6 +83,7 @@ class Told:
     alarms: int = 0
     declared: float = math.nan
     alarmed: float = math.nan
+    alarmed_by_reference: float = math.nan
     dated: bool | None = None
     late: list[Number] = field(default_factory=list)
 
@@ -163,8 +168,9 @@ class _Watched:
         self._stream, self._limits = MoveStream(valve), FrictionLimits()
         self._ledger: deque[Move] = deque(maxlen=MOST_MOVES)
         self._baseline: Baseline | None = None
+        self._reference: Reference | None = None
         self._known: list[int] = []
-        self._was_high = False
+        self._high: set[str] = set()
         self.told = Told(task)
         self.evidence = evidence_of([], valve)
 
@@ -173,6 +179,7 @@ class _Watched:
         moves = self._stream.take(_arrivals(stretch))
         self._ledger.extend(moves)
         self.evidence = evidence_of(list(self._ledger), self._valve)
+        self._reference = self._reference or reference_by_evidence(self.evidence)
         if hour == _BEFORE:
             with contextlib.suppress(RefusalError):
                 self._baseline = baseline_by_evidence(self.evidence)
@@ -191,14 +198,21 @@ class _Watched:
             told.declared = hour - self._course.reached
 
     def _alarm(self, hour: float) -> None:
+        """Note the alarms with a baseline, and those of a valve that has none."""
         told = self.told
-        found = diagnosis_by_evidence(self.evidence, self._valve, self._baseline, self._limits)
-        is_high = found is not None and found.level >= Level.WARN
-        if is_high and not self._course.has_changed(hour):
-            told.alarms += not self._was_high
-        elif is_high and math.isnan(told.alarmed):
-            told.alarmed = hour - self._course.reached
-        self._was_high = is_high
+        cases = (("alarmed", self._baseline, None), ("alarmed_by_reference", None, self._reference))
+        for name, baseline, reference in cases:
+            found = diagnosis_by_evidence(
+                self.evidence, self._valve, baseline, self._limits, reference
+            )
+            if found is None or found.level < Level.WARN:
+                self._high.discard(name)
+                continue
+            if not self._course.has_changed(hour):
+                told.alarms += name not in self._high
+            elif math.isnan(getattr(told, name)):
+                setattr(told, name, hour - self._course.reached)
+            self._high.add(name)
 
 
 def tried(task: Task) -> Told:

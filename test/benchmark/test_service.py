@@ -11,7 +11,7 @@ from rich.console import Console
 from benchmark.service.plants import PLANTS, Duty
 from benchmark.service.report import bounds_met, tables
 from benchmark.service.service import stretches
-from benchmark.service.trial import Number, Task, Told
+from benchmark.service.trial import Number, Task, Told, tried
 
 
 def told(course="steady", **changes):
@@ -20,7 +20,10 @@ def told(course="steady", **changes):
         for name in ("sliding_friction", "static_friction", "dead_band")
     ]
     task = Task("high", 12, 0, course)
-    return replace(Told(task, numbers, declared=0.5, alarmed=0.8, late=numbers), **changes)
+    return replace(
+        Told(task, numbers, declared=0.5, alarmed=0.8, alarmed_by_reference=0.8, late=numbers),
+        **changes,
+    )
 
 
 def judged(*some):
@@ -43,6 +46,7 @@ def test_a_good_outcome_meets_the_bounds():
         (told("step", declared=1.17), "declared within one hour"),
         (told("step", declared=math.nan), "declared within one hour"),
         (told("step", alarmed=math.nan), "alarmed within one hour"),
+        (told("slow", alarmed_by_reference=math.nan), "slowly alarmed within one hour"),
         (told(numbers=[Number("sliding_friction", 100.0, 111.0, 20.0)]), "friction within 10 %"),
         (told(numbers=[Number("sliding_friction", 100.0, math.nan, 1.0)]), "friction within 10 %"),
         (told(numbers=[Number("dead_band", 100.0, 88.0, 20.0)]), "dead band within 10 %"),
@@ -53,6 +57,26 @@ def test_a_bad_one_misses_its_bound(outcome, words):
     met, text = judged(told(), told("step"), outcome)
     assert not met
     assert any(line.startswith("MISSED") and words in line for line in text.splitlines())
+
+
+def test_coverage_is_bound_for_each_valve():
+    """Four hours of one valve outside, among a hundred of another inside."""
+    outside = [Number("static_friction", 100.0, 105.0, 4.0)] * 4
+    inside = [Number("static_friction", 100.0, 104.0, 5.0)] * 100
+    poor = replace(told(), task=Task("low", 12, 0, "steady"), numbers=[*told().numbers, *outside])
+    met, text = judged(told(), told("step"), told(numbers=[*told().numbers, *inside]), poor)
+    assert not met
+    assert "MISSED at least 95 % inside their intervals, of each valve" in text
+    assert "met    at least 95 % inside their intervals, of each number" in text
+
+
+@pytest.mark.slow
+def test_an_hour_of_one_valve():
+    found = tried(Task("high", 1, 5, "steady"))
+    assert (found.changes, found.alarms) == (0, 0)
+    assert math.isnan(found.alarmed_by_reference)
+    sliding = found.numbers[0]
+    assert abs(sliding.value - sliding.truth) <= sliding.half_width < 0.2 * sliding.truth
 
 
 def test_the_stem_follows_its_set_points_and_friction_is_that_of_the_plant():

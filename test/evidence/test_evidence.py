@@ -5,10 +5,10 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from service import PRELOAD, SPRING, START, STEP, VALVE, made_moves
+from service import PRELOAD, SPRING, START, VALVE, made_moves
 
-from valve_friction_ros.evidence import Moves, evidence_of
-from valve_friction_ros.evidence.balance import series_of
+from valve_friction_ros.evidence import MOST_MOVES, Moves, evidence_of
+from valve_friction_ros.evidence.balance import balance_of, series_of
 from valve_friction_ros.identification import IdentificationSettings, Verdict
 
 HOUR = 3600e9
@@ -97,6 +97,13 @@ class TestEstimate:
         one = by_the_hour(moves).parameters["sliding_friction"]
         assert one.value == pytest.approx(300.0, rel=0.03)
 
+    @pytest.mark.parametrize("period", [300.0, 3600.0])
+    def test_weeks_of_a_quiet_valve_cost_no_more_than_hours_of_a_busy_one(self, period):
+        moves = made_moves(MOST_MOVES * period / 3600, constant(300.0), period=period)
+        assert balance_of(Moves.of(moves), 0.04, VALVE.travel).values.size <= 70
+        found = by_the_hour(moves).parameters["sliding_friction"]
+        assert found.value == pytest.approx(300.0, rel=0.02)
+
     @settings(max_examples=15, deadline=None)
     @given(st.floats(0.01, 100.0))
     def test_forces_in_another_scale_give_numbers_in_that_scale(self, scale):
@@ -148,7 +155,13 @@ class TestChange:
             viscous=4e4,
             noise=12.0,
         )
-        moves = [one for one in moves if one.start > 0.45 * VALVE.travel or one.end % 3]
+        middle = 0.5 * VALVE.travel
+        moves = [
+            one
+            for one in moves
+            if (0.5 * (one.start + one.stop) > middle) == bool(int((one.end - START) // HOUR) % 2)
+        ]
+        assert len(moves) > 1000
         found = by_the_hour(moves)
         assert found.change is None
         assert abs(
@@ -167,4 +180,3 @@ class TestChange:
         series = series_of(Moves.of(made_moves(2.0, constant(300.0))), VALVE.travel)
         assert series.friction == pytest.approx(300.0, rel=0.02)
         assert 10 <= series.friction.size <= 12
-        assert STEP > 0

@@ -127,6 +127,18 @@ class TestNoEvidence:
         assert all(one.end - one.begin < 4e9 for one in found)
         assert all(friction_of(one) == pytest.approx(FRICTION, rel=2e-3) for one in found)
 
+    @pytest.mark.parametrize("rate", [20.0, 1000.0])
+    def test_a_repeated_stamp_a_second_costs_nothing(self, rate):
+        stamps, *signal = signals(PLACES, FRICTION, rate=rate)
+        second = round(rate)
+        twice = np.sort(np.concatenate((np.arange(stamps.size), np.arange(0, stamps.size, second))))
+        usual, found = (
+            taken(*parts(arrivals(*columns), range(0, 2 * columns[0].size, 37)))
+            for columns in ((stamps, *signal), (stamps[twice], *(one[twice] for one in signal)))
+        )
+        assert len(found) == len(usual) >= 6
+        assert all(friction_of(one) == pytest.approx(FRICTION, rel=5e-3) for one in found)
+
     def test_what_is_forgotten_in_it(self):
         stream, found = MoveStream(VALVE), []
         for part in parts(arrivals(*WHOLE), range(0, 2 * WHOLE[0].size, 40)):

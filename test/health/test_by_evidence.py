@@ -12,6 +12,8 @@ from valve_friction_ros.health import (
     StatusSignal,
     baseline_by_evidence,
     diagnosis_by_evidence,
+    reference_by_evidence,
+    why_not_compared,
 )
 from valve_friction_ros.identification import IdentificationSettings, RefusalError
 
@@ -44,17 +46,61 @@ def test_limits_are_those_of_an_identification(now, level, signal, words):
     assert found.ratio.value == pytest.approx(now / 300.0, rel=0.05)
 
 
-def test_a_change_warns_where_there_is_no_baseline():
-    grown = evidence(lambda hour: 450.0 if hour > 2 else 300.0, hours=3.0)
-    found = diagnosis_by_evidence(grown, VALVE, None, LIMITS)
-    assert found.level is Level.WARN
-    assert "times what it was before 2023-11-1" in found.message
-    assert diagnosis_by_evidence(evidence(lambda _: 300.0), VALVE, None, LIMITS) is None
+class TestReference:
+    """Friction when the moves were first combined, where no baseline can be compared."""
 
+    FIRST = reference_by_evidence(evidence(lambda _: 300.0))
 
-def test_a_baseline_of_another_friction_is_not_compared():
-    found = diagnosis_by_evidence(evidence(lambda _: 450.0), VALVE, Baseline(100.0), LIMITS)
-    assert found is None
+    def found(self, now, healthy=None, reference=FIRST):
+        return diagnosis_by_evidence(now, VALVE, healthy, LIMITS, reference)
+
+    def test_the_alarm_stays_when_the_change_has_left_the_ledger(self):
+        now = evidence(lambda _: 450.0)
+        assert now.change is None
+        found = self.found(now)
+        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED)
+        assert "times what it was until 2023-11-15" in found.message
+        assert "no baseline: call ~/set_baseline while it is healthy" in found.message
+        assert found.ratio.value == pytest.approx(1.5, rel=0.05)
+
+    def test_slow_growth_ends_in_an_error(self):
+        grown = evidence(lambda hour: 300.0 * (1 + hour / 13), hours=18.0)
+        assert self.found(grown).level is Level.ERROR
+
+    def test_a_second_change_does_not_hide_the_first(self):
+        def friction(hour):
+            return 300.0 if hour < 3 else 480.0 if hour < 6 else 450.0
+
+        assert self.found(evidence(friction, hours=9.0)).level is Level.WARN
+
+    def test_the_same_friction_is_normal_and_none_is_not_compared(self):
+        same = evidence(lambda _: 300.0)
+        assert self.found(same).level is Level.OK
+        assert self.found(same, reference=None) is None
+        assert self.found(evidence(lambda _: 300.0, hours=0.2)) is None
+
+    @pytest.mark.parametrize(
+        ("healthy", "words"),
+        [
+            (Baseline(600.0), "has no sliding friction"),
+            (Baseline(sliding=SlidingFriction(300.0, 10.0, 6e-3)), "belongs to 6 mm/s"),
+        ],
+    )
+    def test_it_stands_in_for_a_baseline_that_cannot_be_compared(self, healthy, words):
+        now = evidence(lambda _: 900.0)
+        found = self.found(now, healthy)
+        assert found.level is Level.ERROR
+        assert "the baseline cannot be compared: call ~/set_baseline" in found.message
+        assert words in why_not_compared(now, healthy)
+
+    def test_a_baseline_that_can_be_compared_counts(self):
+        now = evidence(lambda _: 450.0)
+        assert self.found(now, baseline(450.0)).level is Level.OK
+        assert why_not_compared(now, baseline()) == why_not_compared(now, None) == ""
+
+    def test_it_is_known_as_well_as_a_baseline(self):
+        assert reference_by_evidence(evidence(lambda _: 300.0, hours=0.2)) is None
+        assert self.FIRST.sliding.value == pytest.approx(300.0, rel=0.02)
 
 
 def test_a_negative_friction_points_to_the_signals():

@@ -9,12 +9,16 @@ from histories import DAY, OTHER, SECOND, START, VALVE
 from test_file import write_version_2
 
 from valve_friction_ros.evidence import Move
+from valve_friction_ros.health import Reference, SlidingFriction
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
     evidence_rows,
     keep_moves,
+    keep_reference,
+    keep_renewal,
     read_moves,
+    read_reference,
 )
 from valve_friction_ros.model import Valve
 
@@ -68,10 +72,51 @@ def test_their_age_is_bounded(history):
     assert kept(history) == [501.0, 502.0]
 
 
-def test_a_clock_that_was_set_back(history):
-    keep_moves(history, VALVE, BUILT, list(map(move, range(4))))
-    keep_moves(history, VALVE, BUILT, [replace(move(2), force=7.0)])
-    assert kept(history) == [500.0, 501.0, 7.0]
+@pytest.mark.parametrize("start", [SECOND, START + 70 * 365 * DAY])
+def test_one_wrong_stamp_costs_no_kept_move(history, start):
+    keep_moves(history, VALVE, BUILT, list(map(move, range(40))), days=10_000.0)
+    keep_moves(history, VALVE, BUILT, [move(99, start)], days=10_000.0)
+    keep_moves(history, VALVE, BUILT, [move(40)], days=10_000.0)
+    assert len(kept(history)) >= 41
+
+
+class TestReference:
+    FIRST, LATER = (Reference(SlidingFriction(one, 9.0, 1e-3), START) for one in (300.0, 450.0))
+
+    def kept(self, history, built=BUILT, valve=VALVE):
+        return read_reference(history, valve.name, built)
+
+    def test_the_first_stays(self, history):
+        for one in (self.FIRST, self.LATER):
+            keep_reference(history, VALVE, BUILT, one)
+        assert self.kept(history) == self.FIRST
+        assert self.kept(history, valve=OTHER) is None
+
+    def test_another_actuator_has_another(self, history):
+        larger = replace(BUILT, diaphragm_area=0.05)
+        keep_reference(history, VALVE, BUILT, self.FIRST)
+        assert self.kept(history, larger) is None
+        keep_reference(history, VALVE, larger, self.LATER)
+        assert self.kept(history, larger) == self.LATER
+        assert self.kept(history, replace(larger, travel=0.05)) == self.LATER
+
+    def test_a_renewal_begins_anew(self, history):
+        for valve in (VALVE, OTHER):
+            keep_moves(history, valve, BUILT, [move(0)])
+            keep_reference(history, valve, BUILT, self.FIRST)
+        keep_renewal(history, VALVE, START + DAY)
+        assert kept(history) == []
+        assert self.kept(history) is None
+        assert kept(history, valve=OTHER) == [500.0]
+        assert self.kept(history, valve=OTHER) == self.FIRST
+        keep_moves(history, VALVE, BUILT, [move(1)])
+        keep_reference(history, VALVE, BUILT, self.LATER)
+        assert kept(history) == [501.0]
+        assert self.kept(history) == self.LATER
+
+    def test_an_older_file_holds_none(self, history):
+        write_version_2(history)
+        assert self.kept(history) is None
 
 
 @pytest.mark.parametrize("changes", [{"diaphragm_area": 0.05}, {"pressure_reference": 0.0}])

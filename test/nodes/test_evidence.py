@@ -87,3 +87,31 @@ def test_another_actuator_makes_other_forces(shared):
     node = f"{NAMESPACE}/identifier"
     assert client.set_together(node, {"diaphragm_area": 0.05}).successful
     client.next_status(lambda status: number(values_of(status), "moves") == 0, "no moves")
+
+
+def test_a_renewed_packing_and_a_wrong_stamp(live):
+    live.start_identifier(SECURE)
+    client = live.client
+    serve(client, 0, 300.0)
+    before = client.status_values(
+        lambda status: number(values_of(status), "reference [N]") > 0, "a reference"
+    )
+    assert number(before, "reference [N]") == pytest.approx(300.0, rel=0.03)
+    node = f"{NAMESPACE}/identifier"
+    changed = client.set_together(node, {"travel": 0.03})
+    assert changed.successful, changed.reason
+    serve(client, -100_000, 300.0)
+    left = client.status_values(
+        lambda status: "evidence left_out" in values_of(status), "moves left out"
+    )
+    assert number(left, "moves") >= number(before, "moves")
+    answer = client.trigger("reset_usage")
+    assert "its moves count no more as evidence" in answer.message
+    renewed = client.status_values(lambda status: number(values_of(status), "moves") == 0, "none")
+    assert "evidence reference [N]" not in renewed
+    serve(client, MOVES, 450.0)
+    after = client.status_values(
+        lambda status: number(values_of(status), "reference [N]") > 0, "another reference"
+    )
+    assert number(after, "reference [N]") == pytest.approx(450.0, rel=0.03)
+    assert "evidence change_ratio" not in after

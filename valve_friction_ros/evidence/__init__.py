@@ -2,6 +2,16 @@
 
 from valve_friction_ros.evidence.estimate import MOST_MOVES, Change, Evidence, evidence_of
 from valve_friction_ros.evidence.moves import Move, Moves
+from valve_friction_ros.evidence.stamps import stamp_problem
 from valve_friction_ros.evidence.stream import MoveStream
 
-__all__ = ["MOST_MOVES", "Change", "Evidence", "Move", "MoveStream", "Moves", "evidence_of"]
+__all__ = [
+    "MOST_MOVES",
+    "Change",
+    "Evidence",
+    "Move",
+    "MoveStream",
+    "Moves",
+    "evidence_of",
+    "stamp_problem",
+]

@@ -28,6 +28,9 @@ FEWEST_MOVES = 12
 _EPOCH = 3600.0
 """Time, s, over which the preload stays the same: temperature and sensors drift over longer."""
 
+_MOST_EPOCHS = 60
+"""Their number is bounded: months of a quiet valve cost no more than hours of a busy one."""
+
 _SPEED, _ALONG, _DRIFT = 1.0, 0.5, 0.2
 """Standard deviations of what friction may change by with the speed, at the mean speed, and along
 the travel; and of the preload from hour to hour; as shares of the sliding friction."""
@@ -253,7 +256,9 @@ def _scales(moves: Moves) -> tuple[float, float, float]:
 
 def _design(moves: Moves, frictions: NDArray[np.intp], speed: float, place: float) -> _Design:
     """Return the rows of moves, with one friction for each number in `frictions`."""
-    epochs = ((moves.time - moves.time[0]) / _EPOCH).astype(np.intp)
+    passed = moves.time - moves.time[0]
+    epoch = max(_EPOCH, float(passed[-1]) / (_MOST_EPOCHS - 1))
+    epochs = (passed / epoch).astype(np.intp)
     kinds, epochs = np.unique(epochs, return_inverse=True)
     several = kinds.size if kinds.size > 1 else 0
     way, away = moves.direction, moves.place - place

@@ -39,7 +39,8 @@ _NOTHING = Samples(np.empty(0, np.int64), np.empty(0, np.float64))
 class MoveStream:
     """Cuts the samples of one valve into moves, in bounded memory.
 
-    Bad samples, gaps, and stamps that go back end a move without evidence.
+    Bad samples, gaps, and stamps that go back end a move without evidence. Of samples with the same
+    stamp the first counts.
 
     Parameters
     ----------
@@ -105,12 +106,14 @@ class MoveStream:
         for kind in _SIGNALS:
             new = arrivals.samples(kind)
             raw = _joined(self._raw[kind], new)
-            last = self._kept[kind].stamps[-1:]
-            pauses = np.diff(np.concatenate((last, raw.stamps)))
-            if np.any(pauses <= 0) or not np.isfinite(new.values).all():
+            kept = self._kept[kind].stamps
+            last = kept[-1:] if kept.size else raw.stamps[:1] - 1
+            pauses = np.diff(raw.stamps, prepend=last)
+            if np.any(pauses < 0) or not np.isfinite(new.values).all():
                 return False
             if kind is Kind.PRESSURE and not self._valve.sensor_reads(new.values).all():
                 return False
+            raw = Samples(raw.stamps[pauses > 0], raw.values[pauses > 0])
             if raw.stamps.size < 2:
                 self._raw[kind] = raw
                 continue

@@ -1,7 +1,13 @@
 """Health of a valve: its baseline, its diagnosis, and the monitor of one valve; no ROS."""
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
-from valve_friction_ros.health.by_evidence import baseline_by_evidence, diagnosis_by_evidence
+from valve_friction_ros.health.by_evidence import (
+    Reference,
+    baseline_by_evidence,
+    diagnosis_by_evidence,
+    reference_by_evidence,
+    why_not_compared,
+)
 from valve_friction_ros.health.comparison import (
     Comparison,
     Ratio,
@@ -45,6 +51,7 @@ __all__ = [
     "Measured",
     "MonitorSettings",
     "Ratio",
+    "Reference",
     "SlidingFriction",
     "StatusSignal",
     "ValveLimits",
@@ -61,6 +68,8 @@ __all__ = [
     "friction_words",
     "identify_snapshot",
     "percentage",
+    "reference_by_evidence",
     "valve_changes",
     "valve_numbers",
+    "why_not_compared",
 ]

@@ -1,18 +1,42 @@
 """The diagnosis by the moves of a valve in service, and the baseline that they can be."""
 
+import contextlib
 import math
+from dataclasses import dataclass
 from datetime import datetime, timezone
 
-from valve_friction_ros.evidence import Change, Evidence
+from valve_friction_ros.evidence import Evidence
 from valve_friction_ros.health.baseline import LARGEST_SHARE, Baseline, SlidingFriction
-from valve_friction_ros.health.comparison import compared
+from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, compared
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, against
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING, RefusalError
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["baseline_by_evidence", "diagnosis_by_evidence"]
+__all__ = [
+    "Reference",
+    "baseline_by_evidence",
+    "diagnosis_by_evidence",
+    "reference_by_evidence",
+    "why_not_compared",
+]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Friction of a valve when its moves were first combined, since its packing was renewed.
+
+    Attributes
+    ----------
+    sliding : SlidingFriction
+        What the moves said.
+    time : int
+        End of the last of them, ns since 1970 (UTC).
+    """
+
+    sliding: SlidingFriction
+    time: int
 
 
 def baseline_by_evidence(evidence: Evidence) -> Baseline:
@@ -38,12 +62,22 @@ def baseline_by_evidence(evidence: Evidence) -> Baseline:
     return Baseline(sliding=SlidingFriction(one.value, one.half_width, evidence.sliding_speed))
 
 
-def diagnosis_by_evidence(
-    evidence: Evidence, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
-) -> Diagnosis | None:
-    """Compare the friction of the moves with the baseline.
+def reference_by_evidence(evidence: Evidence) -> Reference | None:
+    """Return what the moves say as reference; None where they could not be a baseline."""
+    with contextlib.suppress(RefusalError):
+        sliding = baseline_by_evidence(evidence).sliding
+        return None if sliding is None else Reference(sliding, evidence.until)
+    return None
 
-    Without a baseline for it, a declared change of friction is compared with the limits instead.
+
+def diagnosis_by_evidence(
+    evidence: Evidence,
+    valve: Valve,
+    baseline: Baseline | None,
+    limits: FrictionLimits,
+    reference: Reference | None = None,
+) -> Diagnosis | None:
+    """Compare the friction of the moves with the baseline, or else with the reference.
 
     Parameters
     ----------
@@ -55,6 +89,9 @@ def diagnosis_by_evidence(
         Friction of the healthy valve.
     limits : FrictionLimits
         Bounds of the ratio.
+    reference : Reference, optional
+        Friction when the moves were first combined, for a valve without a baseline, or with one
+        that cannot be compared (`why_not_compared`).
 
     Returns
     -------
@@ -68,28 +105,42 @@ def diagnosis_by_evidence(
             "zero: check the direction of both signals"
         )
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
-    found = None
-    if baseline is not None and evidence.is_known:
-        found = compared(evidence.parameters, evidence.sliding_speed, baseline)
-    if found is not None:
-        return against(found.ratio, limits, f"by {_moves(evidence)}{_effect(evidence, valve)}")
-    if evidence.change is None or baseline is not None:
+    if not evidence.is_known:
         return None
-    return _by_change(evidence.change, limits)
-
-
-def _by_change(change: Change, limits: FrictionLimits) -> Diagnosis | None:
-    words = (
-        f"{change.ratio:.2f} ({change.low:.2f} to {change.high:.2f}) times what it was before "
-        f"{_date(change.earliest)}, by the moves in service"
+    effect = f"by {_moves(evidence)}{_effect(evidence, valve)}"
+    found = None if baseline is None else _compared(evidence, baseline)
+    if found is not None:
+        return against(found, limits, effect)
+    if reference is None:
+        return None
+    found = _compared(evidence, Baseline(sliding=reference.sliding))
+    what = "no baseline" if baseline is None else "the baseline cannot be compared"
+    healthy = (
+        f"what it was until {_date(reference.time)}, when the moves of this valve were first "
+        f"combined ({what}: call ~/set_baseline while it is healthy)"
     )
-    if change.low >= limits.warn_ratio:
-        message = f"friction has grown to {words}: check the packing"
-        return Diagnosis(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, None)
-    if change.high <= limits.low_ratio:
-        message = f"friction has fallen to {words}: check the packing, which may leak"
-        return Diagnosis(Level.WARN, StatusSignal.OUT_OF_SPECIFICATION, message, None)
-    return None
+    return None if found is None else against(found, limits, effect, healthy)
+
+
+def _compared(evidence: Evidence, baseline: Baseline) -> Ratio | None:
+    found = compared(evidence.parameters, evidence.sliding_speed, baseline)
+    return None if found is None else found.ratio
+
+
+def why_not_compared(evidence: Evidence, baseline: Baseline | None) -> str:
+    """Return why known evidence is not compared with a baseline; empty if it is."""
+    if baseline is None or not evidence.is_known or _compared(evidence, baseline) is not None:
+        return ""
+    if baseline.sliding is None:
+        return (
+            "not compared with the baseline, which has no sliding friction, and moves in service "
+            "determine no other: call ~/set_baseline while the valve is healthy"
+        )
+    return (
+        f"not compared with the baseline, which belongs to {1e3 * baseline.sliding.speed:.2g} "
+        f"mm/s, and the moves to {1e3 * evidence.sliding_speed:.2g} mm/s, beyond a factor of "
+        f"{LARGEST_SPEED_RATIO:g}: call ~/set_baseline while the valve is healthy"
+    )
 
 
 def _moves(evidence: Evidence) -> str:

@@ -335,9 +335,11 @@ def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:
     )
 
 
-def against(ratio: Ratio, limits: FrictionLimits, effect: str) -> Diagnosis:
-    """Return the diagnosis of a friction over its baseline, with its `effect` in words."""
-    finding = f"{ratio.what} is {_figures(ratio)} times its baseline"
+def against(
+    ratio: Ratio, limits: FrictionLimits, effect: str, healthy: str = "its baseline"
+) -> Diagnosis:
+    """Return the diagnosis of a friction over the `healthy` one, with its `effect` in words."""
+    finding = f"{ratio.what} is {_figures(ratio)} times {healthy}"
     if ratio.low >= limits.error_ratio:
         return Diagnosis(
             Level.ERROR, StatusSignal.FAILURE, f"excess friction: {finding}; {effect}", ratio

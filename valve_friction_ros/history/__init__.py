@@ -13,7 +13,12 @@ from valve_friction_ros.history.entry import (
     entry_of,
     trended,
 )
-from valve_friction_ros.history.evidence_rows import keep_moves, read_moves
+from valve_friction_ros.history.evidence_rows import (
+    keep_moves,
+    keep_reference,
+    read_moves,
+    read_reference,
+)
 from valve_friction_ros.history.file import HistoryError, HistoryFile
 from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
@@ -38,11 +43,13 @@ __all__ = [
     "entry_of",
     "keep_alarm_recording",
     "keep_moves",
+    "keep_reference",
     "keep_renewal",
     "keep_told_level",
     "keep_usage",
     "read_moves",
     "read_told_level",
+    "read_reference",
     "read_usage",
     "trend_of",
     "trended",

@@ -2,16 +2,18 @@
 
 import math
 import sqlite3
+import time
 from collections.abc import Sequence
 
 from valve_friction_ros.evidence import MOST_MOVES, Move
+from valve_friction_ros.health import Reference, SlidingFriction
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import HistoryError, reading, writing
+from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["keep_moves", "read_moves"]
+__all__ = ["forget_evidence", "keep_moves", "keep_reference", "read_moves", "read_reference"]
 
 _DAY = 86_400_000_000_000
 _OF_MOVE = (
@@ -33,17 +35,14 @@ def keep_moves(
 ) -> None:
     """Add moves of a valve, oldest first; keeping them twice changes nothing.
 
-    Kept moves that end after these begin go: the clock was set back. So do those that are `days`
-    older than the last one, none for 0, and all but the newest `MOST_MOVES`. Raises HistoryError if
-    they cannot be written.
+    Those go that are `days` older than the last one, none for 0, and all but the newest
+    `MOST_MOVES`; a stamp ahead of the clock of this machine ages none. Raises HistoryError if they
+    cannot be written.
     """
     if not moves:
         return
     with writing(file.path) as connection:
         row = valve_id(connection, valve)
-        connection.execute(
-            "DELETE FROM move WHERE valve_id = ? AND end_ns > ?", (row, moves[0].begin)
-        )
         columns = ("valve_id", "diaphragm_area", "pressure_reference", *_OF_MOVE)
         marks = ", ".join("?" * len(columns))
         connection.executemany(
@@ -51,7 +50,7 @@ def keep_moves(
             [(row, built.diaphragm_area, built.pressure_reference, *_row(one)) for one in moves],
         )
         if days > 0:
-            oldest = moves[-1].end - round(days * _DAY)
+            oldest = min(moves[-1].end, time.time_ns()) - round(days * _DAY)
             connection.execute("DELETE FROM move WHERE valve_id = ? AND end_ns < ?", (row, oldest))
         connection.execute(
             "DELETE FROM move WHERE valve_id = ? AND end_ns <= "
@@ -83,7 +82,7 @@ def read_moves(file: HistoryFile, valve: str, built: Valve) -> tuple[Move, ...]:
     force. Raises HistoryError if the file cannot be read; one of an older version holds no moves.
     """
     with reading(file.path) as connection:
-        if not _has_moves(connection):
+        if not has_table(connection, "move"):
             return ()
         rows = connection.execute(
             f"SELECT {', '.join(_OF_MOVE)} FROM move JOIN valve ON valve.id = valve_id "  # noqa: S608
@@ -102,6 +101,43 @@ def _move(row: Sequence[float | None]) -> Move:
     return Move(int(begin or 0), int(end or 0), *values)
 
 
-def _has_moves(connection: sqlite3.Connection) -> bool:
-    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'move'"
-    return connection.execute(query).fetchone() is not None
+def keep_reference(file: HistoryFile, valve: KeptValve, built: Valve, reference: Reference) -> None:
+    """Keep the first friction by the moves of a valve; a later one for the same actuator is none.
+
+    Raises HistoryError if it cannot be written.
+    """
+    actuator, one = (built.diaphragm_area, built.pressure_reference), reference.sliding
+    with writing(file.path) as connection:
+        row = valve_id(connection, valve)
+        connection.execute(
+            "DELETE FROM evidence_reference WHERE valve_id = ? "
+            "AND NOT (diaphragm_area IS ? AND pressure_reference = ?)",
+            (row, *actuator),
+        )
+        connection.execute(
+            "INSERT OR IGNORE INTO evidence_reference VALUES (?, ?, ?, ?, ?, ?, ?)",
+            (row, reference.time, *actuator, one.value, one.half_width, one.speed),
+        )
+
+
+def read_reference(file: HistoryFile, valve: str, built: Valve) -> Reference | None:
+    """Return the first friction by the moves of the valve of this name, with this actuator.
+
+    Raises HistoryError if the file cannot be read; one of an older version holds none.
+    """
+    with reading(file.path) as connection:
+        if not has_table(connection, "evidence_reference"):
+            return None
+        row = connection.execute(
+            "SELECT time_ns, sliding_friction, half_width, speed FROM evidence_reference "
+            "JOIN valve ON valve.id = valve_id "
+            "WHERE name = ? AND diaphragm_area IS ? AND pressure_reference = ?",
+            (valve, built.diaphragm_area, built.pressure_reference),
+        ).fetchone()
+    return None if row is None else Reference(SlidingFriction(*row[1:]), row[0])
+
+
+def forget_evidence(connection: sqlite3.Connection, row: int) -> None:
+    """Drop the moves and the reference of the valve of this row: its packing was renewed."""
+    for table in ("move", "evidence_reference"):
+        connection.execute(f"DELETE FROM {table} WHERE valve_id = ?", (row,))  # noqa: S608

@@ -1,4 +1,4 @@
-"""The table of the moves in service."""
+"""The tables of the moves in service."""
 
 __all__ = ["EVIDENCE_TABLE"]
 
@@ -18,6 +18,16 @@ CREATE TABLE move (
     onset_position REAL,
     onset_rate REAL,
     PRIMARY KEY (valve_id, end_ns)
-) WITHOUT ROWID
+) WITHOUT ROWID;
+CREATE TABLE evidence_reference (
+    valve_id INTEGER PRIMARY KEY REFERENCES valve,
+    time_ns INTEGER NOT NULL,
+    diaphragm_area REAL,
+    pressure_reference REAL NOT NULL,
+    sliding_friction REAL NOT NULL CHECK (sliding_friction > 0),
+    half_width REAL NOT NULL CHECK (half_width >= 0),
+    speed REAL NOT NULL CHECK (speed > 0)
+)
 """
-"""A row a move; the forces hold for the area and the pressure reference beside them."""
+"""A row a move, and one a valve of what its moves said first, since the packing was renewed; the
+forces hold for the area and the pressure reference beside them."""

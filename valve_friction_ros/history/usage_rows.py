@@ -5,6 +5,7 @@ import sqlite3
 from collections.abc import Iterable
 
 from valve_friction_ros.history.entry import KeptValve
+from valve_friction_ros.history.evidence_rows import forget_evidence
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
@@ -47,13 +48,15 @@ def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[Use
 def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
     """Keep that the packing of a valve was renewed at a time, ns since 1970 (UTC).
 
+    The moves of the packing before go, and their reference: they say nothing of the new one.
     Raises HistoryError if it cannot be written.
     """
     with writing(file.path) as connection:
+        row = valve_id(connection, valve)
         connection.execute(
-            "INSERT OR IGNORE INTO packing_renewal (valve_id, time_ns) VALUES (?, ?)",
-            (valve_id(connection, valve), time),
+            "INSERT OR IGNORE INTO packing_renewal (valve_id, time_ns) VALUES (?, ?)", (row, time)
         )
+        forget_evidence(connection, row)
 
 
 def read_usage(file: HistoryFile, valve: str) -> ValveUsage:

@@ -1,37 +1,37 @@
 """The evidence of the moves in service: gathered, kept in the history, shown, and judged."""
 
+import contextlib
 import math
-import time
-from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import Future
 from datetime import datetime, timezone
 
 from rclpy.node import Node
 
-from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, MoveStream, evidence_of
+from valve_friction_ros.evidence import Evidence, MoveStream, evidence_of
 from valve_friction_ros.health import (
     Baseline,
     Diagnosis,
     Finding,
     FrictionMonitor,
     Level,
+    MonitorSettings,
     baseline_by_evidence,
     diagnosis_by_evidence,
+    why_not_compared,
 )
-from valve_friction_ros.history import HistoryFile, KeptValve, keep_moves
+from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
+from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
+from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.streams import Arrivals
 
 __all__ = ["EvidenceWatch"]
 
 _COMBINE_EVERY = 300_000_000_000
 """Nanoseconds of stamps from one combination to the next: thousands of moves take 0.1 s."""
-
-_WRITE_EVERY = 5.0
-"""Time between two writings, s. A killed node loses so much, and a move that has not ended."""
 
 _SHOWN = ("sliding_friction", "static_friction", "spring_constant", "spring_preload")
 
@@ -44,33 +44,23 @@ def _number(value: float) -> str:
     return f"{value:.9g}"
 
 
-@dataclass(eq=False)
-class _Batch:
-    """Moves to be written in the writer's thread, and whether they are."""
-
-    valve: KeptValve
-    built: Valve
-    moves: tuple[Move, ...]
-    days: float
-    is_written: bool = False
-
-    def __call__(self, file: HistoryFile) -> None:
-        keep_moves(file, self.valve, self.built, self.moves, self.days)
-        self.is_written = True
-
-
 class EvidenceWatch:
-    """Gathers the moves of the valve, and compares their friction with the baseline; a `Watch`."""
+    """Gathers the moves of the valve, and compares their friction with the baseline; a `Watch`.
 
-    def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
+    They are combined in a thread: at the start, and for a baseline, at once.
+    """
+
+    def __init__(
+        self, node: Node, monitor: FrictionMonitor, history: HistoryWriter, worker: Worker
+    ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
-        self._built = monitor.settings.valve
-        self._stream = MoveStream(self._built)
-        self._ledger: deque[Move] = deque(history.moves()[-MOST_MOVES:], maxlen=MOST_MOVES)
-        self._unwritten: deque[Move] = deque(maxlen=MOST_MOVES)
-        self._batch: _Batch | None = None
-        self._written_at = time.monotonic()
-        self._combine()
+        self._worker = worker
+        self._job: Future[Evidence] | None = None
+        self._is_due = False
+        self._settings = monitor.settings
+        self._stream = MoveStream(self._settings.valve)
+        self._ledger = MoveLedger(node, history, self._settings.valve)
+        self._combine_now()
 
     @property
     def evidence(self) -> Evidence:
@@ -84,36 +74,41 @@ class EvidenceWatch:
 
     def as_baseline(self) -> Baseline:
         """Return the sliding friction of the moves as baseline; raises RefusalError."""
-        self._combine()
+        self._combine_now()
         return baseline_by_evidence(self._evidence)
 
     def follow_parameters(self) -> None:
         """Use the valve and the settings in force; other forces need other moves."""
-        if self._monitor.settings.valve != self._built:
-            self.close()
-            self._built = self._monitor.settings.valve
-            self._stream = MoveStream(self._built)
-            self._ledger.clear()
-        self._combine()
+        before, self._settings = self._settings, self._monitor.settings
+        if self._settings.valve != before.valve:
+            self._stream = MoveStream(self._settings.valve)
+            self._ledger.use(self._settings.valve)
+            if not self._ledger.moves:
+                self._combine_now()
+        if _combined_by(self._settings) != _combined_by(before):
+            self._combine()
 
     def forget_samples(self) -> None:
         """Drop the move under way; the moves that have ended stay."""
         self._stream.forget()
 
+    def renew(self) -> None:
+        """Begin anew, as the packing is renewed; the renewal that is kept says so to the file."""
+        self._stream.forget()
+        self._ledger.renew()
+        self._combine_now()
+
     def take(self, arrivals: Arrivals) -> None:
-        """Take samples; combine the moves now and then."""
+        """Take samples; have the moves combined now and then."""
         moves = self._stream.take(arrivals)
-        if not moves:
-            return
-        while self._ledger and self._ledger[-1].end > moves[0].begin:  # the clock was set back
-            self._ledger.pop()
-        self._ledger.extend(moves)
-        self._unwritten.extend(moves)
-        if abs(moves[-1].end - self._combined) >= _COMBINE_EVERY:
-            self._combine()
+        if moves:
+            self._ledger.add(moves)
+            if self._ledger.newest - self._combined >= _COMBINE_EVERY:
+                self._combine()
 
     def findings(self) -> Sequence[Finding]:
         """Return that friction has grown or collapsed, if so."""
+        self._settle()
         diagnosis = self._diagnosis()
         if diagnosis is None or diagnosis.level < Level.WARN:
             return ()
@@ -122,10 +117,12 @@ class EvidenceWatch:
     def values(self) -> Mapping[str, str]:
         """Return what the moves say, with intervals, or why they do not."""
         self._history.settle()
-        if time.monotonic() - self._written_at >= _WRITE_EVERY:
-            self._keep()
+        self._settle()
+        self._ledger.keep()
         found = self._evidence
         values = {"evidence moves": str(found.moves)}
+        if self._ledger.left_out:
+            values["evidence left_out"] = str(self._ledger.left_out)
         if found.moves:
             values["evidence since [time]"] = _date(found.since)
             values["evidence until [time]"] = _date(found.until)
@@ -133,6 +130,12 @@ class EvidenceWatch:
             values["evidence reason"] = found.parameters["sliding_friction"].reason
         else:
             values |= self._numbers()
+            if reason := why_not_compared(found, self._monitor.baseline):
+                values["evidence reason"] = reason
+        if (reference := self._ledger.reference) is not None:
+            values["evidence reference [N]"] = _number(reference.sliding.value)
+            values["evidence reference half width [N]"] = _number(reference.sliding.half_width)
+            values["evidence reference [time]"] = _date(reference.time)
         if (change := found.change) is not None:
             values["evidence change_ratio"] = _number(change.ratio)
             values["evidence change_ratio low"] = _number(change.low)
@@ -149,8 +152,7 @@ class EvidenceWatch:
 
     def close(self) -> None:
         """Write what is not written yet; the writer's thread finishes it."""
-        if self._unwritten:
-            self._write()
+        self._ledger.close()
 
     def _numbers(self) -> dict[str, str]:
         values = {}
@@ -172,27 +174,39 @@ class EvidenceWatch:
         return values
 
     def _diagnosis(self) -> Diagnosis | None:
-        settings = self._monitor.settings
+        settings, reference = self._monitor.settings, self._ledger.reference
         return diagnosis_by_evidence(
-            self._evidence, settings.valve, self._monitor.baseline, settings.limits
+            self._evidence, settings.valve, self._monitor.baseline, settings.limits, reference
         )
 
+    def _combine_now(self) -> None:
+        self._job, self._is_due = None, False  # what is under way may be of other moves
+        self._combined = self._ledger.newest
+        self._use(evidence_of(self._ledger.moves, *_combined_by(self._settings)))
+
     def _combine(self) -> None:
-        settings = self._monitor.settings
-        ledger = tuple(self._ledger)
-        self._evidence = evidence_of(ledger, settings.valve, settings.identification)
-        self._combined = ledger[-1].end if ledger else 0
+        """Have the moves combined in the thread, once what is under way there is done."""
+        self._is_due = self._job is not None
+        if self._job is None:
+            self._combined = self._ledger.newest
+            wanted = self._ledger.moves, *_combined_by(self._settings)
+            self._job = self._worker.submit(evidence_of, *wanted)
 
-    def _keep(self) -> None:
-        """Have the writer's thread write the new moves, once those before are written."""
-        self._written_at = time.monotonic()
-        if self._batch is not None and not self._batch.is_written:
-            self._history.keep_soon(self._batch)
-        elif self._unwritten:
-            self._write()
+    def _settle(self) -> None:
+        """Take what the thread has found, if it has."""
+        if self._job is None or not self._job.done():
+            return
+        job, self._job = self._job, None
+        with contextlib.suppress(InternalError), bugs_reported(self._node):
+            self._use(job.result())
+        if self._is_due:
+            self._combine()
 
-    def _write(self) -> None:
-        days = self._node.get_parameter(HISTORY_DAYS.name).value
-        self._batch = _Batch(self._history.valve, self._built, tuple(self._unwritten), days)
-        self._unwritten.clear()
-        self._history.keep_soon(self._batch)
+    def _use(self, evidence: Evidence) -> None:
+        self._evidence = evidence
+        self._ledger.refer(evidence)
+
+
+def _combined_by(settings: MonitorSettings) -> tuple[Valve, IdentificationSettings]:
+    """Return what of the settings the evidence depends on."""
+    return settings.valve, settings.identification

@@ -12,7 +12,13 @@ from typing import TypeVar
 from rclpy.node import Node
 
 from valve_friction_ros.evidence import Move
-from valve_friction_ros.health import Baseline, FrictionMonitor, IdentificationInput, Level
+from valve_friction_ros.health import (
+    Baseline,
+    FrictionMonitor,
+    IdentificationInput,
+    Level,
+    Reference,
+)
 from valve_friction_ros.history import (
     AlarmRecording,
     HistoryEntry,
@@ -28,6 +34,7 @@ from valve_friction_ros.history import (
     keep_told_level,
     read_moves,
     read_told_level,
+    read_reference,
     read_usage,
     valve_histories,
 )
@@ -231,6 +238,11 @@ class HistoryWriter:
         """Read the moves of the valve in service; none without a file."""
         built = self._monitor.settings.valve
         return self._tried(lambda file: read_moves(file, self._valve.name, built)) or ()
+
+    def reference(self) -> Reference | None:
+        """Read what the moves of the valve said first; None without a file."""
+        built = self._monitor.settings.valve
+        return self._tried(lambda file: read_reference(file, self._valve.name, built))
 
     def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
         """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.

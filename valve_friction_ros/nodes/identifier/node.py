@@ -107,7 +107,8 @@ class Identifier(PolledNode):
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
         earlier = self._history.prepare()
-        self._evidence = EvidenceWatch(self, self._monitor, self._history)
+        evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
+        self._evidence = evidence
         self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
         self._baseline.begin()
         if earlier is not None:
@@ -271,6 +272,7 @@ class Identifier(PolledNode):
 
     async def _reset_usage(self) -> str:
         self._inputs.take()
+        self._evidence.renew()
         answer = await self._usage.reset()
         self._publish_diagnostics()
         return answer

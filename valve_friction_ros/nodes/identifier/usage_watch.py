@@ -167,7 +167,8 @@ class UsageWatch:
             f"the packing counts from {_date(now)} on; the one before, "
             f"{f'of {_date(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
             f"travel, {used.reversals} reversals, {used.breakaways} breakaways in "
-            f"{used.time_watched / 3600e9:.3g} h of watching{self._history.reservation}"
+            f"{used.time_watched / 3600e9:.3g} h of watching; its moves count no more as evidence"
+            f"{self._history.reservation}"
         )
         self._node.get_logger().info(answer)
         return answer

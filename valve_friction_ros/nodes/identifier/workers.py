@@ -12,20 +12,23 @@ __all__ = ["Workers", "running_workers"]
 
 
 class Workers(NamedTuple):
-    """A thread that identifies, one that writes bags and reports, and one that sends alerts."""
+    """Threads that identify, write bags and reports, combine moves in service, and send alerts."""
 
     identify: Worker
     files: Worker
+    evidence: Worker
     alerts: AlertSender
 
 
 @contextlib.contextmanager
 def running_workers() -> Iterator[Workers]:
     """Provide the threads; at the end, tasks that still wait are dropped."""
-    workers = Workers(Worker("identify", compile_methods), Worker("files"), AlertSender())
+    workers = Workers(
+        Worker("identify", compile_methods), Worker("files"), Worker("evidence"), AlertSender()
+    )
     try:
         yield workers
     finally:
         workers.alerts.close()
-        for worker in (workers.identify, workers.files):
+        for worker in (workers.identify, workers.files, workers.evidence):
             worker.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,130 @@
+"""The moves of the valve and their reference: held here, and kept in the history."""
+
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+
+from rclpy.node import Node
+
+from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, stamp_problem
+from valve_friction_ros.health import Reference, reference_by_evidence
+from valve_friction_ros.history import HistoryFile, KeptValve, keep_moves, keep_reference
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
+
+__all__ = ["MoveLedger"]
+
+_WRITE_EVERY = 5.0
+"""Time between two writings, s. A killed node loses so much, and a move that has not ended."""
+
+
+@dataclass(eq=False)
+class _Batch:
+    """Moves to be written in the writer's thread, and whether they are."""
+
+    valve: KeptValve
+    built: Valve
+    moves: tuple[Move, ...]
+    days: float
+    is_written: bool = False
+
+    def __call__(self, file: HistoryFile) -> None:
+        keep_moves(file, self.valve, self.built, self.moves, self.days)
+        self.is_written = True
+
+
+class MoveLedger:
+    """Moves of one actuator and one packing, oldest first, and what they said first."""
+
+    def __init__(self, node: Node, history: HistoryWriter, built: Valve) -> None:
+        self._node, self._history, self._built = node, history, built
+        self._moves: deque[Move] = deque(history.moves()[-MOST_MOVES:], maxlen=MOST_MOVES)
+        self._unwritten: deque[Move] = deque(maxlen=MOST_MOVES)
+        self._batch: _Batch | None = None
+        self._written_at = time.monotonic()
+        self.reference: Reference | None = history.reference()
+        self.left_out = 0
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """The moves."""
+        return tuple(self._moves)
+
+    @property
+    def newest(self) -> int:
+        """End of the newest move, ns since 1970 (UTC); 0 without any."""
+        return self._moves[-1].end if self._moves else 0
+
+    def add(self, moves: Iterable[Move]) -> None:
+        """Add moves, but those with impossible stamps; no kept move goes for them."""
+        now = self._node.get_clock().now().nanoseconds
+        for move in moves:
+            if problem := stamp_problem(move, self.newest or None, now):
+                self._leave_out(problem)
+                continue
+            self._moves.append(move)
+            self._unwritten.append(move)
+
+    def _leave_out(self, problem: str) -> None:
+        self.left_out += 1
+        if self.left_out == 1:
+            self._node.get_logger().warning(
+                f"a move in service is left out of the evidence: its stamps lie {problem}; "
+                "evidence left_out counts them: check the clocks of the sensors and of this "
+                "machine, or set use_sim_time where a recording is played"
+            )
+
+    def refer(self, evidence: Evidence) -> None:
+        """Take the first friction that is known well enough as the reference."""
+        if self.reference is not None:
+            return
+        self.reference = reference_by_evidence(evidence)
+        if self.reference is not None:
+            valve = self._history.valve
+            self._history.keep_soon(
+                partial(keep_reference, valve=valve, built=self._built, reference=self.reference)
+            )
+
+    def use(self, built: Valve) -> None:
+        """Follow the valve; other forces need other moves, as they do in the file."""
+        before, self._built = self._built, built
+        if _actuator(before) != _actuator(built):
+            self._written_with(before)
+            self._clear()
+
+    def renew(self) -> None:
+        """Begin anew with a new packing; the history does so with `keep_renewal`."""
+        self.close()
+        self._clear()
+
+    def keep(self) -> None:
+        """Have the writer's thread write the new moves now and then, once those before are."""
+        if time.monotonic() - self._written_at < _WRITE_EVERY:
+            return
+        self._written_at = time.monotonic()
+        if self._batch is not None and not self._batch.is_written:
+            self._history.keep_soon(self._batch)
+        else:
+            self.close()
+
+    def close(self) -> None:
+        """Write what is not written yet; the writer's thread finishes it."""
+        self._written_with(self._built)
+
+    def _clear(self) -> None:
+        self._moves.clear()
+        self._batch = self.reference = None
+
+    def _written_with(self, built: Valve) -> None:
+        if self._unwritten:
+            days = self._node.get_parameter(HISTORY_DAYS.name).value
+            self._batch = _Batch(self._history.valve, built, tuple(self._unwritten), days)
+            self._unwritten.clear()
+            self._history.keep_soon(self._batch)
+
+
+def _actuator(valve: Valve) -> tuple[float | None, float]:
+    return valve.diaphragm_area, valve.pressure_reference
