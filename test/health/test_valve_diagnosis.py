@@ -19,7 +19,7 @@ from valve_friction_ros.health import (
     valve_numbers,
 )
 from valve_friction_ros.identification import RefusalError, identify
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, Valve
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, SensorNoise, Valve
 
 TRAVEL, SPRING = 0.03, 2e5
 VALVE = Valve(diaphragm_area=0.04, pressure_reference=1e5, travel=TRAVEL)
@@ -154,6 +154,14 @@ class TestCausesThatLookTheSame:
         )
         assert "the scale of the pressure sensor and the diaphragm area" in only(unknown).message
 
+    @pytest.mark.parametrize("friction", [(112.0, 25.0), (90.0, 60.0), (140.0, 200.0)])
+    def test_a_vague_friction_makes_no_sensor_of_a_broken_spring(self, friction):
+        vague = {"coulomb_friction": friction, "static_friction": None, "viscous_friction": None}
+        finding = only(found(**scaled(0.6, "spring_constant"), **vague))
+        assert finding.level is ERROR
+        assert "check the spring" in finding.message
+        assert "the scale of the pressure sensor and the diaphragm area" in finding.message
+
     def test_a_weak_spring_takes_its_preload_with_it(self):
         finding = only(found(**scaled(0.5, "spring_constant", "spring_preload")))
         assert "the spring constant has changed, and its preload with it" in finding.message
@@ -163,8 +171,8 @@ class TestCausesThatLookTheSame:
             found(spring_preload=(620.0, 1.0), lower_stop=None, upper_stop=None, limits=LOW)
         ).message
         assert "+120 N" in message
-        assert "the zero of the pressure sensor (-3 kPa)" in message
-        assert "the zero of the position sensor (-0.6 mm)" in message
+        assert "the zero of the pressure sensor (+3 kPa in its reading)" in message
+        assert "the zero of the position sensor (-0.6 mm in its reading)" in message
         assert "packing whose friction is larger upward" in message
 
     def test_stops_that_stay_exclude_the_position_sensor(self):
@@ -183,7 +191,10 @@ class TestCausesThatLookTheSame:
             lower_stop=(shift, 1e-5),
             upper_stop=(TRAVEL + shift, 1e-5),
         )
-        assert "zero of the position sensor (-2 mm), as the travel stops have" in balance.message
+        assert (
+            "zero of the position sensor (-2 mm in its reading), as the travel stops have"
+            in balance.message
+        )
         assert "both travel stops have moved alike, by -2.00 mm" in stops.message
 
 
@@ -243,6 +254,22 @@ class TestWholeIdentifications:
         result = identify(noisy_record(LOW_FRICTION, 4), area)
         first, *_ = diagnose_parameters(result, Baseline.of(healthy_result))
         assert "one common factor" in first.message
+
+    @pytest.mark.parametrize(
+        ("error", "words"),
+        [
+            ((6e3, 0.0), "pressure sensor (+6"),
+            ((0.0, 2e-3), "position sensor (+2 mm"),
+            ((0.0, -2e-3), "position sensor (-2 mm"),
+        ],
+    )
+    def test_a_zero_is_named_as_the_error_of_the_reading(self, healthy_result, error, words):
+        true = noisy_record(LOW_FRICTION, 5)
+        read = Recording(true.sample_period, true.drive + error[0], true.position + error[1])
+        result = identify(read, BENCH_VALVE)
+        found = diagnose_parameters(result, Baseline.of(healthy_result), LOW)
+        (balance,) = [one.message for one in found if "balance" in one.message]
+        assert words in balance
 
     def test_without_a_baseline_nothing_is_compared(self, healthy_result):
         assert diagnose_parameters(healthy_result, None) == ()

@@ -19,7 +19,7 @@ from valve_friction_ros.model.valve import Valve
 __all__ = ["diagnose_numbers", "diagnose_parameters"]
 
 _COMMON_SHARE = 0.3
-"""Half width of the interval of a ratio, as a share, up to which it speaks for a common factor."""
+"""Share by which the upper end of a ratio may lie above the lower, to speak for a common factor."""
 
 
 def diagnose_parameters(
@@ -150,16 +150,21 @@ def _common_scale(case: _Case) -> Iterator[Finding]:
     """Find that all forces have changed by one factor, as by another scale of the drive."""
     spring = _spring_change(case)
     coulomb = case.changes.get("coulomb_friction")
-    if spring is None or coulomb is None or coulomb.holds(1.0):
+    if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
         return
     others = [case.changes.get(name) for name in ("static_friction", "viscous_friction")]
-    known = [one for one in others if one is not None and one.high / one.low < 1 + _COMMON_SHARE]
+    known = [one for one in others if one is not None and _is_narrow(one)]
     if all(one.agrees_with(spring) for one in (coulomb, *known)):
         yield _check(
             f"spring constant and friction have changed alike, to {_times(spring)} the baseline: "
             f"one common factor points to the scale of the {case.drive} sensor{case.area} rather "
             "than to spring and packing at once: check them"
         )
+
+
+def _is_narrow(ratio: Change) -> bool:
+    """Return whether a ratio is known well enough to speak for a common factor."""
+    return 0 < ratio.low and ratio.high / ratio.low < 1 + _COMMON_SHARE
 
 
 def _spring(case: _Case) -> Iterator[Finding]:
@@ -208,17 +213,21 @@ def _preload(case: _Case) -> Iterator[Finding]:
 
 
 def _preload_causes(case: _Case, shift: Change) -> list[str]:
-    """Name what may have shifted the balance, but for what another number excludes."""
+    """Name what may have shifted the balance, but for what another number excludes.
+
+    A reading of the pressure that is too high by e adds A·e to the preload; one of the position by
+    b takes k·b from it.
+    """
     stiffness = case.healthy["spring_constant"].value
     moved = shift.times(-1.0 / stiffness)
     stops = [case.changes[name] for name in ("lower_stop", "upper_stop") if name in case.changes]
     bound = case.limits.stop_change * case.valve.travel
-    zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm)"
+    zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm in its reading)"
     if stops and all(one.agrees_with(moved) and one.beyond(-bound, bound) for one in stops):
         return [f"{zero}, as the travel stops have moved alike"]
-    zero_of_drive = case.valve.actuator_drive(-shift.value) - case.valve.actuator_drive(0.0)
+    zero_of_drive = case.valve.actuator_drive(shift.value) - case.valve.actuator_drive(0.0)
     drive = f"{zero_of_drive / case.valve.driven_by.size:+.3g} {case.valve.driven_by.unit}"
-    causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive})"]
+    causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive} in its reading)"]
     if not stops or any(one.agrees_with(moved) for one in stops):
         causes.append(zero)
     friction = case.now.get("coulomb_friction")
