@@ -40,7 +40,8 @@ def stop_findings(
     if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
         yield _finding(
             f"both travel stops have moved alike, by {_millimetres(changes[0])}: the zero of the "
-            "position sensor or its coupling to the stem has moved: check its mounting"
+            "position sensor or its coupling to the stem has moved: check its mounting",
+            *moved,
         )
         return
     for name, change in moved.items():
@@ -49,18 +50,20 @@ def stop_findings(
             yield _finding(
                 f"travel is lost at its {words}: the stem stops {_millimetres(change)} from where "
                 "it went before: check for dirt or a part in the trim, a stop that was set, and "
-                "the zero of the position sensor"
+                "the zero of the position sensor",
+                name,
             )
         else:
             yield _finding(
                 f"the travel stop at its {words} has moved outward by {_millimetres(change)}: "
                 "check seat and plug for wear, stop and coupling, and the zero of the position "
-                "sensor"
+                "sensor",
+                name,
             )
 
 
-def _finding(message: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message)
+def _finding(message: str, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, numbers)
 
 
 def _millimetres(change: Change) -> str:

@@ -123,12 +123,12 @@ class _Case:
         return " and the diaphragm area" if self.valve.driven_by is Drive.PRESSURE else ""
 
 
-def _maintenance(message: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message)
+def _maintenance(message: str, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, numbers)
 
 
-def _check(message: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message)
+def _check(message: str, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message, numbers)
 
 
 def _times(change: Change) -> str:
@@ -158,13 +158,15 @@ def _common_scale(case: _Case) -> Iterator[Finding]:
         yield _check(
             f"spring constant and friction have changed alike, to {_times(spring)} the baseline: "
             f"one common factor points to the scale of the {case.drive} sensor{case.area} rather "
-            "than to spring and packing at once: check them"
+            "than to spring and packing at once: check them",
+            "spring_constant",
+            "coulomb_friction",
         )
 
 
 def _is_narrow(ratio: Change) -> bool:
     """Return whether a ratio is known well enough to speak for a common factor."""
-    return 0 < ratio.low and ratio.high / ratio.low < 1 + _COMMON_SHARE
+    return ratio.low > 0 and ratio.high / ratio.low < 1 + _COMMON_SHARE
 
 
 def _spring(case: _Case) -> Iterator[Finding]:
@@ -182,9 +184,9 @@ def _spring(case: _Case) -> Iterator[Finding]:
         f"N/m: check the spring, and {' and '.join(causes)}, which would look the same"
     )
     if change.beyond(1 - share, 1 + share):
-        yield Finding(Level.ERROR, StatusSignal.FAILURE, message)
+        yield Finding(Level.ERROR, StatusSignal.FAILURE, message, ("spring_constant",))
     else:
-        yield _maintenance(message)
+        yield _maintenance(message, "spring_constant")
 
 
 def _preload_ratio(case: _Case) -> Change | None:
@@ -208,7 +210,8 @@ def _preload(case: _Case) -> Iterator[Finding]:
     share = percentage(abs(shift.value) / case.spring_force)
     yield _maintenance(
         f"the balance of forces has shifted: spring preload {_by(shift, 'N')}, {share} of the "
-        f"spring's force over the travel: check {' or '.join(_preload_causes(case, shift))}"
+        f"spring's force over the travel: check {' or '.join(_preload_causes(case, shift))}",
+        "spring_preload",
     )
 
 
@@ -244,7 +247,8 @@ def _slip(case: _Case) -> Iterator[Finding]:
     jump = percentage(case.now["slip_force"].value / case.spring_force)
     yield _maintenance(
         f"the slip jump has grown: static above sliding friction {_by(growth, 'N')}, which makes "
-        f"the stem jump by {jump} of its travel: check packing, stem and guides for sticking"
+        f"the stem jump by {jump} of its travel: check packing, stem and guides for sticking",
+        "slip_force",
     )
 
 
@@ -255,7 +259,8 @@ def _viscous(case: _Case) -> Iterator[Finding]:
         yield _maintenance(
             f"viscous friction has {'grown' if way > 0 else 'fallen'} to {_times(ratio)} the "
             "baseline: check packing and lubricant, and the air path of the actuator; a changed "
-            "lag between the signals would look much the same"
+            "lag between the signals would look much the same",
+            "viscous_friction",
         )
 
 
@@ -265,7 +270,8 @@ def _asymmetry(case: _Case) -> Iterator[Finding]:
         way = "up" if change.value > 0 else "down"
         yield _maintenance(
             f"viscous friction has become larger {way}ward: share {_by(change, '')}: check stem "
-            "and packing for wear on one side, and the air path for a throttle that acts one way"
+            "and packing for wear on one side, and the air path for a throttle that acts one way",
+            "viscous_asymmetry",
         )
 
 
@@ -276,7 +282,8 @@ def _noises(case: _Case) -> Iterator[Finding]:
         if ratio is not None and ratio.low > case.limits.noise_factor:
             yield _check(
                 f"the noise of the {words} has grown to {_times(ratio)} the baseline: check the "
-                "sensor, its cable, its supply and its mounting"
+                "sensor, its cable, its supply and its mounting",
+                name,
             )
 
 
@@ -288,5 +295,6 @@ def _lag(case: _Case) -> Iterator[Finding]:
     yield _check(
         f"the stem has become {way} against the {case.drive}: {_by(change.times(1e3), 'ms')}: "
         "check filters and clocks of both sensors, and tubing and volume between sensor and "
-        "actuator; a changed viscous friction would look much the same"
+        "actuator; a changed viscous friction would look much the same",
+        "lag",
     )
