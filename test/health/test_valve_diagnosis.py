@@ -145,8 +145,20 @@ class TestCausesThatLookTheSame:
         assert "one common factor points to the scale of the pressure sensor" in finding.message
         assert "and the diaphragm area rather than to spring and packing" in finding.message
 
-    def test_a_spring_whose_friction_stays_is_no_scale_of_the_pressure(self):
+    def test_the_noise_of_a_new_scale_is_no_finding_of_its_own(self):
+        assert "one common factor" in only(found(**scaled(2.3, *FORCES, "drive_noise"))).message
+        both = found(**scaled(2.3, *FORCES), **scaled(6.0, "drive_noise"))
+        assert len(both) == 2
+        assert "noise of the pressure has grown to 6" in both[1].message
+
+    def test_stops_that_stay_exclude_the_scale_of_the_position(self):
         message = only(found(**scaled(0.75, "spring_constant"))).message
+        assert message.endswith("check the spring")
+        longer = found(**scaled(0.75, "spring_constant"), **scaled(1 / 0.75, "upper_stop"))
+        assert "the position sensor's scale" in longer[0].message
+
+    def test_a_spring_whose_friction_stays_is_no_scale_of_the_pressure(self):
+        message = only(found(**scaled(0.75, "spring_constant"), upper_stop=None)).message
         assert "the position sensor's scale" in message
         assert "pressure" not in message
         unknown = found(

@@ -8,7 +8,7 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.stop_findings import stop_findings
-from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.valve_changes import Change, difference, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
@@ -89,7 +89,7 @@ def diagnose_numbers(
         *_preload(case),
         *_asymmetry(case),
         *stop_findings(case.now, case.healthy, case.valve, case.limits.stop_change),
-        *_noises(case),
+        *_noises(case, has_scaled=bool(common)),
         *_lag(case),
     )
 
@@ -175,18 +175,37 @@ def _spring(case: _Case) -> Iterator[Finding]:
         return
     share, value = case.limits.spring_failure, case.now["spring_constant"].value
     coulomb, preload = case.changes.get("coulomb_friction"), _preload_ratio(case)
-    causes = ["the position sensor's scale"]
+    causes = [] if _is_scale_excluded(case, change) else ["the position sensor's scale"]
     if coulomb is None or coulomb.agrees_with(change):
         causes.append(f"the scale of the {case.drive} sensor{case.area}")
     also = ", and its preload with it" if preload and preload.agrees_with(change) else ""
+    alike = f", and {' and '.join(causes)}, which would look the same" if causes else ""
     message = (
         f"the spring constant has changed{also}: {_times(change)} the baseline, now {value:.4g} "
-        f"N/m: check the spring, and {' and '.join(causes)}, which would look the same"
+        f"N/m: check the spring{alike}"
     )
     if change.beyond(1 - share, 1 + share):
         yield Finding(Level.ERROR, StatusSignal.FAILURE, message, ("spring_constant",))
     else:
         yield _maintenance(message, "spring_constant")
+
+
+def _is_scale_excluded(case: _Case, spring: Change) -> bool:
+    """Return whether the distance of the stops contradicts a new scale of the position sensor.
+
+    A scale s makes it s times as long, and the spring constant 1/s times as large.
+    """
+    if not {"lower_stop", "upper_stop"} <= case.changes.keys():
+        return False
+    now, healthy = (
+        difference(side["upper_stop"], side["lower_stop"]) for side in (case.now, case.healthy)
+    )
+    if min(now.low, healthy.low, spring.low) <= 0:
+        return False
+    widths = (0.5 * (one.high - one.low) / one.value for one in (now, healthy))
+    span, spread = now.value / healthy.value, math.hypot(*widths)
+    expected = Change(1 / spring.value, 1 / spring.high, 1 / spring.low)
+    return not Change(span, span * (1 - spread), span * (1 + spread)).agrees_with(expected)
 
 
 def _preload_ratio(case: _Case) -> Change | None:
@@ -275,11 +294,15 @@ def _asymmetry(case: _Case) -> Iterator[Finding]:
         )
 
 
-def _noises(case: _Case) -> Iterator[Finding]:
+def _noises(case: _Case, has_scaled: bool) -> Iterator[Finding]:
+    """Find noise that has grown; a new scale of the drive explains its noise where it agrees."""
     names = {"drive_noise": case.drive, "stem_noise": "stem position"}
     for name, words in names.items():
         ratio = case.changes.get(name)
-        if ratio is not None and ratio.low > case.limits.noise_factor:
+        if ratio is None or not ratio.low > case.limits.noise_factor:
+            continue
+        is_scale = has_scaled and ratio.agrees_with(case.changes["spring_constant"])
+        if not (is_scale and name == "drive_noise"):
             yield _check(
                 f"the noise of the {words} has grown to {_times(ratio)} the baseline: check the "
                 "sensor, its cable, its supply and its mounting",
