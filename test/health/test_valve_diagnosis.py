@@ -220,6 +220,20 @@ def test_travel_is_lost_where_the_baseline_met_no_stop_and_went_further():
     assert found(baseline, lower_stop=(-2e-3, 1e-5)) == ()
 
 
+def test_a_stem_beyond_the_healthy_stop_shows_that_it_has_moved():
+    beyond = {"lower_stop": None, "lowest_position": (-2e-3, 1e-5)}
+    assert "lower end has moved outward by -2.00 mm" in only(found(**beyond)).message
+    assert found(lower_stop=None, lowest_position=(2e-3, 1e-5)) == ()
+
+
+def test_a_stop_that_stays_leaves_the_span_of_the_position_sensor():
+    assert (
+        "the span of the position sensor" in only(found(upper_stop=(0.95 * TRAVEL, 1e-5))).message
+    )
+    alone = only(found(upper_stop=(0.95 * TRAVEL, 1e-5), lower_stop=None)).message
+    assert "the zero of the position sensor" in alone
+
+
 def test_without_travel_shares_of_it_are_not_compared():
     changed = {"spring_preload": (900.0, 1.0), "slip_force": (400.0, 1.0), "lower_stop": (1.0, 0.0)}
     assert found(valve=replace(VALVE, travel=math.inf), **changed) == ()

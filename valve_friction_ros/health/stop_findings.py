@@ -21,14 +21,19 @@ def stop_findings(
     """Find stops that have surely moved by more than a share of the travel.
 
     A stop that only the present record met is compared with how far the stem went in that of the
-    baseline: where it went further, travel has been lost.
+    baseline: where it went further, travel has been lost. Where the stem has gone beyond a stop of
+    the baseline, that has moved outward. A stop that has stayed excludes the zero of the position
+    sensor for the other, and leaves its span.
     """
     bound = share * valve.travel
     moved = {}
     for name, (end, side, _) in _SIDES.items():
         if name not in now:
-            continue
-        if name in healthy:
+            if end in now and name in healthy:
+                change = difference(now[end], healthy[name])
+                if change.times(side).beyond(-float("inf"), bound):
+                    moved[name] = change
+        elif name in healthy:
             change = difference(now[name], healthy[name])
             if change.beyond(-bound, bound):
                 moved[name] = change
@@ -44,21 +49,23 @@ def stop_findings(
             *moved,
         )
         return
+    both = {name for name in _SIDES if name in now and name in healthy}
+    sensor = "zero" if both <= moved.keys() else "span"
     for name, change in moved.items():
-        _, side, words = _SIDES[name]
+        end, side, words = _SIDES[name]
         if side * change.value < 0:
             yield _finding(
                 f"travel is lost at its {words}: the stem stops {_millimetres(change)} from where "
                 "it went before: check for dirt or a part in the trim, a stop that was set, and "
-                "the zero of the position sensor",
+                f"the {sensor} of the position sensor",
                 name,
             )
         else:
             yield _finding(
                 f"the travel stop at its {words} has moved outward by {_millimetres(change)}: "
-                "check seat and plug for wear, stop and coupling, and the zero of the position "
-                "sensor",
-                name,
+                f"check seat and plug for wear, stop and coupling, and the {sensor} of the "
+                "position sensor",
+                name if name in now else end,
             )
 
 
