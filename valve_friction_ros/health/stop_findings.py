@@ -26,21 +26,7 @@ def stop_findings(
     sensor for the other, and leaves its span.
     """
     bound = share * valve.travel
-    moved = {}
-    for name, (end, side, _) in _SIDES.items():
-        if name not in now:
-            if end in now and name in healthy:
-                change = difference(now[end], healthy[name])
-                if change.times(side).beyond(-float("inf"), bound):
-                    moved[name] = change
-        elif name in healthy:
-            change = difference(now[name], healthy[name])
-            if change.beyond(-bound, bound):
-                moved[name] = change
-        elif end in healthy:
-            change = difference(now[name], healthy[end])
-            if change.times(side).beyond(-bound, float("inf")):
-                moved[name] = change
+    moved = _moved(now, healthy, bound)
     changes = list(moved.values())
     if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
         yield _finding(
@@ -67,6 +53,28 @@ def stop_findings(
                 "position sensor",
                 name if name in now else end,
             )
+
+
+def _moved(
+    now: Mapping[str, Measured], healthy: Mapping[str, Measured], bound: float
+) -> dict[str, Change]:
+    """Return the changes of the stops that have surely moved by more than a bound, m."""
+    moved = {}
+    for name, (end, side, _) in _SIDES.items():
+        if name not in now:
+            if end in now and name in healthy:
+                change = difference(now[end], healthy[name])
+                if change.times(side).beyond(-float("inf"), bound):
+                    moved[name] = change
+        elif name in healthy:
+            change = difference(now[name], healthy[name])
+            if change.beyond(-bound, bound):
+                moved[name] = change
+        elif end in healthy:
+            change = difference(now[name], healthy[end])
+            if change.times(side).beyond(-bound, float("inf")):
+                moved[name] = change
+    return moved
 
 
 def _finding(message: str, *numbers: str) -> Finding:
