@@ -1,13 +1,16 @@
 """Noise of the sensors of a record, told apart from the motion of the signals."""
 
+import math
+
 import numpy as np
 import pytest
 
 from valve_friction_ros.health.sensor_noise import sensor_noises
+from valve_friction_ros.health.valve_changes import valve_changes
 from valve_friction_ros.model import Recording
 
 
-def record(position_noise, pressure_noise, rate=200.0, period=8.0, seed=3, colour=0.0):
+def record(position_noise, pressure_noise, rate=200.0, period=8.0, seed=3, colour=0.0, stroke=1.0):
     draw = np.random.default_rng(seed)
     time = np.arange(round(60 * rate)) / rate
     wave = np.sin(2 * np.pi * time / period)
@@ -17,8 +20,8 @@ def record(position_noise, pressure_noise, rate=200.0, period=8.0, seed=3, colou
             white[:, step] = colour * white[:, step - 1] + white[:, step]
     return Recording(
         1 / rate,
-        1e5 + 5e4 * wave + pressure_noise * white[0],
-        0.015 + 0.01 * wave + position_noise * white[1],
+        1e5 + 5e4 * stroke * wave + pressure_noise * white[0],
+        0.015 + 0.01 * stroke * wave + position_noise * white[1],
     )
 
 
@@ -45,5 +48,24 @@ def test_a_short_record_shows_none():
 
 
 def test_no_noise_is_found_below_the_resolution():
-    found = sensor_noises(record(0.0, 0.0, rate=1000.0))
-    assert found["stem_noise"].value == pytest.approx(1e-4 * 0.02, rel=0.01)
+    found = sensor_noises(record(0.0, 0.0, rate=1000.0))["stem_noise"]
+    assert found.value == found.half_width == pytest.approx(0.5e-4 * 0.02, rel=0.01)
+
+
+@pytest.mark.parametrize("strokes", [(0.2, 1.0), (1.0, 0.2)])
+def test_one_noise_seen_over_unlike_strokes_has_not_grown(strokes):
+    """The resolution grows with the stroke; here from below the noise to above it."""
+    healthy, now = (
+        sensor_noises(record(0.7e-6, 100.0, stroke=stroke, seed=seed))
+        for seed, stroke in enumerate(strokes)
+    )
+    ratio = valve_changes(now, healthy)["stem_noise"]
+    assert ratio.holds(1.0)
+    assert ratio.low < 2.0
+
+
+def test_a_noise_above_a_former_resolution_has_surely_grown():
+    healthy, now = sensor_noises(record(0.0, 100.0)), sensor_noises(record(2e-5, 100.0))
+    ratio = valve_changes(now, healthy)["stem_noise"]
+    assert 9.0 < ratio.low < 10.0
+    assert ratio.high == math.inf

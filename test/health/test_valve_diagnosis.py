@@ -19,7 +19,7 @@ from valve_friction_ros.health import (
     valve_numbers,
 )
 from valve_friction_ros.identification import RefusalError, identify
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, Valve
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, SensorNoise, Valve
 
 TRAVEL, SPRING = 0.03, 2e5
 VALVE = Valve(diaphragm_area=0.04, pressure_reference=1e5, travel=TRAVEL)
@@ -145,14 +145,34 @@ class TestCausesThatLookTheSame:
         assert "one common factor points to the scale of the pressure sensor" in finding.message
         assert "and the diaphragm area rather than to spring and packing" in finding.message
 
-    def test_a_spring_whose_friction_stays_is_no_scale_of_the_pressure(self):
+    def test_the_noise_of_a_new_scale_is_no_finding_of_its_own(self):
+        assert "one common factor" in only(found(**scaled(2.3, *FORCES, "drive_noise"))).message
+        both = found(**scaled(2.3, *FORCES), **scaled(6.0, "drive_noise"))
+        assert len(both) == 2
+        assert "noise of the pressure has grown to 6" in both[1].message
+
+    def test_stops_that_stay_exclude_the_scale_of_the_position(self):
         message = only(found(**scaled(0.75, "spring_constant"))).message
+        assert message.endswith("check the spring")
+        longer = found(**scaled(0.75, "spring_constant"), **scaled(1 / 0.75, "upper_stop"))
+        assert "the position sensor's scale" in longer[0].message
+
+    def test_a_spring_whose_friction_stays_is_no_scale_of_the_pressure(self):
+        message = only(found(**scaled(0.75, "spring_constant"), upper_stop=None)).message
         assert "the position sensor's scale" in message
         assert "pressure" not in message
         unknown = found(
             **scaled(0.75, "spring_constant"), coulomb_friction=None, static_friction=None
         )
         assert "the scale of the pressure sensor and the diaphragm area" in only(unknown).message
+
+    @pytest.mark.parametrize("friction", [(112.0, 25.0), (90.0, 60.0), (140.0, 200.0)])
+    def test_a_vague_friction_makes_no_sensor_of_a_broken_spring(self, friction):
+        vague = {"coulomb_friction": friction, "static_friction": None, "viscous_friction": None}
+        finding = only(found(**scaled(0.6, "spring_constant"), **vague))
+        assert finding.level is ERROR
+        assert "check the spring" in finding.message
+        assert "the scale of the pressure sensor and the diaphragm area" in finding.message
 
     def test_a_weak_spring_takes_its_preload_with_it(self):
         finding = only(found(**scaled(0.5, "spring_constant", "spring_preload")))
@@ -163,8 +183,8 @@ class TestCausesThatLookTheSame:
             found(spring_preload=(620.0, 1.0), lower_stop=None, upper_stop=None, limits=LOW)
         ).message
         assert "+120 N" in message
-        assert "the zero of the pressure sensor (-3 kPa)" in message
-        assert "the zero of the position sensor (-0.6 mm)" in message
+        assert "the zero of the pressure sensor (+3 kPa in its reading)" in message
+        assert "the zero of the position sensor (-0.6 mm in its reading)" in message
         assert "packing whose friction is larger upward" in message
 
     def test_stops_that_stay_exclude_the_position_sensor(self):
@@ -183,7 +203,10 @@ class TestCausesThatLookTheSame:
             lower_stop=(shift, 1e-5),
             upper_stop=(TRAVEL + shift, 1e-5),
         )
-        assert "zero of the position sensor (-2 mm), as the travel stops have" in balance.message
+        assert (
+            "zero of the position sensor (-2 mm in its reading), as the travel stops have"
+            in balance.message
+        )
         assert "both travel stops have moved alike, by -2.00 mm" in stops.message
 
 
@@ -195,6 +218,20 @@ def test_travel_is_lost_where_the_baseline_met_no_stop_and_went_further():
     baseline = replace(BASELINE, numbers=reached)
     assert "travel is lost" in only(found(baseline, lower_stop=(2e-3, 1e-5))).message
     assert found(baseline, lower_stop=(-2e-3, 1e-5)) == ()
+
+
+def test_a_stem_beyond_the_healthy_stop_shows_that_it_has_moved():
+    beyond = {"lower_stop": None, "lowest_position": (-2e-3, 1e-5)}
+    assert "lower end has moved outward by -2.00 mm" in only(found(**beyond)).message
+    assert found(lower_stop=None, lowest_position=(2e-3, 1e-5)) == ()
+
+
+def test_a_stop_that_stays_leaves_the_span_of_the_position_sensor():
+    assert (
+        "the span of the position sensor" in only(found(upper_stop=(0.95 * TRAVEL, 1e-5))).message
+    )
+    alone = only(found(upper_stop=(0.95 * TRAVEL, 1e-5), lower_stop=None)).message
+    assert "the zero of the position sensor" in alone
 
 
 def test_without_travel_shares_of_it_are_not_compared():
@@ -243,6 +280,22 @@ class TestWholeIdentifications:
         result = identify(noisy_record(LOW_FRICTION, 4), area)
         first, *_ = diagnose_parameters(result, Baseline.of(healthy_result))
         assert "one common factor" in first.message
+
+    @pytest.mark.parametrize(
+        ("error", "words"),
+        [
+            ((6e3, 0.0), "pressure sensor (+6"),
+            ((0.0, 2e-3), "position sensor (+2 mm"),
+            ((0.0, -2e-3), "position sensor (-2 mm"),
+        ],
+    )
+    def test_a_zero_is_named_as_the_error_of_the_reading(self, healthy_result, error, words):
+        true = noisy_record(LOW_FRICTION, 5)
+        read = Recording(true.sample_period, true.drive + error[0], true.position + error[1])
+        result = identify(read, BENCH_VALVE)
+        found = diagnose_parameters(result, Baseline.of(healthy_result), LOW)
+        (balance,) = [one.message for one in found if "balance" in one.message]
+        assert words in balance
 
     def test_without_a_baseline_nothing_is_compared(self, healthy_result):
         assert diagnose_parameters(healthy_result, None) == ()

@@ -12,7 +12,7 @@ from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, succ
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.health import Baseline, Level, Measured, SlidingFriction
+from valve_friction_ros.health import Baseline, Level, Measured, MonitorSettings, SlidingFriction
 from valve_friction_ros.history import (
     FrictionPoint,
     HistoryError,
@@ -21,9 +21,10 @@ from valve_friction_ros.history import (
     KeptValve,
     schema,
 )
+from valve_friction_ros.history.entry import settings_text
 from valve_friction_ros.identification import Verdict
 from valve_friction_ros.identification.trust.calibration import calibrated
-from valve_friction_ros.model import Drive, Recording
+from valve_friction_ros.model import BENCH_VALVE, Drive, Recording
 
 
 @pytest.fixture
@@ -187,6 +188,31 @@ def test_the_numbers_of_baseline_and_identification_are_kept(history):
     assert history.last_success(VALVE.name).numbers == NUMBERS
     history.add(success(START + 9 * DAY), days=1.0)
     assert select(history, "SELECT count(*) FROM identification_number") == [(0,)]
+
+
+def test_the_newest_measurement_of_each_number_is_known_after_a_restart(history):
+    lost = {"lower_stop": Measured(2e-3, 1e-5), "lowest_position": Measured(2e-3, 1e-5)}
+    within = {"lowest_position": Measured(5e-3, 1e-5), "lag": Measured(0.0, 0.003)}
+    other = settings_text(MonitorSettings(replace(BENCH_VALVE, travel=0.02)))
+    for entry in (
+        success(START - 1, numbers={"slip_force": Measured(9.0, 1.0)}),
+        success(numbers=NUMBERS | lost),
+        success(valve=OTHER, numbers={"stem_noise": Measured(1e-6, 1e-8)}),
+        success(START + 1, numbers={"slip_force": Measured(5.0, 1.0)}, settings=other),
+        success(START + 2, numbers=within),
+    ):
+        history.add(entry)
+    known = history.known_numbers(VALVE.name, BENCH_VALVE, START)
+    assert known.numbers == NUMBERS | lost | {"lag": within["lag"]}
+    assert known.dated["lag"].time == START + 2
+    assert known.dated["spring_constant"].time == START
+    assert history.known_numbers("none", BENCH_VALVE, 0).numbers == {}
+    repaired = {"lowest_position": Measured(0.0, 1e-5)}
+    history.add(success(START + 3, numbers=repaired))
+    known = history.known_numbers(VALVE.name, BENCH_VALVE, START)
+    assert known.numbers == NUMBERS | {"lag": within["lag"]} | repaired
+    make_version_5(history)
+    assert history.known_numbers(VALVE.name, BENCH_VALVE, 0).numbers == {}
 
 
 def test_a_file_of_version_5_is_read_and_extended(history):

@@ -2,17 +2,23 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from live_nodes import NAMESPACE, values_of
-from records import quick_record
+from records import quick_record, simulated
 
 from valve_friction_ros.history import HistoryFile
-from valve_friction_ros.model import LOW_FRICTION
+from valve_friction_ros.model import LOW_FRICTION, SensorNoise
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 HEALTHY = quick_record()
-WEAK = quick_record(replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3))
+SOFT = replace(LOW_FRICTION, spring_constant=LOW_FRICTION.spring_constant * 2 / 3)
+WEAK = quick_record(SOFT)
+HARDLY = SensorNoise(1e-5, 100.0, 3).applied_to(
+    simulated(5e4 + 5e3 * np.sin(2 * np.pi * np.arange(500) / 250), 0.01, SOFT)
+)
+"""Small strokes of the valve of the soft spring, which hardly show it."""
 CHANGE = "spring_constant change [%]"
 
 
@@ -64,6 +70,25 @@ def test_a_spring_that_has_lost_a_third_of_its_stiffness_is_said_and_outlives_a_
     assert after.level == ERROR
     assert "the spring constant has changed: 0.667 times" in after.message
     assert values_of(after)[CHANGE] == values[CHANGE]
+
+
+def test_an_alarm_outlives_a_record_that_does_not_show_its_number_and_a_kill(live, history):
+    node = live.start_identifier()
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    client.identified(WEAK)
+    assert client.statuses[-1][1].level == ERROR
+    client.identified(HARDLY)
+    assert "spring_constant" not in history.last_success(NODE).numbers
+    status = client.statuses[-1][1]
+    assert status.level == ERROR
+    assert "no record since shows it)" in status.message
+    killed(live, node)
+    live.start_identifier()
+    after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
+    assert after.level == ERROR
+    assert "no record since shows it)" in after.message
 
 
 def test_a_restored_baseline_brings_all_its_numbers_back(live):

@@ -30,6 +30,7 @@ from valve_friction_ros.health.friction_monitor import (
     MonitorSettings,
     identify_snapshot,
 )
+from valve_friction_ros.health.known_numbers import DatedNumber, KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_changes import Change, valve_changes
@@ -41,12 +42,14 @@ __all__ = [
     "Baseline",
     "Change",
     "Comparison",
+    "DatedNumber",
     "Diagnosis",
     "EarlierEstimate",
     "Finding",
     "FrictionLimits",
     "FrictionMonitor",
     "IdentificationInput",
+    "KnownNumbers",
     "Level",
     "Measured",
     "MonitorSettings",

@@ -1,6 +1,5 @@
 """The monitor of one valve, without ROS: buffer, last result, baseline, diagnosis."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -12,10 +11,9 @@ from valve_friction_ros.health.diagnosis import (
     diagnose,
     diagnose_again,
 )
+from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
-from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_changes import Change, valve_changes
-from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import (
@@ -120,19 +118,28 @@ class FrictionMonitor:
     buffer : RecordBuffer
         The last seconds of both signals.
     baseline : Baseline or None
-        The healthy valve.
+        The healthy valve. Setting it drops the numbers of the valve from before the latest record.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
         self._settings = settings
         self._result: Result | None = None
-        self._numbers: Mapping[str, Measured] = {}
+        self._known = KnownNumbers()
         self._earlier: EarlierEstimate | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
         self._internal_error: str | None = None
-        self.baseline: Baseline | None = None
+        self._baseline: Baseline | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
+
+    @property
+    def baseline(self) -> Baseline | None:
+        """The healthy valve."""
+        return self._baseline
+
+    @baseline.setter
+    def baseline(self, baseline: Baseline | None) -> None:
+        self._baseline, self._known = baseline, self._known.only_latest()
 
     @property
     def settings(self) -> MonitorSettings:
@@ -160,22 +167,24 @@ class FrictionMonitor:
         return self._result or self._earlier
 
     @property
-    def numbers(self) -> Mapping[str, Measured]:
-        """What the estimate says of the valve beside its friction (`valve_numbers`)."""
-        return self._numbers
+    def known(self) -> KnownNumbers:
+        """What is known of the valve beside its friction, also by earlier records."""
+        return self._known
 
     @property
     def changes(self) -> dict[str, Change]:
         """Changes of these numbers since the baseline; empty without one."""
-        return {} if self.baseline is None else valve_changes(self._numbers, self.baseline.numbers)
+        return (
+            {}
+            if self.baseline is None
+            else valve_changes(self._known.numbers, self.baseline.numbers)
+        )
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What has changed on the valve beside its friction (`diagnose_numbers`)."""
-        if self.baseline is None:
-            return ()
+        """What has changed on the valve beside its friction (`KnownNumbers.findings`)."""
         settings = self._settings
-        return diagnose_numbers(self._numbers, self.baseline, settings.valve, settings.valve_limits)
+        return self._known.findings(self.baseline, settings.valve, settings.valve_limits)
 
     @property
     def refusal(self) -> str | None:
@@ -188,7 +197,12 @@ class FrictionMonitor:
         return self._internal_error
 
     def change_settings(self, settings: MonitorSettings) -> None:
-        """Put new settings in force; a new window or valve empties the buffer."""
+        """Put new settings in force; a new window or valve empties the buffer.
+
+        With a new valve only the numbers of the latest record stay.
+        """
+        if settings.valve != self._settings.valve:
+            self._known = self._known.only_latest()
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear("valve or window parameters were changed")
@@ -198,14 +212,19 @@ class FrictionMonitor:
         """Return a copy of the buffer, with the settings in force."""
         return IdentificationInput(self.buffer.snapshot(), self._settings)
 
-    def remember(self, earlier: EarlierEstimate) -> None:
-        """Go on with an estimate from before the monitor began, until there is a result."""
-        self._earlier, self._stamp, self._numbers = earlier, earlier.time, earlier.numbers
+    def remember(self, earlier: EarlierEstimate, known: KnownNumbers | None = None) -> None:
+        """Go on with an estimate from before the monitor began, until there is a result.
+
+        What was `known` of the valve beside its friction by earlier records goes on, too.
+        """
+        self._earlier, self._stamp = earlier, earlier.time
+        numbers = (known or KnownNumbers()).dated
+        self._known = KnownNumbers(numbers).followed_by(earlier.numbers, earlier.time)
 
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
         self._result, self._earlier, self._stamp = result, None, stamp
-        self._numbers = valve_numbers(result)
+        self._known = self._known.followed_by(valve_numbers(result), stamp)
         self._refusal = self._internal_error = None
 
     def refuse(self, refusal: RefusalError) -> None:

@@ -1,7 +1,7 @@
 """Severity of what is found on a valve."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Any
 
@@ -38,11 +38,14 @@ class Finding:
         The severity as a status signal of NE 107.
     message : str
         One sentence that says what to check.
+    numbers : tuple of str
+        Names of the numbers that it rests on, if any.
     """
 
     level: Level
     status_signal: StatusSignal
     message: str
+    numbers: tuple[str, ...] = field(default=(), compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a mapping of plain values: ``level``, ``ne_107`` and ``message``."""

@@ -26,7 +26,8 @@ _FINEST = 1e-4
 def sensor_noises(recording: Recording) -> dict[str, Measured]:
     """Return ``drive_noise`` (Pa or N) and ``stem_noise`` (m), standard deviations.
 
-    One that depends on rate or drive is left out.
+    One that depends on rate or drive is left out. Of one below the resolution, which grows with the
+    stroke, only that is known: its interval goes from zero to the resolution.
     """
     if (stamped := recording.stamped) is not None:
         signals = stamped.drive, stamped.position
@@ -49,5 +50,7 @@ def _noise(signal: StampedSignal) -> Measured | None:
     finest = _FINEST * float(np.ptp(fresh.value))
     if sparse > _LIKE_WHITE * max(noise, finest):
         return None
+    if noise < finest:
+        return Measured(0.5 * finest, 0.5 * finest)
     chance = 2.0 * noise / math.sqrt(fresh.time.size)
-    return Measured(max(noise, finest), math.hypot(chance, sparse - noise))
+    return Measured(noise, math.hypot(chance, sparse - noise))

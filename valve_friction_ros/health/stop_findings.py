@@ -21,14 +21,52 @@ def stop_findings(
     """Find stops that have surely moved by more than a share of the travel.
 
     A stop that only the present record met is compared with how far the stem went in that of the
-    baseline: where it went further, travel has been lost.
+    baseline: where it went further, travel has been lost. Where the stem has gone beyond a stop of
+    the baseline, that has moved outward. A stop that has stayed excludes the zero of the position
+    sensor for the other, and leaves its span.
     """
     bound = share * valve.travel
+    moved = _moved(now, healthy, bound)
+    changes = list(moved.values())
+    if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
+        yield _finding(
+            f"both travel stops have moved alike, by {_millimetres(changes[0])}: the zero of the "
+            "position sensor or its coupling to the stem has moved: check its mounting",
+            *moved,
+        )
+        return
+    both = {name for name in _SIDES if name in now and name in healthy}
+    sensor = "zero" if both <= moved.keys() else "span"
+    for name, change in moved.items():
+        end, side, words = _SIDES[name]
+        if side * change.value < 0:
+            yield _finding(
+                f"travel is lost at its {words}: the stem stops {_millimetres(change)} from where "
+                "it went before: check for dirt or a part in the trim, a stop that was set, and "
+                f"the {sensor} of the position sensor",
+                name,
+            )
+        else:
+            yield _finding(
+                f"the travel stop at its {words} has moved outward by {_millimetres(change)}: "
+                f"check seat and plug for wear, stop and coupling, and the {sensor} of the "
+                "position sensor",
+                name if name in now else end,
+            )
+
+
+def _moved(
+    now: Mapping[str, Measured], healthy: Mapping[str, Measured], bound: float
+) -> dict[str, Change]:
+    """Return the changes of the stops that have surely moved by more than a bound, m."""
     moved = {}
     for name, (end, side, _) in _SIDES.items():
         if name not in now:
-            continue
-        if name in healthy:
+            if end in now and name in healthy:
+                change = difference(now[end], healthy[name])
+                if change.times(side).beyond(-float("inf"), bound):
+                    moved[name] = change
+        elif name in healthy:
             change = difference(now[name], healthy[name])
             if change.beyond(-bound, bound):
                 moved[name] = change
@@ -36,31 +74,11 @@ def stop_findings(
             change = difference(now[name], healthy[end])
             if change.times(side).beyond(-bound, float("inf")):
                 moved[name] = change
-    changes = list(moved.values())
-    if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
-        yield _finding(
-            f"both travel stops have moved alike, by {_millimetres(changes[0])}: the zero of the "
-            "position sensor or its coupling to the stem has moved: check its mounting"
-        )
-        return
-    for name, change in moved.items():
-        _, side, words = _SIDES[name]
-        if side * change.value < 0:
-            yield _finding(
-                f"travel is lost at its {words}: the stem stops {_millimetres(change)} from where "
-                "it went before: check for dirt or a part in the trim, a stop that was set, and "
-                "the zero of the position sensor"
-            )
-        else:
-            yield _finding(
-                f"the travel stop at its {words} has moved outward by {_millimetres(change)}: "
-                "check seat and plug for wear, stop and coupling, and the zero of the position "
-                "sensor"
-            )
+    return moved
 
 
-def _finding(message: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message)
+def _finding(message: str, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, numbers)
 
 
 def _millimetres(change: Change) -> str:

@@ -34,7 +34,8 @@ class Change:
     """The change of a number, with its 95 % interval: a ratio, or a difference.
 
     The half widths of two independent measurements add in squares; those of a ratio are shares, and
-    its interval is symmetric in the logarithm.
+    its interval is symmetric in the logarithm. Where the interval of a number reaches zero, that of
+    the ratio has all quotients of the two intervals.
 
     Attributes
     ----------
@@ -68,6 +69,11 @@ def _ratio(now: Measured, healthy: Measured) -> Change | None:
     if not (now.value > 0 and healthy.value > 0):
         return None
     ratio, spread = now.value / healthy.value, math.hypot(now.share, healthy.share)
+    if max(now.share, healthy.share) >= 1.0:
+        least, healthy_least = (max(one.value - one.half_width, 0.0) for one in (now, healthy))
+        low = least / (healthy.value + healthy.half_width)
+        most = now.value + now.half_width
+        return Change(ratio, low, most / healthy_least if healthy_least else math.inf)
     return Change(ratio, ratio * math.exp(-spread), ratio * math.exp(spread))
 
 

@@ -8,7 +8,7 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.stop_findings import stop_findings
-from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.valve_changes import Change, difference, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
@@ -19,7 +19,7 @@ from valve_friction_ros.model.valve import Valve
 __all__ = ["diagnose_numbers", "diagnose_parameters"]
 
 _COMMON_SHARE = 0.3
-"""Half width of the interval of a ratio, as a share, up to which it speaks for a common factor."""
+"""Share by which the upper end of a ratio may lie above the lower, to speak for a common factor."""
 
 
 def diagnose_parameters(
@@ -89,7 +89,7 @@ def diagnose_numbers(
         *_preload(case),
         *_asymmetry(case),
         *stop_findings(case.now, case.healthy, case.valve, case.limits.stop_change),
-        *_noises(case),
+        *_noises(case, has_scaled=bool(common)),
         *_lag(case),
     )
 
@@ -123,12 +123,12 @@ class _Case:
         return " and the diaphragm area" if self.valve.driven_by is Drive.PRESSURE else ""
 
 
-def _maintenance(message: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message)
+def _maintenance(message: str, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, numbers)
 
 
-def _check(message: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message)
+def _check(message: str, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message, numbers)
 
 
 def _times(change: Change) -> str:
@@ -150,16 +150,23 @@ def _common_scale(case: _Case) -> Iterator[Finding]:
     """Find that all forces have changed by one factor, as by another scale of the drive."""
     spring = _spring_change(case)
     coulomb = case.changes.get("coulomb_friction")
-    if spring is None or coulomb is None or coulomb.holds(1.0):
+    if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
         return
     others = [case.changes.get(name) for name in ("static_friction", "viscous_friction")]
-    known = [one for one in others if one is not None and one.high / one.low < 1 + _COMMON_SHARE]
+    known = [one for one in others if one is not None and _is_narrow(one)]
     if all(one.agrees_with(spring) for one in (coulomb, *known)):
         yield _check(
             f"spring constant and friction have changed alike, to {_times(spring)} the baseline: "
             f"one common factor points to the scale of the {case.drive} sensor{case.area} rather "
-            "than to spring and packing at once: check them"
+            "than to spring and packing at once: check them",
+            "spring_constant",
+            "coulomb_friction",
         )
+
+
+def _is_narrow(ratio: Change) -> bool:
+    """Return whether a ratio is known well enough to speak for a common factor."""
+    return ratio.low > 0 and ratio.high / ratio.low < 1 + _COMMON_SHARE
 
 
 def _spring(case: _Case) -> Iterator[Finding]:
@@ -168,18 +175,37 @@ def _spring(case: _Case) -> Iterator[Finding]:
         return
     share, value = case.limits.spring_failure, case.now["spring_constant"].value
     coulomb, preload = case.changes.get("coulomb_friction"), _preload_ratio(case)
-    causes = ["the position sensor's scale"]
+    causes = [] if _is_scale_excluded(case, change) else ["the position sensor's scale"]
     if coulomb is None or coulomb.agrees_with(change):
         causes.append(f"the scale of the {case.drive} sensor{case.area}")
     also = ", and its preload with it" if preload and preload.agrees_with(change) else ""
+    alike = f", and {' and '.join(causes)}, which would look the same" if causes else ""
     message = (
         f"the spring constant has changed{also}: {_times(change)} the baseline, now {value:.4g} "
-        f"N/m: check the spring, and {' and '.join(causes)}, which would look the same"
+        f"N/m: check the spring{alike}"
     )
     if change.beyond(1 - share, 1 + share):
-        yield Finding(Level.ERROR, StatusSignal.FAILURE, message)
+        yield Finding(Level.ERROR, StatusSignal.FAILURE, message, ("spring_constant",))
     else:
-        yield _maintenance(message)
+        yield _maintenance(message, "spring_constant")
+
+
+def _is_scale_excluded(case: _Case, spring: Change) -> bool:
+    """Return whether the distance of the stops contradicts a new scale of the position sensor.
+
+    A scale s makes it s times as long, and the spring constant 1/s times as large.
+    """
+    if not {"lower_stop", "upper_stop"} <= case.changes.keys():
+        return False
+    now, healthy = (
+        difference(side["upper_stop"], side["lower_stop"]) for side in (case.now, case.healthy)
+    )
+    if min(now.low, healthy.low, spring.low) <= 0:
+        return False
+    widths = (0.5 * (one.high - one.low) / one.value for one in (now, healthy))
+    span, spread = now.value / healthy.value, math.hypot(*widths)
+    expected = Change(1 / spring.value, 1 / spring.high, 1 / spring.low)
+    return not Change(span, span * (1 - spread), span * (1 + spread)).agrees_with(expected)
 
 
 def _preload_ratio(case: _Case) -> Change | None:
@@ -203,22 +229,27 @@ def _preload(case: _Case) -> Iterator[Finding]:
     share = percentage(abs(shift.value) / case.spring_force)
     yield _maintenance(
         f"the balance of forces has shifted: spring preload {_by(shift, 'N')}, {share} of the "
-        f"spring's force over the travel: check {' or '.join(_preload_causes(case, shift))}"
+        f"spring's force over the travel: check {' or '.join(_preload_causes(case, shift))}",
+        "spring_preload",
     )
 
 
 def _preload_causes(case: _Case, shift: Change) -> list[str]:
-    """Name what may have shifted the balance, but for what another number excludes."""
+    """Name what may have shifted the balance, but for what another number excludes.
+
+    A reading of the pressure that is too high by e adds A·e to the preload; one of the position by
+    b takes k·b from it.
+    """
     stiffness = case.healthy["spring_constant"].value
     moved = shift.times(-1.0 / stiffness)
     stops = [case.changes[name] for name in ("lower_stop", "upper_stop") if name in case.changes]
     bound = case.limits.stop_change * case.valve.travel
-    zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm)"
+    zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm in its reading)"
     if stops and all(one.agrees_with(moved) and one.beyond(-bound, bound) for one in stops):
         return [f"{zero}, as the travel stops have moved alike"]
-    zero_of_drive = case.valve.actuator_drive(-shift.value) - case.valve.actuator_drive(0.0)
+    zero_of_drive = case.valve.actuator_drive(shift.value) - case.valve.actuator_drive(0.0)
     drive = f"{zero_of_drive / case.valve.driven_by.size:+.3g} {case.valve.driven_by.unit}"
-    causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive})"]
+    causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive} in its reading)"]
     if not stops or any(one.agrees_with(moved) for one in stops):
         causes.append(zero)
     friction = case.now.get("coulomb_friction")
@@ -235,7 +266,8 @@ def _slip(case: _Case) -> Iterator[Finding]:
     jump = percentage(case.now["slip_force"].value / case.spring_force)
     yield _maintenance(
         f"the slip jump has grown: static above sliding friction {_by(growth, 'N')}, which makes "
-        f"the stem jump by {jump} of its travel: check packing, stem and guides for sticking"
+        f"the stem jump by {jump} of its travel: check packing, stem and guides for sticking",
+        "slip_force",
     )
 
 
@@ -246,7 +278,8 @@ def _viscous(case: _Case) -> Iterator[Finding]:
         yield _maintenance(
             f"viscous friction has {'grown' if way > 0 else 'fallen'} to {_times(ratio)} the "
             "baseline: check packing and lubricant, and the air path of the actuator; a changed "
-            "lag between the signals would look much the same"
+            "lag between the signals would look much the same",
+            "viscous_friction",
         )
 
 
@@ -256,18 +289,24 @@ def _asymmetry(case: _Case) -> Iterator[Finding]:
         way = "up" if change.value > 0 else "down"
         yield _maintenance(
             f"viscous friction has become larger {way}ward: share {_by(change, '')}: check stem "
-            "and packing for wear on one side, and the air path for a throttle that acts one way"
+            "and packing for wear on one side, and the air path for a throttle that acts one way",
+            "viscous_asymmetry",
         )
 
 
-def _noises(case: _Case) -> Iterator[Finding]:
+def _noises(case: _Case, has_scaled: bool) -> Iterator[Finding]:
+    """Find noise that has grown; a new scale of the drive explains its noise where it agrees."""
     names = {"drive_noise": case.drive, "stem_noise": "stem position"}
     for name, words in names.items():
         ratio = case.changes.get(name)
-        if ratio is not None and ratio.low > case.limits.noise_factor:
+        if ratio is None or not ratio.low > case.limits.noise_factor:
+            continue
+        is_scale = has_scaled and ratio.agrees_with(case.changes["spring_constant"])
+        if not (is_scale and name == "drive_noise"):
             yield _check(
                 f"the noise of the {words} has grown to {_times(ratio)} the baseline: check the "
-                "sensor, its cable, its supply and its mounting"
+                "sensor, its cable, its supply and its mounting",
+                name,
             )
 
 
@@ -279,5 +318,6 @@ def _lag(case: _Case) -> Iterator[Finding]:
     yield _check(
         f"the stem has become {way} against the {case.drive}: {_by(change.times(1e3), 'ms')}: "
         "check filters and clocks of both sensors, and tubing and volume between sensor and "
-        "actuator; a changed viscous friction would look much the same"
+        "actuator; a changed viscous friction would look much the same",
+        "lag",
     )

@@ -348,7 +348,7 @@ def entry_of(
             ),
             "warnings": result.warnings,
             "sliding_speed": result.sliding_speed,
-            "numbers": monitor.numbers,
+            "numbers": monitor.known.of_latest,
         }
     return HistoryEntry(
         time=time,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.history.entry import (
     FrictionPoint,
     HistoryEntry,
@@ -15,7 +16,7 @@ from valve_friction_ros.history.entry import (
     KeptValve,
     friction_point,
 )
-from valve_friction_ros.history.number_rows import numbers_in
+from valve_friction_ros.history.number_rows import known_numbers_in, numbers_in
 from valve_friction_ros.history.rows import (
     entries_in,
     frictions_in,
@@ -27,6 +28,7 @@ from valve_friction_ros.history.rows import (
 )
 from valve_friction_ros.history.schema import HistoryError, is_current, reading, writing
 from valve_friction_ros.identification import FORMER_METHODS, SLIDING
+from valve_friction_ros.model.valve import Valve
 
 __all__ = ["HistoryError", "HistoryFile"]
 
@@ -125,6 +127,14 @@ class HistoryFile:
             if last.friction is None:
                 raise ValueError("a success without coulomb_friction")
         return last
+
+    def known_numbers(self, valve: str, built: Valve, since: int) -> KnownNumbers:
+        """Return the newest measurement of each number of a valve since a time, ns.
+
+        Only identifications with the parameters `built` of the valve count.
+        """
+        with self._rows() as connection:
+            return known_numbers_in(connection, valve, built, since)
 
     def points(
         self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None

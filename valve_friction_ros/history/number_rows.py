@@ -1,12 +1,17 @@
 """Rows of what else was measured of a valve: with an identification, and with a baseline."""
 
+import json
 import sqlite3
 from collections import defaultdict
 from collections.abc import Mapping
 
+from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
+from valve_friction_ros.identification import plain
+from valve_friction_ros.model.valve import Valve
 
-__all__ = ["NUMBER_TABLES", "insert_numbers", "numbers_in"]
+__all__ = ["NUMBER_TABLES", "insert_numbers", "known_numbers_in", "numbers_in"]
 
 NUMBER_TABLES = "".join(
     f"""
@@ -49,3 +54,56 @@ def numbers_in(
         ):
             found[row][name] = Measured(value, width)
     return found
+
+
+_FARTHEST = {
+    "lowest_position": ("lower_stop", "value"),
+    "highest_position": ("upper_stop", "value DESC"),
+}
+"""Ends of the stem's motion: the stop beside each, and the order that begins with the farthest."""
+
+
+def known_numbers_in(
+    connection: sqlite3.Connection, name: str, valve: Valve, since: int
+) -> KnownNumbers:
+    """Return what the identifications of a valve since a time (ns) say of it (`KnownNumbers`).
+
+    Those made with other parameters of the valve do not count. There is nothing in a file of an
+    older version.
+    """
+    if not connection.execute(
+        "SELECT 1 FROM sqlite_master WHERE name = 'identification_number'"
+    ).fetchone():
+        return KnownNumbers()
+    same = json.dumps(plain(vars(valve)), sort_keys=True)
+    settings = [
+        row
+        for row, content in connection.execute("SELECT id, content FROM settings")
+        if json.dumps(json.loads(content).get("valve"), sort_keys=True) == same
+    ]
+    marks = ", ".join("?" * len(settings))
+    condition = (
+        "FROM identification JOIN identification_number ON identification_id = identification.id "  # noqa: S608
+        "WHERE valve_id = (SELECT id FROM valve WHERE name = ?) AND time_ns >= ? "
+        f"AND settings_id IN ({marks}) AND identification_number.name = ?"
+    )
+
+    def first(number: str, since: int, order: str) -> tuple[int, str, Measured] | None:
+        row = connection.execute(
+            f"SELECT time_ns, value, half_width {condition} ORDER BY {order} LIMIT 1",
+            (name, since, *settings, number),
+        ).fetchone()
+        return None if row is None else (row[0], number, Measured(*row[1:]))
+
+    newest = "time_ns DESC, identification.id DESC"
+    found = [first(number, since, newest) for number in (*RATIOS, *DIFFERENCES)]
+    times = {one[1]: one[0] for one in found if one is not None}
+    for end, (stop, farthest) in _FARTHEST.items():
+        found.append(first(end, times.get(stop, since), f"{farthest}, {newest}"))
+    records: defaultdict[int, dict[str, Measured]] = defaultdict(dict)
+    for time, number, measured in filter(None, found):
+        records[time][number] = measured
+    known = KnownNumbers()
+    for time in sorted(records):
+        known = known.followed_by(records[time], time)
+    return known

@@ -8,11 +8,11 @@ from valve_friction_ros.health import (
     Diagnosis,
     Finding,
     FrictionLimits,
+    KnownNumbers,
     Measured,
     ValveLimits,
     by_severity,
     diagnose,
-    diagnose_numbers,
     valve_numbers,
 )
 from valve_friction_ros.history import ValveHistory
@@ -51,6 +51,8 @@ class IdentifiedRecord:
         What the valve has done.
     valve_limits : ValveLimits
         Bounds of what else may change on the valve.
+    known : KnownNumbers or None
+        What is known of the valve, also by earlier records; None: by the result alone.
     """
 
     name: str
@@ -64,6 +66,7 @@ class IdentifiedRecord:
     history: ValveHistory | None = field(default=None, repr=False)
     usage: ValveUsage = field(default_factory=ValveUsage, repr=False)
     valve_limits: ValveLimits = field(default_factory=ValveLimits)
+    known: KnownNumbers | None = field(default=None, repr=False)
 
     @property
     def recording(self) -> Recording:
@@ -81,14 +84,17 @@ class IdentifiedRecord:
         return diagnose(self.result, self.valve, self.baseline, self.limits)
 
     @cached_property
+    def _known(self) -> KnownNumbers:
+        return self.known or KnownNumbers().followed_by(valve_numbers(self.result), 0)
+
+    @property
     def numbers(self) -> dict[str, Measured]:
-        """What the result says of the valve beside its friction."""
-        return valve_numbers(self.result)
+        """What is known of the valve beside its friction."""
+        return self._known.numbers
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What has changed on the valve beside its friction, the most severe first."""
-        if self.baseline is None:
-            return ()
-        found = diagnose_numbers(self.numbers, self.baseline, self.valve, self.valve_limits)
-        return tuple(by_severity(found))
+        return tuple(
+            by_severity(self._known.findings(self.baseline, self.valve, self.valve_limits))
+        )

@@ -16,6 +16,7 @@ from valve_friction_ros.health import (
     Baseline,
     FrictionMonitor,
     IdentificationInput,
+    KnownNumbers,
     Level,
     Reference,
 )
@@ -148,6 +149,12 @@ class HistoryWriter:
         if last is not None:
             self._former = self._tried(lambda file: file.baseline(name, until=last.time))
         return self._tried(lambda file: file.last_success(name))
+
+    def known_numbers(self, earlier: HistoryEntry) -> KnownNumbers | None:
+        """Read what is known of the valve since its baseline was set, by the last success, too."""
+        name, built, kept = self._valve.name, self._monitor.settings.valve, self._baseline
+        since = earlier.time if kept is None else min(kept.time, earlier.time)
+        return self._tried(lambda file: file.known_numbers(name, built, since))
 
     def read_trend(self) -> None:
         """Compute the trend with the baseline and settings of now."""

@@ -112,7 +112,7 @@ class Identifier(PolledNode):
         self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
         self._baseline.begin()
         if earlier is not None:
-            self._monitor.remember(earlier)
+            self._monitor.remember(earlier, self._history.known_numbers(earlier))
             results.publish(earlier, self._monitor)
         self._history.read_trend()
         self._alerts = Alerts(self, workers.alerts, self._history)

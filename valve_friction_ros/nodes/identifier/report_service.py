@@ -58,7 +58,7 @@ def report_writer(
     time = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
     title, node_name = history.valve.tag or node.get_name(), node.get_fully_qualified_name()
     baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
-    valve_limits = monitor.settings.valve_limits
+    valve_limits, known = monitor.settings.valve_limits, monitor.known
     healthy = None if kept is None or kept.baseline != baseline else kept.record
     notes = () if refusal is None else (f"a later record was refused: {refusal}",)
 
@@ -75,6 +75,7 @@ def report_writer(
             baseline=baseline,
             limits=limits,
             valve_limits=valve_limits,
+            known=known,
             notes=(*notes, *unread),
             healthy=healthy,
             history=before,

@@ -1,0 +1,115 @@
+"""The newest measurement of each number of a valve, and what has changed by them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timezone
+from typing import NamedTuple
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.levels import Finding
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
+from valve_friction_ros.health.valve_limits import ValveLimits
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["DatedNumber", "KnownNumbers"]
+
+_ENDS = (("lowest_position", "lower_stop", -1.0), ("highest_position", "upper_stop", 1.0))
+
+
+class DatedNumber(NamedTuple):
+    """A number of a valve, and when it was measured.
+
+    Attributes
+    ----------
+    number : Measured
+        Number and interval, SI unit.
+    time : int
+        When its record was identified, ns since 1970 (UTC).
+    """
+
+    number: Measured
+    time: int
+
+
+@dataclass(frozen=True)
+class KnownNumbers:
+    """The newest known measurement of each number of a valve.
+
+    A record that does not show a number leaves the one before it: nothing was repaired by that.
+
+    Attributes
+    ----------
+    dated : mapping of str to DatedNumber
+        The numbers by name.
+    latest : int or None
+        Time of the latest record, ns; None without one.
+    """
+
+    dated: Mapping[str, DatedNumber] = field(default_factory=dict)
+    latest: int | None = None
+
+    @property
+    def numbers(self) -> dict[str, Measured]:
+        """The numbers, whatever their age."""
+        return {name: one.number for name, one in self.dated.items()}
+
+    @property
+    def of_latest(self) -> dict[str, Measured]:
+        """The numbers of the latest record alone."""
+        return {n: one.number for n, one in self.dated.items() if one.time == self.latest}
+
+    def only_latest(self) -> "KnownNumbers":
+        """Return what is known by the latest record alone."""
+        return KnownNumbers(
+            {name: one for name, one in self.dated.items() if one.time == self.latest}, self.latest
+        )
+
+    def followed_by(self, numbers: Mapping[str, Measured], time: int) -> "KnownNumbers":
+        """Return what is known after a further record.
+
+        A stop that the stem has since gone beyond is no more. How far the stem went stays until
+        the record of a stop, or a record in which it went farther.
+        """
+        dated = dict(self.dated)
+        fresh = dict(numbers)
+        for end, stop, side in _ENDS:
+            if end not in fresh or stop in fresh:
+                continue
+            if stop in dated and _is_beyond(fresh[end], dated[stop].number, side):
+                del dated[stop]
+            if end in dated and not _is_farther(fresh[end], dated[end].number, side):
+                del fresh[end]
+        dated |= {name: DatedNumber(one, time) for name, one in fresh.items()}
+        return KnownNumbers(dated, time)
+
+    def findings(
+        self, baseline: Baseline | None, valve: Valve, limits: ValveLimits | None = None
+    ) -> tuple[Finding, ...]:
+        """Return what has changed since a baseline (`diagnose_numbers`).
+
+        What rests on a number of an earlier record says when that was.
+        """
+        if baseline is None or not baseline.numbers:
+            return ()
+        found = diagnose_numbers(self.numbers, baseline, valve, limits)
+        return tuple(map(self._with_date, found))
+
+    def _with_date(self, finding: Finding) -> Finding:
+        times = {self.dated[name].time for name in finding.numbers if name in self.dated}
+        if not times - {self.latest}:
+            return finding
+        date = datetime.fromtimestamp(min(times) / 1e9, timezone.utc)
+        message = (
+            f"{finding.message} (measured {date:%Y-%m-%d %H:%M} UTC; no record since shows it)"
+        )
+        return replace(finding, message=message)
+
+
+def _is_beyond(end: Measured, stop: Measured, side: float) -> bool:
+    """Return whether the stem has surely gone beyond a stop."""
+    return side * (end.value - stop.value) > end.half_width + stop.half_width
+
+
+def _is_farther(end: Measured, before: Measured, side: float) -> bool:
+    return side * (end.value - before.value) >= 0
