@@ -14,8 +14,10 @@ __all__ = ["PAGE", "recording_name", "remove_oldest", "remove_recording", "size_
 PAGE = "report.html"
 """The page of the report, in the folder of the bag."""
 
-_CONTENT = re.compile(rf"metadata\.yaml|valve\.yaml|(\.\d+_)?{re.escape(PAGE)}|.+\.mcap")
-"""Files of a recording, and the draft of a page. A folder that holds any other file is left."""
+_DESCRIPTION = "metadata.yaml"
+"""The file that makes a folder a bag."""
+_BESIDE = re.compile(rf"valve\.yaml|(\.\d+_)?{re.escape(PAGE)}")
+"""Files beside the bag, and the draft of a page."""
 _STALE = 86_400.0
 """Age, s, from which an unfinished bag is what a killed node has left."""
 
@@ -32,9 +34,12 @@ def size_of(recording: Path) -> int:
 
 
 def remove_recording(recording: Path) -> None:
-    """Remove the files of a recording, and its folder if nothing else is in it."""
-    for one in recording.iterdir():
-        if _CONTENT.fullmatch(one.name):
+    """Remove the files of a recording, and its folder if nothing else is in it.
+
+    What makes it a recording goes last: a node killed meanwhile leaves one, to be removed later.
+    """
+    for one in sorted(recording.iterdir(), key=lambda one: one.name == _DESCRIPTION):
+        if _is_written(one):
             one.unlink()
     recording.rmdir()
 
@@ -70,8 +75,16 @@ def _folders(folder: Path) -> Iterator[Path]:
 
 
 def _is_recording(place: Path) -> bool:
-    names = {one.name for one in place.iterdir()}
-    return "metadata.yaml" in names and all(map(_CONTENT.fullmatch, names))
+    """Return whether a folder holds a recording and nothing else, or nothing at all."""
+    files = list(place.iterdir())
+    is_bag = any(one.name == _DESCRIPTION for one in files)
+    return all(map(_is_written, files)) and (is_bag or not files)
+
+
+def _is_written(file: Path) -> bool:
+    """Return whether the node writes a file of this name into its folder."""
+    name, folder = file.name, re.sub(r"_\d+$", "", file.parent.name)  # without a second's number
+    return name in (_DESCRIPTION, f"{folder}.mcap") or _BESIDE.fullmatch(name) is not None
 
 
 def _is_left(workplace: Path, pattern: re.Pattern[str]) -> bool:
