@@ -85,9 +85,19 @@ def test_alarm_recordings(history):
     assert alarms[0].to_dict()["level"] == "WARN"
 
 
+def test_old_alarm_recordings_are_forgotten(history):
+    for day, valve in ((0, VALVE), (0, OTHER), (2, VALVE), (3, VALVE)):
+        one = AlarmRecording(START + day * DAY, Level.WARN, Path(f"/alarms/{day}"), "excess")
+        keep_alarm_recording(history, valve, one, days=2.0)
+    found = alarm_recordings(history, VALVE.name)
+    assert [one.time for one in found] == [START + 2 * DAY, START + 3 * DAY]
+    assert len(alarm_recordings(history, OTHER.name)) == 1
+
+
 def make_version_5(history):
     connection = sqlite3.connect(history.path)
-    for table in ("usage", "packing_renewal", "alarm_recording"):
+    tables = ("usage", "packing_renewal", "alarm_recording", "move")
+    for table in (*tables, "baseline_number", "identification_number"):
         connection.execute(f"DROP TABLE {table}")
     connection.execute("PRAGMA user_version = 5")
     connection.commit()

@@ -3,7 +3,7 @@
 import re
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -49,22 +49,37 @@ def remove_oldest(
 ) -> None:
     """Remove the oldest recordings of a valve until few enough, and small enough, are left.
 
+    Of recordings of one level in a row the first goes last: it shows how the trouble began, the
+    others a level that flaps.
+
     Only folders by the name of such a recording count that hold the files of one and no others. The
     `new` one counts and stays. What a killed node has left of this valve goes after a day. Raises
     OSError if something cannot be removed.
     """
-    pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(?:WARN|ERROR)(?:_(\d+))?")
-    found: dict[Path, tuple[str, int]] = {}
+    pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(WARN|ERROR)(?:_(\d+))?")
+    found: dict[Path, tuple[str, int, str]] = {}
     for place in _folders(folder):
         if (name := pattern.fullmatch(place.name)) and _is_recording(place):
-            found[place] = name[1], int(name[2] or 1)
+            found[place] = name[1], int(name[3] or 1), name[2]
         elif place.name.startswith(".saving_") and _is_left(place, pattern):
             shutil.rmtree(place)
-    oldest = sorted(found, key=lambda place: (place == new, found[place]))
+    oldest = _useless_first(found)
+    if new in oldest:
+        oldest.remove(new)
+        oldest.append(new)
     sizes = [size_of(place) for place in oldest]
     while oldest and oldest[0] != new and (len(oldest) > most or sum(sizes) > most_bytes):
         remove_recording(oldest.pop(0))
         sizes.pop(0)
+
+
+def _useless_first(found: Mapping[Path, tuple[str, int, str]]) -> list[Path]:
+    """Sort recordings by age, and put the first of each level in a row behind the others."""
+    firsts, others, before = [], [], ""
+    for place, (_, _, level) in sorted(found.items(), key=lambda item: item[1]):
+        (others if level == before else firsts).append(place)
+        before = level
+    return others + firsts
 
 
 def _folders(folder: Path) -> Iterator[Path]:
