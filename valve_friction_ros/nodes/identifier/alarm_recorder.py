@@ -61,9 +61,9 @@ class AlarmRecorder:
     """Saves the buffer from before and after a rise of the level, one at a time.
 
     The level is that of what samples can show: silent inputs, a history that cannot be written and
-    the life of a packing do not count. The level at the start is none that has risen. After a rise, others are
-    recorded for a pause only if they reach a higher level, so that a level that flaps fills no
-    disk. The worker writes; the executor's thread looks for the outcome once a second.
+    the life of a packing do not count. The level at the start is none that has risen. After a rise,
+    others are recorded for a pause only if they reach a higher level, so that a level that flaps
+    fills no disk. The worker writes; the executor's thread looks for the outcome once a second.
     """
 
     def __init__(
