@@ -157,15 +157,3 @@ def test_valves_that_the_planner_does_not_know(seed):
     assert trial.errors[name] <= trial.reported[name] < 0.2
     assert 0.3 < trial.reported[name] / trial.predicted[name] < 6.0
     assert trial.square[name] > 2.0 * trial.reported[name]
-
-
-def test_friction_that_falls_with_speed_is_told_and_lies_in_its_interval():
-    """Stribeck, which the model lacks: wider than predicted, and remarked on; a seed held back."""
-    (trial,) = trials(1, 70_001)
-    assert trial.law == "stribeck"
-    assert not trial.refusal
-    for name in trial.reported:
-        assert not trial.errors[name] > trial.reported[name]
-    slipping = known_friction(606.0, SPRING, 1.6, static_friction=700.0)
-    found = plan_test(BENCH_VALVE, slipping, QUICK, CONDITIONS, SETTINGS)
-    assert any("(Stribeck)" in one for one in plan_remarks(found))

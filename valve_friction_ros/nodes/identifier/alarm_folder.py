@@ -75,7 +75,9 @@ def remove_oldest(
 
 def _useless_first(found: Mapping[Path, tuple[str, int, str]]) -> list[Path]:
     """Sort recordings by age, and put the first of each level in a row behind the others."""
-    firsts, others, before = [], [], ""
+    firsts: list[Path] = []
+    others: list[Path] = []
+    before = ""
     for place, (_, _, level) in sorted(found.items(), key=lambda item: item[1]):
         (others if level == before else firsts).append(place)
         before = level
