@@ -85,8 +85,19 @@ def test_days(run, monkeypatch):
     lines = [" ".join(line.split()) for line in output.splitlines()]
     assert "FV-101 /fv_101/identifier" in lines
     assert "LV-7 /area_2/lv_7/identifier" in lines
-    assert "2026-09-22 1.5 10 4 21 1 not known" in lines
-    assert "2026-09-23 1.5 10 4 21 1 2026-09-23" in lines
+    assert "2026-09-22 1.5 10 4 21 1 20 not known" in lines
+    assert "2026-09-23 1.5 10 4 21 1 20 2026-09-23" in lines
+
+
+def test_the_sum_of_chosen_days_names_them(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    code, output, _ = run("--usage", "--valve", "FV-101", "--until", "2026-09-22")
+    assert code == 0
+    assert (
+        "3 m of travel, 20 reversals, 8 breakaways in 42 h of watching, from 2026-09-21 to"
+        in output
+    )
+    assert "in all" not in output
 
 
 def test_days_in_json_and_csv(run, tmp_path):

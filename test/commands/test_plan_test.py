@@ -76,9 +76,17 @@ def test_the_text_says_that_nothing_moves_and_how_to_play_it(plan, tmp_path):
     assert "Nothing has been moved." in words
     assert "put the loop in manual" in words
     assert "between 40 and 60 % of the travel" in words
-    last = out.splitlines()[-1]
-    assert last.startswith("ros2 run valve_friction_ros pressure_source --ros-args")
-    assert f"-p file:={tmp_path / 'test.csv'}" in last
+    assert "1.5 to 1.8 times as wide" in words
+    assert "never that of the measured pressure" in words
+    plays = [line for line in out.splitlines() if line.startswith("ros2 run")]
+    on_valve, on_bench = plays
+    for line in plays:
+        assert line.startswith("ros2 run valve_friction_ros pressure_source --ros-args -r ")
+        assert f"-p file:={tmp_path / 'test.csv'}" in line
+    assert "-r actuator_pressure:=" in on_valve
+    assert "-p converter_lag:=0.0" in on_valve
+    assert "-r __ns:=" in on_bench
+    assert "-p converter_lag:=0.0" not in on_bench
     assert "coulomb_friction [N]" in out
 
 

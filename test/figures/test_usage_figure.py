@@ -1,5 +1,6 @@
 """The figure of a valve's usage shows the packing in use."""
 
+import numpy as np
 import pytest
 
 from valve_friction_ros.figures.usage_figure import usage_figure
@@ -20,6 +21,14 @@ def test_histogram_and_days():
     for axes in figure.axes:
         assert "[" in axes.get_xlabel()
         assert "[" in axes.get_ylabel()
+
+
+@pytest.mark.parametrize(("count", "shown"), [(1, 7), (3, 7), (20, 20)])
+def test_at_least_a_week_is_on_the_axis(count, shown):
+    days = [UsedDay(20_000 + day, 0, Usage(1.0, 1, 1, TIMES)) for day in range(count)]
+    axes = usage_figure(ValveUsage.of(days)).axes[1]
+    assert np.ptp(axes.get_xlim()) == pytest.approx(shown)
+    assert axes.get_xlim()[1] == pytest.approx(20_000 + count - 0.5)
 
 
 def test_nothing_to_draw():

@@ -95,6 +95,15 @@ def test_the_told_level_is_the_last(history):
     assert read_told_level(history, OTHER.name) is None
 
 
+def test_old_alarm_recordings_are_forgotten(history):
+    for day, valve in ((0, VALVE), (0, OTHER), (2, VALVE), (3, VALVE)):
+        one = AlarmRecording(START + day * DAY, Level.WARN, Path(f"/alarms/{day}"), "excess")
+        keep_alarm_recording(history, valve, one, days=2.0)
+    found = alarm_recordings(history, VALVE.name)
+    assert [one.time for one in found] == [START + 2 * DAY, START + 3 * DAY]
+    assert len(alarm_recordings(history, OTHER.name)) == 1
+
+
 def make_version_5(history):
     connection = sqlite3.connect(history.path)
     for table in re.findall(r"CREATE TABLE (\w+)", ";".join(schema._STEPS[5])):

@@ -3,8 +3,11 @@
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import numpy as np
+import pageless_identifier
 import pytest
 from histories import START as DAWN
 from histories import VALVE, success
@@ -19,17 +22,20 @@ from valve_friction_ros.history import (
     alarm_recordings,
     keep_alarm_recording,
 )
-from valve_friction_ros.model import HIGH_FRICTION
+from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
+from valve_friction_ros.nodes.identifier.alarm_recorder import _LATE
 
 NODE = f"{NAMESPACE}/identifier"
 ERROR = b"\x02"
+TICK = 1.0
+"""Period of the diagnostics, s."""
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
 FAST = {"method": "refined", "alarm_recording": 0.1, "alarm_pause": 0.0}
 
 
-def baseline_set(live, parameters):
+def baseline_set(live, parameters, script=None):
     """Start a node with the healthy valve as its baseline."""
-    node = live.start_identifier({**FAST, **parameters})
+    node = live.start_identifier({**FAST, **parameters}, script=script)
     live.client.identified(HEALTHY)
     assert live.client.trigger("set_baseline").success
     return node
@@ -56,6 +62,14 @@ def paged(client, path):
     page = Path(path) / "report.html"
     client.wait_until(page.exists, f"{page}", timeout=100)
     return page.read_text(encoding="utf-8")
+
+
+def wait_beyond_a_recording(client):
+    """Wait until one that has begun would have been written."""
+    end = time.monotonic() + FAST["alarm_recording"] + _LATE + 2 * TICK
+    client.wait_until(lambda: time.monotonic() > end, "the end of a recording")
+    client.next_status()
+    client.next_status()
 
 
 def names(folder):
@@ -142,7 +156,7 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
         paged(client, path)
         paths.append(Path(path).name)
     assert len(set(paths)) == 4
-    assert names(folder) == sorted([*others, *paths[-2:]])
+    assert names(folder) == sorted([*others, paths[0], paths[-1]])  # of one level in a row
     size = sum(one.stat().st_size for one in Path(path).iterdir())
 
     (done,) = client.set_parameters(NODE, {"alarm_megabytes": 1.5 * size / 1e6})
@@ -185,8 +199,7 @@ def test_what_is_not_recorded(live, tmp_path, switched_off):
         client.identified(TIGHT)
     else:
         client.next_status(lambda one: one.level == b"\x01", "silent inputs")
-    client.next_status()
-    client.next_status()
+    wait_beyond_a_recording(client)
     assert "alarm_recording" not in client.last_values()
     assert not (tmp_path / "valve_friction_ros" / "alarms").exists()
 
@@ -207,3 +220,27 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
     assert done.successful
     assert alarmed(client).parent == tmp_path / "alarms"
     assert "alarm_recording problem" not in client.last_values()
+
+
+def test_a_fault_in_the_page_is_told_as_that_and_the_bag_is_there(live):
+    baseline_set(live, {}, script=pageless_identifier.SCRIPT).forgive_tracebacks()
+    client = live.client
+    client.identified(TIGHT)
+    values = client.status_values(
+        lambda one: "alarm_recording problem" in values_of(one), "the fault in the page"
+    )
+    problem = values["alarm_recording problem"]
+    assert problem.startswith("the page was not written: internal error: ZeroDivisionError")
+    assert (Path(values["alarm_recording"]) / "metadata.yaml").exists()
+
+
+def test_the_life_of_a_packing_makes_no_recording(live, tmp_path):
+    """It rises after months of use, and no samples show it."""
+    live.start_identifier({**FAST, "reversal_limit": 1.0})
+    client = live.client
+    turns = np.tile(np.linspace(0.0, BENCH_VALVE.travel, 64), 16)
+    client.send(position=(START + SECOND * np.arange(turns.size), turns))
+    client.next_status(lambda one: "packing life" in one.message, "the limit")
+    wait_beyond_a_recording(client)
+    assert "alarm_recording" not in client.last_values()
+    assert not (tmp_path / "valve_friction_ros" / "alarms").exists()

@@ -118,6 +118,22 @@ def test_a_narrow_range_of_the_pressure_is_named():
         pressure_band(BENCH_VALVE, frictions(), Limits(pressure_maximum=9e4))
 
 
+@pytest.mark.parametrize("reference", [0.0, 101325.0])
+def test_no_converter_goes_below_the_atmosphere(reference):
+    """A weak preload and a large friction would need suction."""
+    valve = Valve(BENCH_VALVE.diaphragm_area, reference, BENCH_VALVE.travel)
+    band = pressure_band(valve, frictions(factor=1.0), Limits(0.0, 0.8, allow_stops=True))
+    assert band.low == reference
+    assert band.high > reference + 5e4
+    with pytest.raises(RefusalError, match="pressure limits leave no band"):
+        pressure_band(valve, frictions(factor=1.0), Limits(pressure_maximum=reference))
+
+
+def test_limits_that_leave_no_band_are_named():
+    with pytest.raises(RefusalError, match=r"pressure limits leave no band: .* 300 kPa to 250 kPa"):
+        pressure_band(BENCH_VALVE, frictions(), Limits(pressure_minimum=3e5))
+
+
 def test_a_valve_needs_diaphragm_and_travel():
     for valve in (Valve(travel=0.03), Valve(0.0445)):
         with pytest.raises(ValueError, match="diaphragm_area and travel"):

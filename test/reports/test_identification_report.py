@@ -85,6 +85,8 @@ def test_what_the_valve_has_done(identified):
     assert told["travelled distance [m]"] == ("1.5", "3")
     assert told["reversals"] == ("12", "23")
     assert told["time watched [h]"] == ("24", "48")
+    assert told["time near 0 % of the travel [h]"] == ("24", "48")
+    assert told["time near 100 % of the travel [h]"] == ("0", "0")
     blocks = section(identification_report(used), "Use").blocks
     assert [block.kind for block in blocks] == ["table", "picture", "paragraph"]
     assert "1.5 m and 12 reversals in a day of watching" in blocks[-1].text

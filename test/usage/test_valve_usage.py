@@ -13,6 +13,7 @@ from valve_friction_ros.usage import (
     UsedDay,
     ValveUsage,
     limit_states,
+    warned_limits,
 )
 
 HOUR = DAY // 24
@@ -107,6 +108,21 @@ class TestLimits:
         state = self.state(UsageLimits(travel=150.0), pace=pace)
         assert state.expected is None
         assert not state.warns
+
+    def test_what_has_warned_goes_on(self):
+        state = self.state(UsageLimits(travel=162.0))._replace(has_warned=True)
+        assert state.warns
+
+    def test_what_has_warned_is_found_again(self):
+        """It warned at 3 m a day; then the valve rests."""
+        used = [*days(20, distance=3.0), *days(28, first=TODAY, distance=0.0)]
+        limits = UsageLimits(travel=100.0 + 2 * 60.0, reversals=1e6)
+        found = ValveUsage.of(used)
+        (travel, _) = limit_states(found.since_renewal, found.pace(), limits, NOW)
+        assert not travel.warns
+        assert warned_limits(found, limits) == {"travel_limit"}
+        assert warned_limits(found, UsageLimits(travel=1e4)) == set()
+        assert warned_limits(ValveUsage.of(used, renewal=7), limits) == set()
 
     @pytest.mark.parametrize("name", ["travel", "reversals"])
     def test_negative(self, name):

@@ -137,7 +137,7 @@ def _print_usages(options: argparse.Namespace) -> int:
             ]
             print(json.dumps({"valves": valves}, ensure_ascii=False, allow_nan=False))
         else:
-            print_usage(usages)
+            print_usage(usages, (options.since, options.until) != (_FIRST, _LAST))
     finally:
         if options.csv is not None:
             write_usage(options.csv, usages)

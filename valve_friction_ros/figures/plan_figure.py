@@ -38,10 +38,10 @@ def plan_figure(plan: StrokePlan) -> Figure:
         motion = moved(test.excitation, test.duration, plan.valve, draw, plan.conditions)
         time = np.arange(motion.pressure.size) * motion.sample_period
         stem.plot(time, 100 * motion.stem.position / travel, color=colour, label=f"friction {name}")
-    for share in (plan.limits.lowest, plan.limits.highest):
-        stem.axhline(100 * share, color="0.5", lw=0.8, ls="--")
+    for share, label in ((plan.limits.lowest, "part of the travel"), (plan.limits.highest, None)):
+        stem.axhline(100 * share, color="0.5", lw=0.8, ls="--", label=label)
     stem.set_ylabel("expected stem [% of travel]")
     stem.set_xlabel("time [s]")
-    stem.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    stem.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     dress((pressure, stem))
     return figure

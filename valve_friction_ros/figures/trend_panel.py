@@ -68,7 +68,7 @@ def draw_history(
     axes: Axes, history: ValveHistory, span: tuple[int, int], now: int | None = None
 ) -> None:
     """Draw a history on a time axis of this span, ns, and today, where it lies within."""
-    _draw_limits(axes, history)
+    _draw_limits(axes, history, span)
     _draw_estimates(axes, history, span)
     _draw_refusals(axes, history)
     if history.set_baseline is not None and history.set_baseline.time >= span[0]:
@@ -117,8 +117,8 @@ def set_dates(
     axes.set_xlabel(f"time [UTC]; identified from {first} to {last}")
 
 
-def _draw_limits(axes: Axes, history: ValveHistory) -> None:
-    """Draw baseline and limits as they were in force at each identification."""
+def _draw_limits(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> None:
+    """Draw baseline and limits as they were in force at each identification, over the axis."""
     times = [entry.time for entry in history.entries]
     of = trended(history.entries[-1].baseline)
     levels = np.array(
@@ -129,14 +129,16 @@ def _draw_limits(axes: Axes, history: ValveHistory) -> None:
     )
     if np.isnan(levels).all():
         return
-    dates = _dates([*times, _end(history)])
-    axes.step(dates, [*levels, levels[-1]], where="post", color="0.4", lw=1.0, label="baseline")
+    dates = _dates([span[0], *times, span[1]])
+    axes.step(
+        dates, [levels[0], *levels, levels[-1]], where="post", color="0.4", lw=1.0, label="baseline"
+    )
     for name, colour in _LIMITS.items():
         ratios = np.array([getattr(entry.limits, name) for entry in history.entries])
         limit = ratios * levels
         axes.step(
             dates,
-            [*limit, limit[-1]],
+            [limit[0], *limit, limit[-1]],
             where="post",
             color=colour,
             ls="--",

@@ -11,6 +11,8 @@ __all__ = ["usage_figure"]
 
 _DAYS = 31
 """Last days that are drawn."""
+_FEWEST_DAYS = 7
+"""Days on the axis; around a single one matplotlib would show hours."""
 _COLOUR = "#0072B2"
 
 
@@ -33,6 +35,9 @@ def usage_figure(usage: ValveUsage) -> Figure:
     last = [one for one in usage.days if one.renewal == usage.renewal][-_DAYS:]
     dates = np.array([np.datetime64(int(one.day * DAY), "ns") for one in last], "datetime64[D]")
     days.bar(dates, [one.usage.distance for one in last], color=_COLOUR)
+    first = min(dates[0], dates[-1] - (_FEWEST_DAYS - 1))
+    half = np.timedelta64(12, "h")
+    days.set_xlim(first - half, dates[-1] + half)
     locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
     days.xaxis.set_major_locator(locator)
     days.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]

@@ -9,6 +9,7 @@ from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
+from valve_friction_ros.usage import DAY
 
 __all__ = ["AlarmRecording", "alarm_recordings", "keep_alarm_recording"]
 
@@ -44,14 +45,25 @@ class AlarmRecording:
         }
 
 
-def keep_alarm_recording(file: HistoryFile, valve: KeptValve, one: AlarmRecording) -> None:
-    """Keep that an alarm was recorded; raises HistoryError if it cannot be written."""
+def keep_alarm_recording(
+    file: HistoryFile, valve: KeptValve, one: AlarmRecording, days: float = 0.0
+) -> None:
+    """Keep that an alarm was recorded; delete those of its valve `days` older, none for 0.
+
+    Raises HistoryError if it cannot be written.
+    """
     with writing(file.path) as connection:
+        row = valve_id(connection, valve)
         connection.execute(
             "INSERT OR IGNORE INTO alarm_recording (valve_id, time_ns, level, path, message) "
             "VALUES (?, ?, ?, ?, ?)",
-            (valve_id(connection, valve), one.time, int(one.level), str(one.path), one.message),
+            (row, one.time, int(one.level), str(one.path), one.message),
         )
+        if days > 0:
+            connection.execute(
+                "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns < ?",
+                (row, one.time - round(days * DAY)),
+            )
 
 
 def alarm_recordings(file: HistoryFile, valve: str) -> tuple[AlarmRecording, ...]:

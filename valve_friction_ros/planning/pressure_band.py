@@ -9,7 +9,14 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.planning.conditions import Limits
 from valve_friction_ros.planning.friction_range import FrictionRange
 
-__all__ = ["LEAST_STROKE", "PressureBand", "frictionless_reach", "pressure_band", "stroke"]
+__all__ = [
+    "LEAST_STROKE",
+    "PressureBand",
+    "frictionless_reach",
+    "lowest_pressure",
+    "pressure_band",
+    "stroke",
+]
 
 LEAST_STROKE = 0.03
 """Share of the travel that the stem must move over: three times what an identification needs."""
@@ -62,11 +69,21 @@ def frictionless_reach(
     return low, high
 
 
+def lowest_pressure(valve: Valve) -> float:
+    """Return the lowest pressure that a converter can set, Pa: that of the atmosphere.
+
+    There the actuator exerts no force. It is the reference of the valve: 0 for a gauge sensor,
+    101325 Pa for one of absolute pressure.
+    """
+    return valve.pressure_reference
+
+
 def pressure_band(valve: Valve, frictions: FrictionRange, limits: Limits) -> PressureBand:
     """Return the widest band that keeps to the limits.
 
     At the upper end a rising stem rests at k·x = S_a·(P − P_ref) − F_0 − F_c. The smallest F_c of
-    the range must rest within the part of the travel, and no friction at all within the stops.
+    the range must rest within the part of the travel, and no friction at all within the stops. No
+    converter goes below the atmosphere.
 
     Raises
     ------
@@ -90,12 +107,29 @@ def pressure_band(valve: Valve, frictions: FrictionRange, limits: Limits) -> Pre
         low = max(low, valve.actuator_drive(constant * margin + preload))
         high = min(high, valve.actuator_drive(constant * (valve.travel - margin) + preload))
     pressures = PressureBand(
-        max(low, limits.pressure_minimum, valve.pressure_minimum),
+        max(low, _lowest(valve, limits)),
         min(high, limits.pressure_maximum, valve.pressure_maximum),
         min(limits.pressure_rate, limits.speed * constant / valve.diaphragm_area),
     )
+    if pressures.low >= pressures.high:
+        raise RefusalError(
+            f"the pressure limits leave no band: the stem needs {low / 1e3:.4g} to "
+            f"{high / 1e3:.4g} kPa between {100 * limits.lowest:g} and {100 * limits.highest:g} % "
+            f"of the travel, and {_lowest(valve, limits) / 1e3:.4g} kPa to "
+            f"{_highest(valve, limits)} may be set: widen the range of the pressure (the "
+            "atmosphere, pressure_reference, is its floor)"
+        )
     _require_strokes(valve, frictions, limits, pressures, (low, high))
     return pressures
+
+
+def _lowest(valve: Valve, limits: Limits) -> float:
+    return max(limits.pressure_minimum, valve.pressure_minimum, lowest_pressure(valve))
+
+
+def _highest(valve: Valve, limits: Limits) -> str:
+    highest = min(limits.pressure_maximum, valve.pressure_maximum)
+    return f"{highest / 1e3:.4g} kPa" if math.isfinite(highest) else "any pressure"
 
 
 def _require_strokes(
@@ -125,5 +159,5 @@ def _require_strokes(
     raise RefusalError(
         f"a reversal would not move the stem {where}: a friction of "
         f"{likely.static_friction:.4g} N needs {needed / 1e3:.4g} kPa to move the stem both "
-        f"ways, and there are {max(band.high - band.low, 0.0) / 1e3:.4g}: {remedy}"
+        f"ways, and there are {(band.high - band.low) / 1e3:.4g}: {remedy}"
     )

@@ -6,7 +6,12 @@ from collections.abc import Iterator
 from valve_friction_ros.identification import percentage
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
 from valve_friction_ros.planning.forecast import Forecast
-from valve_friction_ros.planning.pressure_band import LEAST_STROKE, frictionless_reach, stroke
+from valve_friction_ros.planning.pressure_band import (
+    LEAST_STROKE,
+    frictionless_reach,
+    lowest_pressure,
+    stroke,
+)
 from valve_friction_ros.planning.search import AIMS, StrokePlan
 
 __all__ = ["plan_remarks"]
@@ -36,6 +41,11 @@ def _resting(plan: StrokePlan) -> Iterator[str]:
 def _reaches(plan: StrokePlan) -> Iterator[str]:
     """Yield that the stem may leave its part of the travel."""
     valve, limits = plan.valve, plan.limits
+    if plan.band.low <= lowest_pressure(valve):
+        yield (
+            f"the lower end is the atmosphere, {plan.band.low / 1e3:.4g} kPa (pressure_reference): "
+            "the stem may not reach the lower end of its part of the travel"
+        )
     low, high = frictionless_reach(valve, plan.frictions, plan.band)
     if low < limits.lowest * valve.travel or high > limits.highest * valve.travel:
         yield (

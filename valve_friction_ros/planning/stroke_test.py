@@ -123,7 +123,8 @@ def _cycle_time(levels: tuple[float, ...], speed: float, hold: float, span_time:
 def stroke_test(pattern: Pattern, band: PressureBand, duration: float) -> StrokeTest | None:
     """Return the test of a pattern that lasts at most `duration` s; None if that is too short.
 
-    It begins and ends at rest in the middle of the band. Each of its kinds of cycles is there.
+    It begins and ends with a hold at the middle pressure of the band, where the stem rests on that
+    side of its middle from which it came. Each of its kinds of cycles is there.
     """
     span_time = (band.high - band.low) / band.rate
     ends = _BEFORE + 2 * (_MIDDLE * span_time + pattern.hold)

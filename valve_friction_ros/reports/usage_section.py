@@ -11,7 +11,8 @@ __all__ = ["usage_section"]
 
 _MEANING = (
     "A stroke counts where it is longer than the counting dead band, so noise counts nothing; a "
-    "breakaway is a start after a second of rest. Time that was not watched counts nowhere."
+    "breakaway is a start after a rest of a whole second of the stamps. Time that was "
+    "not watched counts nowhere."
 )
 
 
@@ -53,4 +54,6 @@ def _cells(usage: Usage, valve: Valve) -> dict[str, str]:
         "reversals": f"{usage.reversals}",
         "breakaways": f"{usage.breakaways}",
         "time watched [h]": f"{usage.time_watched / 3600e9:.4g}",
+        "time near 0 % of the travel [h]": f"{usage.time_near_seat() / 3600e9:.4g}",
+        "time near 100 % of the travel [h]": f"{usage.time_near_seat(True) / 3600e9:.4g}",
     }

@@ -1,7 +1,7 @@
 """Usage of a valve: distance, reversals, breakaways, time at each travel; no ROS."""
 
 from valve_friction_ros.usage.counter import DEFAULT_BAND, UsageCounter
-from valve_friction_ros.usage.limits import LimitState, UsageLimits, limit_states
+from valve_friction_ros.usage.limits import LimitState, UsageLimits, limit_states, warned_limits
 from valve_friction_ros.usage.usage import BINS, Usage
 from valve_friction_ros.usage.valve_usage import DAY, Pace, UsedDay, ValveUsage
 
@@ -17,4 +17,5 @@ __all__ = [
     "UsedDay",
     "ValveUsage",
     "limit_states",
+    "warned_limits",
 ]

@@ -7,13 +7,15 @@ from typing import NamedTuple
 
 from valve_friction_ros.model.checks import require_non_negative
 from valve_friction_ros.usage.usage import Usage
-from valve_friction_ros.usage.valve_usage import DAY, Pace
+from valve_friction_ros.usage.valve_usage import DAY, Pace, ValveUsage
 
-__all__ = ["LEAD", "LimitState", "UsageLimits", "limit_states"]
+__all__ = ["LEAD", "LimitState", "UsageLimits", "limit_states", "warned_limits"]
 
 LEAD = 30 * DAY
 """Time before the expected date from which a limit warns, ns. Chosen: a packing can be ordered and
 its renewal planned."""
+_DOUBT = 2 * DAY
+"""Time, ns, by which a date may have receded by the end of the day on which it warned."""
 _END_OF_TIME = 2**63 - 1
 
 
@@ -53,6 +55,8 @@ class LimitState(NamedTuple):
         the calendar.
     now : int
         Time of this state, ns.
+    has_warned : bool
+        Whether it has warned before: while a valve rests, the expected date recedes.
     """
 
     name: str
@@ -60,6 +64,7 @@ class LimitState(NamedTuple):
     limit: float
     expected: int | None
     now: int
+    has_warned: bool = False
 
     @property
     def is_reached(self) -> bool:
@@ -68,8 +73,12 @@ class LimitState(NamedTuple):
 
     @property
     def warns(self) -> bool:
-        """Whether the limit is reached, or expected within `LEAD`."""
-        return self.is_reached or (self.expected is not None and self.expected - self.now <= LEAD)
+        """Whether the limit is reached, expected within `LEAD`, or was so before."""
+        return self.is_reached or self.has_warned or self.is_expected_within(LEAD)
+
+    def is_expected_within(self, lead: int) -> bool:
+        """Return whether it is expected within a time, ns."""
+        return self.expected is not None and self.expected - self.now <= lead
 
     @property
     def message(self) -> str:
@@ -101,3 +110,19 @@ def limit_states(
             expected = round(date) if value < limit and date < _END_OF_TIME else None
             found.append(LimitState(name, value, limit, expected, now))
     return tuple(found)
+
+
+def warned_limits(usage: ValveUsage, limits: UsageLimits) -> set[str]:
+    """Return the names of the limits that have warned on a day of the packing in use.
+
+    A day tells its usage as a whole, so a limit that was to warn within two days counts too.
+    """
+    days = [one for one in usage.days if one.renewal == usage.renewal]
+    found: set[str] = set()
+    for count, last in enumerate(days, 1):
+        then = ValveUsage(tuple(days[:count]), usage.renewal)
+        states = limit_states(then.since_renewal, then.pace(), limits, (last.day + 1) * DAY)
+        found |= {
+            one.name for one in states if one.is_reached or one.is_expected_within(LEAD + _DOUBT)
+        }
+    return found

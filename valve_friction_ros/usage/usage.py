@@ -25,7 +25,7 @@ class Usage:
     reversals : int
         Changes of direction that were followed by a stroke beyond the counting dead band.
     breakaways : int
-        Starts of the stem after a rest (`Breakaways`).
+        Starts of the stem after a rest of a whole second of the stamps (`Breakaways`).
     histogram : tuple of int
         Time at each 5 % of the travel, ns, from position 0 upwards; the first and the last hold
         what lies beyond the stops, too.

@@ -75,12 +75,22 @@ def _words(usage: Usage) -> str:
     )
 
 
-def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
-    """Print a table of days a valve, and the sums and the pace below it."""
+def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool = False) -> None:
+    """Print a table of days a valve, and the sums and the pace below it.
+
+    Of chosen days the sum names the first and the last.
+    """
     console = plain_console()
     for valve, usage in valves:
         tag = f"{valve.tag} " if valve.tag else ""
-        names = ("travel [m]", "reversals", "breakaways", "watched [h]", "near 0 [h]")
+        names = (
+            "travel [m]",
+            "reversals",
+            "breakaways",
+            "watched [h]",
+            "near 0 % [h]",
+            "near 100 % [h]",
+        )
         table = Table(
             "day [UTC]",
             *names,
@@ -100,11 +110,16 @@ def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
                 str(one.usage.breakaways),
                 f"{one.usage.time_watched / _HOUR:.4g}",
                 f"{one.usage.time_near_seat() / _HOUR:.4g}",
+                f"{one.usage.time_near_seat(True) / _HOUR:.4g}",
                 _date(one.renewal) if one.renewal else "not known",
             )
         console.print(table)
-        for line in service_lines(usage, ()):
-            console.print(line)
+        if is_chosen:
+            first, last = (_date(usage.days[place].day * DAY) for place in (0, -1))
+            console.print(f"usage: {_words(usage.total)}, from {first} to {last}")
+        else:
+            for line in service_lines(usage, ()):
+                console.print(line)
         if (pace := usage.pace()) is not None:
             console.print(
                 f"pace of the last days: {pace.distance:.4g} m and {pace.reversals:.4g} reversals "

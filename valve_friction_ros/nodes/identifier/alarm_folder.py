@@ -3,7 +3,7 @@
 import re
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -14,8 +14,10 @@ __all__ = ["PAGE", "recording_name", "remove_oldest", "remove_recording", "size_
 PAGE = "report.html"
 """The page of the report, in the folder of the bag."""
 
-_CONTENT = re.compile(rf"metadata\.yaml|valve\.yaml|(\.\d+_)?{re.escape(PAGE)}|.+\.mcap")
-"""Files of a recording, and the draft of a page. A folder that holds any other file is left."""
+_DESCRIPTION = "metadata.yaml"
+"""The file that makes a folder a bag."""
+_BESIDE = re.compile(rf"valve\.yaml|(\.\d+_)?{re.escape(PAGE)}")
+"""Files beside the bag, and the draft of a page."""
 _STALE = 86_400.0
 """Age, s, from which an unfinished bag is what a killed node has left."""
 
@@ -32,9 +34,12 @@ def size_of(recording: Path) -> int:
 
 
 def remove_recording(recording: Path) -> None:
-    """Remove the files of a recording, and its folder if nothing else is in it."""
-    for one in recording.iterdir():
-        if _CONTENT.fullmatch(one.name):
+    """Remove the files of a recording, and its folder if nothing else is in it.
+
+    What makes it a recording goes last: a node killed meanwhile leaves one, to be removed later.
+    """
+    for one in sorted(recording.iterdir(), key=lambda one: one.name == _DESCRIPTION):
+        if _is_written(one):
             one.unlink()
     recording.rmdir()
 
@@ -44,22 +49,39 @@ def remove_oldest(
 ) -> None:
     """Remove the oldest recordings of a valve until few enough, and small enough, are left.
 
+    Of recordings of one level in a row the first goes last: it shows how the trouble began, the
+    others a level that flaps.
+
     Only folders by the name of such a recording count that hold the files of one and no others. The
     `new` one counts and stays. What a killed node has left of this valve goes after a day. Raises
     OSError if something cannot be removed.
     """
-    pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(?:WARN|ERROR)(?:_(\d+))?")
-    found: dict[Path, tuple[str, int]] = {}
+    pattern = re.compile(rf"alarm_{re.escape(valve)}_(\d{{8}}T\d{{6}}Z)_(WARN|ERROR)(?:_(\d+))?")
+    found: dict[Path, tuple[str, int, str]] = {}
     for place in _folders(folder):
         if (name := pattern.fullmatch(place.name)) and _is_recording(place):
-            found[place] = name[1], int(name[2] or 1)
+            found[place] = name[1], int(name[3] or 1), name[2]
         elif place.name.startswith(".saving_") and _is_left(place, pattern):
             shutil.rmtree(place)
-    oldest = sorted(found, key=lambda place: (place == new, found[place]))
+    oldest = _useless_first(found)
+    if new in oldest:
+        oldest.remove(new)
+        oldest.append(new)
     sizes = [size_of(place) for place in oldest]
     while oldest and oldest[0] != new and (len(oldest) > most or sum(sizes) > most_bytes):
         remove_recording(oldest.pop(0))
         sizes.pop(0)
+
+
+def _useless_first(found: Mapping[Path, tuple[str, int, str]]) -> list[Path]:
+    """Sort recordings by age, and put the first of each level in a row behind the others."""
+    firsts: list[Path] = []
+    others: list[Path] = []
+    before = ""
+    for place, (_, _, level) in sorted(found.items(), key=lambda item: item[1]):
+        (others if level == before else firsts).append(place)
+        before = level
+    return others + firsts
 
 
 def _folders(folder: Path) -> Iterator[Path]:
@@ -70,8 +92,16 @@ def _folders(folder: Path) -> Iterator[Path]:
 
 
 def _is_recording(place: Path) -> bool:
-    names = {one.name for one in place.iterdir()}
-    return "metadata.yaml" in names and all(map(_CONTENT.fullmatch, names))
+    """Return whether a folder holds a recording and nothing else, or nothing at all."""
+    files = list(place.iterdir())
+    is_bag = any(one.name == _DESCRIPTION for one in files)
+    return all(map(_is_written, files)) and (is_bag or not files)
+
+
+def _is_written(file: Path) -> bool:
+    """Return whether the node writes a file of this name into its folder."""
+    name, folder = file.name, re.sub(r"_\d+$", "", file.parent.name)  # without a second's number
+    return name in (_DESCRIPTION, f"{folder}.mcap") or _BESIDE.fullmatch(name) is not None
 
 
 def _is_left(workplace: Path, pattern: re.Pattern[str]) -> bool:

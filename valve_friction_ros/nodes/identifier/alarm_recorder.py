@@ -1,6 +1,8 @@
 """A bag, and the page of the report, of the time before and after a rise of the level."""
 
+import contextlib
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future
 from datetime import datetime, timezone
 from functools import partial
@@ -8,7 +10,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor, Level
@@ -23,6 +24,7 @@ from valve_friction_ros.nodes.identifier.alarm_folder import (
 )
 from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
 from valve_friction_ros.nodes.identifier.report_service import report_writer
 from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_FOLDER,
@@ -58,10 +60,10 @@ class _Rise(NamedTuple):
 class AlarmRecorder:
     """Saves the buffer from before and after a rise of the level, one at a time.
 
-    The level is that of what is found on the valve: silent inputs and a history that cannot be
-    written do not count. The level at the start is none that has risen. After a rise, others are
-    recorded for a pause only if they reach a higher level, so that a level that flaps fills no
-    disk. The worker writes; the executor's thread looks for the outcome once a second.
+    The level is that of what samples can show: silent inputs, a history that cannot be written and
+    the life of a packing do not count. The level at the start is none that has risen. After a rise,
+    others are recorded for a pause only if they reach a higher level, so that a level that flaps
+    fills no disk. The worker writes; the executor's thread looks for the outcome once a second.
     """
 
     def __init__(
@@ -82,13 +84,12 @@ class AlarmRecorder:
         self._latest = history.last_alarm()
         self._problem: str | None = None
 
-    def follow(self, status: DiagnosticStatus, names: StreamNames) -> None:
+    def follow(self, level: Level, message: str, names: StreamNames) -> None:
         """Follow what is found on the valve; begin and end recordings."""
-        level, before = Level(status.level[0]), self._level
-        self._level = level
+        before, self._level = self._level, level
         self._settle()
         if before is not None and level > before:
-            self._risen(level, status.message)
+            self._risen(level, message)
         is_writing = self._bag is not None or self._page is not None
         if self._rise is not None and not is_writing and self._is_over(self._rise):
             self._write_bag(self._rise, names)
@@ -186,24 +187,32 @@ class AlarmRecorder:
 
     def _settle(self) -> None:
         """Take the outcome of what was written, if it has ended."""
+        if self._page is not None and self._page.done():
+            page, self._page = self._page, None
+            with self._trouble_told("the page was not written"):
+                self._problem = page.result()
+        if self._bag is not None and self._bag.done():
+            bag, self._bag = self._bag, None
+            with self._trouble_told("the alarm was not recorded"):
+                self._saved(bag.result())
+
+    @contextlib.contextmanager
+    def _trouble_told(self, what: str) -> Iterator[None]:
         try:
-            with bugs_reported(self._node, known=self._problem):
-                if self._page is not None and self._page.done():
-                    page, self._page = self._page, None
-                    self._problem = page.result()
-                if self._bag is not None and self._bag.done():
-                    bag, self._bag = self._bag, None
-                    self._saved(bag.result())
+            with bugs_reported(self._node):
+                yield
         except (RefusalError, InternalError) as error:
-            self._problem = f"the alarm was not recorded: {error}"
+            self._problem = f"{what}: {error}"
             self._node.get_logger().warning(self._problem)
 
     def _saved(self, recording: AlarmRecording) -> None:
         self._latest, self._problem = recording, None
         self._node.get_logger().info(f"the alarm is recorded: {recording.path}")
-        valve = self._history.valve
-        self._history.keep_soon(partial(keep_alarm_recording, valve=valve, one=recording))
-        self._write_page(recording.path)
+        valve, days = self._history.valve, self._parameter(HISTORY_DAYS.name)
+        keep = partial(keep_alarm_recording, valve=valve, one=recording, days=days)
+        self._history.keep_soon(keep)
+        with self._trouble_told("the page was not written"):
+            self._write_page(recording.path)
 
 
 _EMPTY = Samples(np.empty(0, np.int64), np.empty(0))

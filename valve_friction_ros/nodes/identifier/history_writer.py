@@ -34,8 +34,8 @@ from valve_friction_ros.history import (
     entry_of,
     keep_told_level,
     read_moves,
-    read_told_level,
     read_reference,
+    read_told_level,
     read_usage,
     valve_histories,
 )

@@ -287,7 +287,8 @@ class Identifier(PolledNode):
         self._inputs.take()
         self._inputs.follow_publishers()
         now = self.get_clock().now()
-        findings = [finding for watch in self._watches for finding in watch.findings()]
+        found = {watch: watch.findings() for watch in self._watches}
+        findings = [finding for some in found.values() for finding in some]
         self._history.found_level = max((one.level for one in findings), default=Level.OK)
         estimate = estimate_status(
             self._monitor,
@@ -297,7 +298,10 @@ class Identifier(PolledNode):
             self._history.trend,
         )
         self._estimate_topic.publish(estimate)
-        self._alarm.follow(estimate, self._inputs.names)
+        del found[self._usage]  # the life of a packing, which no samples show
+        levels = [finding.level for some in found.values() for finding in some]
+        level = max([self._monitor.diagnosis().level, *levels])
+        self._alarm.follow(level, estimate.message, self._inputs.names)
         status = friction_status(
             estimate,
             self._monitor,

@@ -7,6 +7,7 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -95,7 +96,8 @@ class ResponseWatch:
         given = Samples(*(part[np.isfinite(given.values)] for part in given))
         travel, unit = float(self._value(TRAVEL)), self._value(COMMAND_UNIT.name)
         wrong = ""
-        metres, good = given.values, np.zeros(given.values.size, bool)
+        metres = given.values
+        good: NDArray[np.bool_] = np.zeros(metres.size, np.bool_)
         if not math.isfinite(travel):
             wrong = "the travel of the valve is not known: set travel"
         elif not good.size:

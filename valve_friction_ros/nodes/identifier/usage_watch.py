@@ -29,6 +29,7 @@ from valve_friction_ros.usage import (
     UsedDay,
     ValveUsage,
     limit_states,
+    warned_limits,
 )
 
 __all__ = ["UsageWatch"]
@@ -70,8 +71,11 @@ class UsageWatch:
         self._renewal = 0 if found is None else found.renewal
         self._total = self._since_renewal = Usage()
         self._pace: Pace | None = None
+        self._warned: set[tuple[int, str, float]] = set()
+        """Packing, name and value of the limits that have warned."""
         self.follow_parameters()
         self._add_up()
+        self._remember_warnings()
 
     def follow_parameters(self) -> None:
         """Count with the travel and the dead band in force."""
@@ -183,12 +187,27 @@ class UsageWatch:
         return self._monitor.settings.valve.travel
 
     def _states(self) -> tuple[LimitState, ...]:
-        limits = UsageLimits(
+        """Return how far the packing is from its limits; what has warned goes on warning."""
+        now = self._node.get_clock().now().nanoseconds
+        states = [
+            state._replace(has_warned=(self._renewal, state.name, state.limit) in self._warned)
+            for state in limit_states(self._since_renewal, self._pace, self._limits, now)
+        ]
+        self._warned = {(self._renewal, one.name, one.limit) for one in states if one.warns}
+        return tuple(states)
+
+    @property
+    def _limits(self) -> UsageLimits:
+        return UsageLimits(
             self._node.get_parameter(TRAVEL_LIMIT.name).value,
             self._node.get_parameter(REVERSAL_LIMIT.name).value,
         )
-        now = self._node.get_clock().now().nanoseconds
-        return limit_states(self._since_renewal, self._pace, limits, now)
+
+    def _remember_warnings(self) -> None:
+        """Find in earlier runs which limits have warned."""
+        warned, now = warned_limits(self.usage(), self._limits), self._renewal
+        states = limit_states(Usage(), None, self._limits, now)
+        self._warned |= {(now, one.name, one.limit) for one in states if one.name in warned}
 
     def _gather(self, is_end: bool = False) -> None:
         """Add what the counter has counted; at the end also what waits there."""
@@ -212,6 +231,7 @@ class UsageWatch:
             for renewal, day in [key for key in found if key[0] == 0]:
                 found[earlier.renewal, day] = found.pop((renewal, day))
         self._add_up()
+        self._remember_warnings()
 
     def _add_up(self) -> None:
         """Find the sums and the pace from the days."""
