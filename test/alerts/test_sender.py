@@ -92,7 +92,7 @@ def test_an_alert_arrives_once_and_signed(sender):
     assert abs(time_of_signature - time.time()) < PATIENCE
     assert headers["Authorization"] == "Bearer t0ken"
     assert headers["Content-Type"] == "application/json"
-    assert outbox.state() == (0, 1, 0, None, None)
+    assert outbox.state()[:5] == (0, 1, 0, None, None)
 
 
 def test_a_trusted_certificate(certificate, monkeypatch):
@@ -206,7 +206,7 @@ def test_what_a_server_misses_it_gets_when_it_is_back():
     assert ids[-1] == two.event_id
     assert ids.count(two.event_id) == 1
     assert ids[:-1].count(one.event_id) == len(ids) - 1 >= tried
-    assert outbox.state() == (0, 2, 0, None, None)
+    assert outbox.state()[:5] == (0, 2, 0, None, None)
     sender.close()
 
 
@@ -224,7 +224,7 @@ def test_tries_are_bounded_and_the_loss_is_told(sender):
         receiver.answer = answer_with(200)
         outbox.put(alert())
         wait_until(lambda: outbox.state().delivered)
-        assert outbox.state() == (0, 1, 1, None, None)
+        assert outbox.state()[:5] == (0, 1, 1, None, None)
 
 
 def test_the_queue_is_bounded_and_keeps_the_newest():

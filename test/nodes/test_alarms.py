@@ -32,7 +32,7 @@ USAGE = (  # of which a kill may cost the last minute
     "time_near_seat [s]",
     "travel_histogram [s]",
 )
-AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)$")
+AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)")
 
 
 @pytest.fixture
@@ -146,7 +146,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
         refused = client.trigger(service)
         assert not refused.success
         assert refused.message.startswith("the valve is in ERROR, which another baseline may hide")
-        assert "set baseline_in_alarm to true if its friction is healthy" in refused.message
+        assert "set baseline_in_alarm to true if the valve is healthy" in refused.message
     assert client.status_values()["friction_ratio"] != "1"
     assert len(history.baselines(VALVE.name)) == 1
 

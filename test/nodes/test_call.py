@@ -86,7 +86,7 @@ def test_refused_in_one_line(bench, arguments, line):
 
 
 def test_an_unknown_service_lists_the_known(bench):
-    code, out, err = bench[1]("/fv_101", "reset")
+    code, out, err = bench[1]("/fv_101", "xyz")
     assert (code, out) == (2, "")
     assert "identify" in err
     assert "clear" in err

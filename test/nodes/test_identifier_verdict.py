@@ -91,7 +91,7 @@ def test_limits_are_parameters_and_judge_at_once(client):
     client.identified(quick_record(HIGH_FRICTION))
     assert client.statuses[-1][1].level == ERROR
     for limits, level in (
-        ({"error_ratio": 8.0}, WARN),
+        ({"error_ratio": 8.0, "viscous_factor": 100.0}, WARN),
         ({"warn_ratio": 7.5}, OK),
         ({"warn_ratio": 1.1, "error_ratio": 1.2}, ERROR),
     ):

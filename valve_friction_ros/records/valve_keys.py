@@ -57,6 +57,15 @@ _IDENTIFIER_ONLY = (
     "alarm_recordings",
     "alarm_megabytes",
     "alarm_pause",
+    "spring_change",
+    "spring_failure",
+    "preload_change",
+    "slip_change",
+    "viscous_factor",
+    "asymmetry_change",
+    "stop_change",
+    "noise_factor",
+    "lag_change",
 )
 _OTHER_NODES = (
     "valves",

@@ -25,15 +25,19 @@ class Alerts:
     """Follows the diagnostics of a valve, posts each change of level, and says what went wrong.
 
     It begins with the level that the history says was told last: so a restart alone is no change,
-    and what waited when the process was killed is told. Without one it begins with the first
-    level. After a restart `webhook_period` goes by first, in which inputs come and levels settle.
+    and what waited when the process was killed is told. Without one it begins with `level`, that
+    of the valve at the start. After a restart `webhook_period` goes by first, in which inputs come
+    and levels settle.
     """
 
-    def __init__(self, node: Node, sender: AlertSender, history: HistoryWriter) -> None:
+    def __init__(
+        self, node: Node, sender: AlertSender, history: HistoryWriter, level: Level
+    ) -> None:
         self._node, self._history = node, history
         self._outbox = sender.outbox()
-        self._told = self._kept = history.told_level()
-        self._told_at = -math.inf if self._told is None else time.monotonic()
+        self._kept = history.told_level()
+        self._told = level if self._kept is None else self._kept
+        self._told_at = -math.inf if self._kept is None else time.monotonic()
 
     def follow(self, status: DiagnosticStatus, diagnosis: Diagnosis) -> None:
         """Post the level of a status if it has changed; then add to it what became of alerts.
@@ -47,9 +51,8 @@ class Alerts:
         if webhook is None:
             self._told, self._told_at = level, -math.inf
             return
-        if self._told is None:
-            self._told = level
-            self._keep(level)
+        if self._kept is None:
+            self._keep(self._told)
         now = time.monotonic()
         if level != self._told and now - self._told_at >= period:
             self._outbox.put(self._alert(status, self._told, level, diagnosis))

@@ -115,7 +115,6 @@ class Identifier(PolledNode):
             self._monitor.remember(earlier, self._history.known_numbers(earlier))
             results.publish(earlier, self._monitor)
         self._history.read_trend()
-        self._alerts = Alerts(self, workers.alerts, self._history)
         self._usage = UsageWatch(self, self._monitor, self._history)
         self._alarm = AlarmRecorder(self, self._monitor, self._history, self._usage, workers.files)
         self._watches: tuple[Watch, ...] = (
@@ -124,6 +123,9 @@ class Identifier(PolledNode):
             self._usage,
             ResponseWatch(self),
         )
+        found = [one.level for watch in self._watches for one in watch.findings()]
+        level = max([self._monitor.diagnosis().level, *found])
+        self._alerts = Alerts(self, workers.alerts, self._history, level)
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
