@@ -198,6 +198,8 @@ def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
             client.next_status()
             killed(live, node)
         live.start_identifier({**chosen, "reversal_limit": 20.0})
+        assert client.next_status().level == WARN  # and the client has met the new node
+        client.next_status()
         client.identified(HEALTHY)
         assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
         assert client.trigger("set_baseline").success
