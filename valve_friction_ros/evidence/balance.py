@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg, special
 
 from valve_friction_ros.evidence.moves import Moves
 
@@ -202,7 +202,7 @@ def balance_of(
     if spring_constant is None:
         spread = math.sqrt(float(np.average((moves.place - place) ** 2, weights=moves.distance)))
         systematic[SPRING, SPRING] += (_BENT * scale / max(spread, 1e-12)) ** 2
-    quantile = float(stats.t.ppf(0.975, max(count - 2, 2)))
+    quantile = float(special.stdtrit(max(count - 2, 2), 0.975))
     onsets = int(np.isfinite(moves.onset_force).sum())
     return Balance(values, scatter, systematic, quantile, speed, place, onsets, timing, lag)
 
