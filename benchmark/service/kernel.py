@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from benchmark.reality.plants import laws
 from benchmark.reality.plants.constants import ELEMENTS, Constants
+from benchmark.reality.plants.kernel import stem_pull
 from benchmark.reality.plants.laws import INNER, V, X
 from benchmark.reality.plants.parameters import Law
 
@@ -60,17 +61,6 @@ def new_state(loop: Loop, opening: float, travel: float) -> NDArray[np.float64]:
     return state
 
 
-@numba.njit(inline="always")
-def _pull(c: Constants, position: float, pressure: float) -> float:
-    place = position / c.travel
-    area = c.area * (1.0 + c.area_change * (place - 0.5))
-    load = c.preload + c.spring * position * (1.0 + 0.5 * c.spring_curve * (place - 1.0))
-    flow = 0.0
-    if c.flow_force != 0.0:
-        flow = c.flow_force * max(place, 0.0) ** c.flow_exponent
-    return area * (pressure - c.pressure_reference) - load - flow
-
-
 def _runner(advance: Callable[..., float], skips: bool) -> Callable[..., Any]:
     @numba.njit(nogil=True)
     def run(
@@ -105,7 +95,7 @@ def _runner(advance: Callable[..., float], skips: bool) -> Callable[..., Any]:
                     whole[_INTEGRAL] = min(max(integral, _LOWEST), _HIGHEST)
                     command = loop.gain * error + whole[_INTEGRAL]
                     whole[_COMMAND] = min(max(command, _LOWEST), _HIGHEST)
-                pull = _pull(c, stem[X], pressure)
+                pull = stem_pull(c, stem[X], pressure)
                 now = step
                 if skips and stem[V] == 0.0 and abs(pull) < limit:
                     now = max(min(_AT_REST, end - time, next_action - time), step)

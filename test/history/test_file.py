@@ -8,7 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from histories import DAY, OTHER, SECOND, START, VALVE, parameter, refused, success
+from histories import (
+    DAY,
+    OTHER,
+    SECOND,
+    START,
+    VALVE,
+    make_version_5,
+    parameter,
+    refused,
+    success,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -136,26 +146,6 @@ def test_records_go_with_their_baselines(history):
     assert select(history, "SELECT count(*) FROM baseline_record") == [(0,)]
 
 
-OF_VERSION_5 = {
-    "valve",
-    "settings",
-    "identification",
-    "parameter",
-    "baseline",
-    "baseline_record",
-}
-
-
-def make_version_5(history):
-    """Take away what version 6 knows: the valve in service."""
-    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
-    newer = {name for (name,) in tables} - OF_VERSION_5
-    connection = sqlite3.connect(history.path)
-    connection.executescript("".join(f"DROP TABLE {name};" for name in newer))
-    connection.execute("PRAGMA user_version = 5")
-    connection.close()
-
-
 def make_version_4(history):
     """Take away what version 5 knows of a baseline, who set it and what it replaced, and 6."""
     make_version_5(history)
@@ -165,9 +155,6 @@ def make_version_4(history):
     new = [one for one in columns if one.startswith("replaced_")] + ["set_by", "level", "withdrawn"]
     connection = sqlite3.connect(history.path)
     drop = "".join(f"ALTER TABLE baseline DROP COLUMN {name};" for name in new)
-    tables = select(history, "SELECT name FROM sqlite_master WHERE type = 'table'")
-    newer = {name for (name,) in tables} - OF_VERSION_5
-    drop += "".join(f"DROP TABLE {name};" for name in newer)
     connection.executescript(f"{drop} PRAGMA user_version = 4")
     connection.close()
 

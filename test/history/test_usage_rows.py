@@ -1,11 +1,10 @@
 """Usage and alarm recordings in the history: kept once, in all and since the renewal."""
 
-import re
 import sqlite3
 from pathlib import Path
 
 import pytest
-from histories import DAY, OTHER, START, VALVE, success
+from histories import DAY, OTHER, START, VALVE, make_version_5, success
 
 from valve_friction_ros.health import Level
 from valve_friction_ros.history import (
@@ -102,15 +101,6 @@ def test_old_alarm_recordings_are_forgotten(history):
     found = alarm_recordings(history, VALVE.name)
     assert [one.time for one in found] == [START + 2 * DAY, START + 3 * DAY]
     assert len(alarm_recordings(history, OTHER.name)) == 1
-
-
-def make_version_5(history):
-    connection = sqlite3.connect(history.path)
-    for table in re.findall(r"CREATE TABLE (\w+)", ";".join(schema._STEPS[5])):
-        connection.execute(f"DROP TABLE {table}")
-    connection.execute("PRAGMA user_version = 5")
-    connection.commit()
-    connection.close()
 
 
 def version(history):

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from live_nodes import NAMESPACE, Client, Domain, NodeProcess
 
+from valve_friction_ros.history import HistoryFile
+
 _HERE = Path(__file__).parent
 _PROFILE = _HERE / "fast_discovery.xml"
 
@@ -65,6 +67,13 @@ class Live:
         self.client.connect()
         return process
 
+    def kill(self, process):
+        """End a node by kill -9; what comes now is of the next one."""
+        self.client.watched.clear()
+        process.kill()
+        self.nodes.remove(process)
+        self.client.statuses.clear()
+
     def close(self):
         """Stop what still runs; every node must end well."""
         self.client.watched.clear()
@@ -98,3 +107,9 @@ def shared(tmp_path_factory):
     """A domain that the tests of a module share."""
     with _live(tmp_path_factory.mktemp("nodes")) as bench:
         yield bench
+
+
+@pytest.fixture
+def history(tmp_path):
+    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
+    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")

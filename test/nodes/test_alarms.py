@@ -11,7 +11,7 @@ from records import quick_record
 from std_msgs.msg import Float64
 
 from valve_friction_ros.health import Baseline, Level
-from valve_friction_ros.history import HistoryFile, KeptBaseline
+from valve_friction_ros.history import KeptBaseline
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 
@@ -35,20 +35,6 @@ USAGE = (  # of which a kill may cost the last minute
 AGE = re.compile(r" \(identified \d+ (s|min) ago, before the restart\)")
 
 
-@pytest.fixture
-def history(tmp_path):
-    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
-    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-
-
-def killed(live, node):
-    """End a node by kill -9; what comes now is of the next one."""
-    live.client.watched.clear()
-    node.kill()
-    live.nodes.remove(node)
-    live.client.statuses.clear()
-
-
 def test_an_alarm_outlives_a_kill(live):
     node = live.start_identifier(PATIENT)
     client = live.client
@@ -57,7 +43,7 @@ def test_an_alarm_outlives_a_kill(live):
     client.identified(TIGHT)
     before = client.statuses[-1][1]
     assert before.level == ERROR
-    killed(live, node)
+    live.kill(node)
 
     live.start_identifier(PATIENT)
     after = client.next_status()
@@ -155,7 +141,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert answer.success
     assert answer.message == f"baseline: {NEW}; before: {OLD}"
     assert client.next_status().level == OK
-    killed(live, node)
+    live.kill(node)
 
     live.start_identifier(PATIENT)  # by its default again
     assert client.next_status().level == OK
@@ -187,7 +173,7 @@ def test_the_first_baseline_can_be_undone(live):
     assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
     client.next_status(lambda one: "no baseline yet" in one.message, "no baseline")
     assert math.isnan(*client.parameters(NODE, "baseline_coulomb_friction"))
-    killed(live, node)
+    live.kill(node)
     live.start_identifier(PATIENT)
     assert "baseline_coulomb_friction [N]" not in client.status_values()
 

@@ -9,7 +9,7 @@ from webhook_server import Receiver, answer_never, answer_with, self_signed
 
 from valve_friction_ros.alerts import SIGNATURE, signature
 from valve_friction_ros.health import Baseline, Level
-from valve_friction_ros.history import HistoryFile, KeptValve, keep_usage, read_told_level
+from valve_friction_ros.history import KeptValve, keep_usage, read_told_level
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.usage import BINS, Usage, UsedDay
@@ -169,20 +169,6 @@ def test_an_address_that_cannot_be_used_is_refused_without_repeating_it(live):
     assert "s3cret" not in refused.reason
 
 
-@pytest.fixture
-def history(tmp_path):
-    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
-    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-
-
-def killed(live, node):
-    """End a node by kill -9; what comes now is of the next one."""
-    live.client.watched.clear()
-    node.kill()
-    live.nodes.remove(node)
-    live.client.statuses.clear()
-
-
 def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
     """A packing whose life is over, known from the history at each start; no level of friction."""
     used = UsedDay(20_000, 0, Usage(1.0, 50, 2, (10**9, *[0] * (BINS - 1))))
@@ -196,7 +182,7 @@ def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):
             assert client.next_status().level == WARN
             client.wait_until(lambda: read_told_level(history, NODE) == Level.WARN, "the level")
             client.next_status()
-            killed(live, node)
+            live.kill(node)
         live.start_identifier({**chosen, "reversal_limit": 20.0})
         assert client.next_status().level == WARN  # and the client has met the new node
         client.next_status()
@@ -222,12 +208,12 @@ def test_what_waited_at_a_kill_is_told_after_the_restart(live, history):
     client = live.client
     client.identified(TIGHT)
     client.next_status(lambda one: values_of(one).get("webhook waiting") == "1", "a waiting alert")
-    killed(live, node)
+    live.kill(node)
     with Receiver(port=port) as back:
         node = live.start_identifier(chosen)
         client.wait_until(lambda: back.requests, "the alert that waited")
         client.wait_until(lambda: read_told_level(history, NODE) == Level.ERROR, "the told level")
-        killed(live, node)
+        live.kill(node)
         live.start_identifier(chosen)
         client.next_status()
         client.next_status()

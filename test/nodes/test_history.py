@@ -21,12 +21,6 @@ RESULT = identify(RECORD, BENCH_VALVE)
 EXPECTED = as_kept(RESULT.parameters["coulomb_friction"])
 
 
-@pytest.fixture
-def history(tmp_path):
-    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
-    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-
-
 def logged(live, process, words):
     """Wait for lines of a node's log that hold these words."""
     lines = lambda: [line for line in process.errors.splitlines() if words in line]  # noqa: E731

@@ -2,25 +2,18 @@
 
 import math
 
-import pytest
 from builtin_interfaces.msg import Time
 from histories import as_kept
 from live_nodes import NAMESPACE, SECOND, START, stamp_of, values_of
 from records import quick_record
 from rosgraph_msgs.msg import Clock
 
-from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, Recording
 
 NODE = f"{NAMESPACE}/identifier"
 RECORD = quick_record()
 EXPECTED = as_kept(identify(RECORD, BENCH_VALVE).parameters["coulomb_friction"])
-
-
-@pytest.fixture
-def history(tmp_path):
-    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
 
 
 def skipped(words):

@@ -15,12 +15,6 @@ PERIOD = 10 * SECOND
 DISTANCE = "travelled_distance [m]"
 
 
-@pytest.fixture
-def history(tmp_path):
-    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
-    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-
-
 def strokes(count, samples=64):
     """Full strokes, a stroke in `samples` samples, and the stem ends where it began."""
     one = np.linspace(0.0, TRAVEL, samples, endpoint=False)
@@ -37,13 +31,6 @@ def shown(client, key, value):
     return client.status_values(
         lambda status: values_of(status).get(key) == value, f"{key} = {value}"
     )
-
-
-def killed(live, node):
-    live.client.watched.clear()
-    node.kill()
-    live.nodes.remove(node)
-    live.client.statuses.clear()
 
 
 def test_usage_is_shown_kept_and_goes_on(live, history):
@@ -69,7 +56,7 @@ def test_usage_is_shown_kept_and_goes_on(live, history):
     shown(client, "reversals", "19")
     client.wait_until(lambda: read_usage(history, NODE).total.reversals == 19, "the last rows")
     kept = read_usage(history, NODE)
-    killed(live, node)
+    live.kill(node)
     assert read_usage(history, NODE) == kept
 
     live.start_identifier()  # the same stamps once more are as good as new ones

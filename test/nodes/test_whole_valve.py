@@ -7,7 +7,6 @@ import pytest
 from live_nodes import NAMESPACE, values_of
 from records import quick_record, simulated
 
-from valve_friction_ros.history import HistoryFile
 from valve_friction_ros.model import LOW_FRICTION, SensorNoise
 
 NODE = f"{NAMESPACE}/identifier"
@@ -20,20 +19,6 @@ HARDLY = SensorNoise(1e-5, 100.0, 3).applied_to(
 )
 """Small strokes of the valve of the soft spring, which hardly show it."""
 CHANGE = "spring_constant change [%]"
-
-
-@pytest.fixture
-def history(tmp_path):
-    """The file that a node of this test keeps without being told; ROS_HOME is this folder."""
-    return HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
-
-
-def killed(live, node):
-    """End a node by kill -9; what comes now is of the next one."""
-    live.client.watched.clear()
-    node.kill()
-    live.nodes.remove(node)
-    live.client.statuses.clear()
 
 
 def test_a_spring_that_has_lost_a_third_of_its_stiffness_is_said_and_outlives_a_kill(live, history):
@@ -64,7 +49,7 @@ def test_a_spring_that_has_lost_a_third_of_its_stiffness_is_said_and_outlives_a_
     assert not refused.success
     assert "the spring constant has changed" in refused.message
 
-    killed(live, node)
+    live.kill(node)
     live.start_identifier()
     after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
     assert after.level == ERROR
@@ -84,7 +69,7 @@ def test_an_alarm_outlives_a_record_that_does_not_show_its_number_and_a_kill(liv
     status = client.statuses[-1][1]
     assert status.level == ERROR
     assert "no record since shows it)" in status.message
-    killed(live, node)
+    live.kill(node)
     live.start_identifier()
     after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
     assert after.level == ERROR
@@ -99,7 +84,7 @@ def test_a_restored_baseline_brings_all_its_numbers_back(live):
     client.identified(WEAK)
     assert client.trigger("set_baseline").success
     assert client.next_status(lambda one: one.level == OK, "another baseline")
-    killed(live, node)
+    live.kill(node)
 
     live.start_identifier({"baseline_in_alarm": True})
     assert client.next_status(lambda one: CHANGE in values_of(one), "the kept one").level == OK

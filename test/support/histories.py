@@ -1,6 +1,8 @@
 """Entries of a history, made up."""
 
 import math
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 
 from valve_friction_ros.health import (
@@ -90,3 +92,22 @@ def refused(time=START, reason="the stem does not move: move the valve", valve=V
             **changes,
         }
     )
+
+
+_OF_VERSION_5 = {
+    "valve",
+    "settings",
+    "identification",
+    "parameter",
+    "baseline",
+    "baseline_record",
+}
+
+
+def make_version_5(history):
+    """Take away what version 6 of the schema knows: the valve in service."""
+    with closing(sqlite3.connect(history.path)) as connection:
+        tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+        newer = {name for (name,) in tables} - _OF_VERSION_5
+        connection.executescript("".join(f"DROP TABLE {name};" for name in newer))
+        connection.execute("PRAGMA user_version = 5")

@@ -12,7 +12,7 @@ from benchmark.reality.plants.constants import ELEMENTS, Constants
 from benchmark.reality.plants.laws import INNER, SLIDING, V, X
 from benchmark.reality.plants.parameters import Law
 
-__all__ = ["GRID", "SUMS", "Loop", "runner_of"]
+__all__ = ["GRID", "SUMS", "Loop", "runner_of", "stem_pull"]
 
 GRID = 1e-4
 """Time between two points of the simulated signals, s."""
@@ -65,7 +65,7 @@ def _trend(place: float, change: float, bend: float) -> float:
 
 
 @numba.njit
-def _pull(c: Constants, position: float, pressure: float) -> float:
+def stem_pull(c: Constants, position: float, pressure: float) -> float:
     """Return the force of actuator, spring and medium on the stem, N."""
     place = position / c.travel
     area = c.area * (1.0 + c.area_change * (place - 0.5))
@@ -101,7 +101,7 @@ def _advancer(advance: Callable[..., float]) -> Callable[..., float]:
             scale = in_time
             if c.along_change != 0.0:
                 scale *= 1.0 + _trend(state[X] / c.travel, c.along_change, c.along_bend)
-            friction = advance(c, state, _pull(c, state[X], inside), scale, step)
+            friction = advance(c, state, stem_pull(c, state[X], inside), scale, step)
             after = state[X] + step * state[V]
             if after < c.lowest or after > c.highest:
                 after = min(max(after, c.lowest), c.highest)
@@ -201,7 +201,7 @@ def _balance(c: Constants, pressure: float) -> float:
     low, high = c.lowest, c.highest
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if _pull(c, middle, pressure) > 0.0:
+        if stem_pull(c, middle, pressure) > 0.0:
             low = middle
         else:
             high = middle
