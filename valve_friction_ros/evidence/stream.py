@@ -33,7 +33,7 @@ _FADING = 0.95
 and by."""
 
 _SIGNALS = (Kind.PRESSURE, Kind.POSITION)
-_NOTHING = Samples(np.empty(0, np.int64), np.empty(0, np.float64))
+_NOTHING = Samples.joined()
 
 
 class MoveStream:
@@ -82,7 +82,7 @@ class MoveStream:
             return ()
         self._held = 0
         self._due = newest + _EVERY
-        waiting = Arrivals(*(np.concatenate(part) for part in zip(*self._waiting, strict=True)))
+        waiting = Arrivals.joined(self._waiting)
         self._waiting = []
         if not self._extended(waiting):
             self.forget()
@@ -105,7 +105,7 @@ class MoveStream:
             return False
         for kind in _SIGNALS:
             new = arrivals.samples(kind)
-            raw = _joined(self._raw[kind], new)
+            raw = Samples.joined(self._raw[kind], new)
             kept = self._kept[kind].stamps
             last = kept[-1:] if kept.size else raw.stamps[:1] - 1
             pauses = np.diff(raw.stamps, prepend=last)
@@ -129,7 +129,7 @@ class MoveStream:
                 _means(raw.values[:whole], together),
             )
             self._raw[kind] = Samples(raw.stamps[whole:], raw.values[whole:])
-            self._kept[kind] = _joined(self._kept[kind], averaged)
+            self._kept[kind] = Samples.joined(self._kept[kind], averaged)
             if kind is Kind.POSITION:
                 self._look(averaged.values, together * period)
         return True
@@ -155,13 +155,6 @@ class MoveStream:
             first = max(int(np.searchsorted(kept.stamps, cut.settled)) - 1, 0)
             self._kept[kind] = Samples(kept.stamps[first:], kept.values[first:])
         return cut.moves
-
-
-def _joined(first: Samples, second: Samples) -> Samples:
-    return Samples(
-        np.concatenate((first.stamps, second.stamps)),
-        np.concatenate((first.values, second.values)),
-    )
 
 
 def _means(values: NDArray[np.int64] | NDArray[np.float64], together: int) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Sequence
-from datetime import datetime, timezone
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +13,7 @@ from valve_friction_ros.health import Baseline, friction_words
 from valve_friction_ros.history import FrictionPoint, Trend, ValveHistory, trended
 from valve_friction_ros.identification import SLIDING, Verdict, two_digits
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.streams import utc
 
 __all__ = ["draw_history", "drift_text", "entitle", "set_dates", "span_of_time"]
 
@@ -241,5 +241,5 @@ def drift_text(trend: Trend) -> str:
     text = f"{trend.drift:+.3g} ± {two_digits(trend.half_width)} N a month".replace("-", "−")
     if trend.crossing is None:
         return text
-    when = datetime.fromtimestamp(trend.crossing.time / 1e9, timezone.utc)
+    when = utc(trend.crossing.time)
     return f"{text}; {_NAMES[trend.crossing.limit.value]} expected {when:%Y-%m-%d}"

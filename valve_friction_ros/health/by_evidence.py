@@ -3,7 +3,6 @@
 import contextlib
 import math
 from dataclasses import dataclass
-from datetime import datetime, timezone
 
 from valve_friction_ros.evidence import Evidence
 from valve_friction_ros.health.baseline import LARGEST_SHARE, Baseline, SlidingFriction
@@ -13,6 +12,7 @@ from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING, RefusalError
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams import utc
 
 __all__ = [
     "Reference",
@@ -157,4 +157,4 @@ def _effect(evidence: Evidence, valve: Valve) -> str:
 
 
 def _date(time: int) -> str:
-    return f"{datetime.fromtimestamp(time / 1e9, timezone.utc):%Y-%m-%d %H:%M} UTC"
+    return f"{utc(time):%Y-%m-%d %H:%M} UTC"

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timezone
 from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
@@ -11,6 +10,7 @@ from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams import utc
 
 __all__ = ["DatedNumber", "KnownNumbers"]
 
@@ -99,7 +99,7 @@ class KnownNumbers:
         times = {self.dated[name].time for name in finding.numbers if name in self.dated}
         if not times - {self.latest}:
             return finding
-        date = datetime.fromtimestamp(min(times) / 1e9, timezone.utc)
+        date = utc(min(times))
         message = (
             f"{finding.message} (measured {date:%Y-%m-%d %H:%M} UTC; no record since shows it)"
         )

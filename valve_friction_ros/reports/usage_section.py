@@ -1,10 +1,9 @@
 """The section of a report on what the valve has done."""
 
-from datetime import datetime, timezone
-
 from valve_friction_ros.figures.usage_figure import usage_figure
 from valve_friction_ros.model import Valve
 from valve_friction_ros.reports.page import Column, Paragraph, Picture, Section, Table
+from valve_friction_ros.streams import utc
 from valve_friction_ros.usage import Usage, ValveUsage
 
 __all__ = ["usage_section"]
@@ -26,7 +25,7 @@ def usage_section(usage: ValveUsage, valve: Valve) -> Section | None:
         return None
     since = "since the first sample"
     if usage.renewal:
-        date = datetime.fromtimestamp(usage.renewal / 1e9, timezone.utc)
+        date = utc(usage.renewal)
         since = f"since the packing was renewed, {date:%Y-%m-%d}"
     columns = (Column("usage"), Column(since, is_number=True), Column("in all", is_number=True))
     old, new = _cells(used, valve), _cells(everything, valve)

@@ -1,7 +1,7 @@
 """Samples of both signals in the order in which they came."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -48,6 +48,12 @@ class Arrivals(NamedTuple):
     kinds: NDArray[np.uint8]
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]
+
+    @classmethod
+    def joined(cls, parts: "Iterable[Arrivals]") -> "Arrivals":
+        """Join what arrived one after the other; none are an empty one."""
+        nothing = cls(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0))
+        return cls(*map(np.concatenate, zip(nothing, *parts, strict=True)))
 
     def samples(self, kind: Kind) -> Samples:
         """Return the samples of one kind."""

@@ -25,6 +25,14 @@ class Samples(NamedTuple):
     stamps: NDArray[np.int64]
     values: NDArray[np.float64]
 
+    @classmethod
+    def joined(cls, *parts: "Samples") -> "Samples":
+        """Join parts that follow each other; none are an empty one."""
+        return cls(
+            np.concatenate([np.empty(0, np.int64), *(part.stamps for part in parts)]),
+            np.concatenate([np.empty(0), *(part.values for part in parts)]),
+        )
+
 
 class _Chunk(NamedTuple):
     """Consecutive samples, their stamps as offsets (ns) from the first."""

@@ -91,7 +91,7 @@ class UsageCounter:
             self._count_whole_blocks()
 
     def _count_whole_blocks(self) -> None:
-        stamps, position = (np.concatenate(part) for part in zip(*self._waiting, strict=True))
+        stamps, position = Samples.joined(*self._waiting)
         while stamps.size >= _BLOCK:
             ends = stamps[_BLOCK - 1 : _LARGEST_BLOCK] - stamps[0] >= _SECOND
             place = int(ends.argmax())
@@ -106,7 +106,7 @@ class UsageCounter:
     def flush(self) -> None:
         """Count what waits for a whole block, at the end of a stream."""
         if self._count:
-            stamps, position = (np.concatenate(part) for part in zip(*self._waiting, strict=True))
+            stamps, position = Samples.joined(*self._waiting)
             self._count_block(stamps, position)
         self._waiting, self._count = [], 0
 

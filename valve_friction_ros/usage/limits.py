@@ -2,10 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from typing import NamedTuple
 
 from valve_friction_ros.model.checks import require_non_negative
+from valve_friction_ros.streams import utc
 from valve_friction_ros.usage.usage import Usage
 from valve_friction_ros.usage.valve_usage import DAY, Pace, ValveUsage
 
@@ -90,7 +90,7 @@ class LimitState(NamedTuple):
         )
         state = f"of {self.limit:.6g} ({self.name}): reached"
         if not self.is_reached and self.expected is not None:
-            day = datetime.fromtimestamp(self.expected / 1e9, timezone.utc)
+            day = utc(self.expected)
             state = f"of {self.limit:.6g} ({self.name}), expected on {day:%Y-%m-%d}"
         return f"packing life: {figures} {state}: renew the packing, then call ~/reset_usage"
 

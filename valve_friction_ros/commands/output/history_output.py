@@ -4,11 +4,8 @@ import csv
 import io
 import re
 from collections.abc import Sequence
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
-
-from rich.table import Table
 
 from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.commands.output.usage_output import (
@@ -16,6 +13,7 @@ from valve_friction_ros.commands.output.usage_output import (
     service_lines,
     usage_as_json,
 )
+from valve_friction_ros.commands.output.valve_table import valve_table
 from valve_friction_ros.history import HistoryEntry, KeptBaseline, Trend, ValveHistory
 from valve_friction_ros.identification import (
     parameter_cells,
@@ -24,15 +22,16 @@ from valve_friction_ros.identification import (
     plain,
     two_digits,
 )
-from valve_friction_ros.outside_text import harmless, printable
+from valve_friction_ros.outside_text import harmless
 from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.streams import utc
 
 __all__ = ["as_json", "print_table", "write_csv"]
 
 
 def time_text(time: float, timespec: str = "milliseconds") -> str:
     """Write a time in ns since 1970 by ISO 8601, in UTC."""
-    when = datetime.fromtimestamp(time / 1e9, timezone.utc)
+    when = utc(time)
     return when.isoformat(timespec=timespec).replace("+00:00", "Z")
 
 
@@ -169,8 +168,8 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
     """Print a table a valve, with its baselines, and the trend below it."""
     console = plain_console()
     for history in histories:
-        tag = f"{history.valve.tag} " if history.valve.tag else ""
-        table = Table(
+        table = valve_table(
+            history.valve,
             "time [UTC]",
             "F_c [N]",
             "± 95 %",
@@ -178,10 +177,6 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
             "ratio",
             "level",
             "diagnosis",
-            box=None,
-            header_style="bold",
-            title=printable(f"{tag}{history.valve.name}"),
-            title_justify="left",
         )
         for column in (1, 2, 4):
             table.columns[column].justify = "right"

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
 from valve_friction_ros.commands.output.formatting import plain_console
+from valve_friction_ros.commands.output.valve_table import valve_table
 from valve_friction_ros.history import AlarmRecording, KeptValve
 from valve_friction_ros.outside_text import harmless, printable
 from valve_friction_ros.records.whole_file import write_whole
@@ -82,23 +81,16 @@ def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool 
     """
     console = plain_console()
     for valve, usage in valves:
-        tag = f"{valve.tag} " if valve.tag else ""
-        names = (
+        table = valve_table(
+            valve,
+            "day [UTC]",
             "travel [m]",
             "reversals",
             "breakaways",
             "watched [h]",
             "near 0 % [h]",
             "near 100 % [h]",
-        )
-        table = Table(
-            "day [UTC]",
-            *names,
             "packing of",
-            box=None,
-            header_style="bold",
-            title=printable(f"{tag}{valve.name}"),
-            title_justify="left",
         )
         for column in table.columns[1:-1]:
             column.justify = "right"

@@ -4,10 +4,10 @@ import re
 import shutil
 import time
 from collections.abc import Iterator, Mapping
-from datetime import datetime, timezone
 from pathlib import Path
 
 from valve_friction_ros.health import Level
+from valve_friction_ros.streams import utc
 
 __all__ = ["PAGE", "recording_name", "remove_oldest", "remove_recording", "size_of"]
 
@@ -24,7 +24,7 @@ _STALE = 86_400.0
 
 def recording_name(valve: str, stamp: int, level: Level) -> str:
     """Name the recording of a valve whose level has risen at a time, ns."""
-    date = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
+    date = utc(stamp)
     return f"alarm_{valve}_{date:%Y%m%dT%H%M%SZ}_{level.name}"
 
 

@@ -4,7 +4,6 @@ import contextlib
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
-from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -38,7 +37,7 @@ from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_rep
 from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.streams import Samples, Snapshot, nanoseconds
+from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc
 
 __all__ = ["AlarmRecorder"]
 
@@ -78,7 +77,7 @@ class AlarmRecorder:
         self._usage, self._worker = usage, worker
         self._level: Level | None = None
         self._rise: _Rise | None = None
-        self._last_rise: _Rise | None = None
+        self._last_rise: tuple[Level, float] | None = None
         self._bag: Future[AlarmRecording] | None = None
         self._page: Future[str | None] | None = None
         self._latest = history.last_alarm()
@@ -99,7 +98,7 @@ class AlarmRecorder:
         """Return the latest recording, and what hindered one since."""
         values: dict[str, str] = {}
         if self._latest is not None:
-            risen = datetime.fromtimestamp(self._latest.time / 1e9, timezone.utc)
+            risen = utc(self._latest.time)
             values["alarm_recording"] = str(self._latest.path)
             values["alarm_recording [time]"] = f"{risen:%Y-%m-%dT%H:%M:%SZ}"
             values["alarm_recording level"] = self._latest.level.name
@@ -117,14 +116,14 @@ class AlarmRecorder:
         if self._rise is not None:
             level = max(level, self._rise.level)
             self._rise = self._rise._replace(level=level, message=message)
-            self._last_rise = self._rise._replace(before=_NOTHING)
+            self._last_rise = level, self._rise.clock
             return
         pause = self._parameter(ALARM_PAUSE.name)
-        if last is not None and now - last.clock < pause and level <= last.level:
+        if last is not None and now - last[1] < pause and level <= last[0]:
             return
         buffer, stamp = self._monitor.buffer, self._node.get_clock().now().nanoseconds
         self._rise = _Rise(level, stamp, message, buffer.snapshot(), buffer.newest_stamp, now)
-        self._last_rise = self._rise._replace(before=_NOTHING)
+        self._last_rise = level, now
 
     def _is_over(self, rise: _Rise) -> bool:
         """Whether the time after a rise is over: by the stamps, or else by the machine's clock."""
@@ -215,10 +214,6 @@ class AlarmRecorder:
             self._write_page(recording.path)
 
 
-_EMPTY = Samples(np.empty(0, np.int64), np.empty(0))
-_NOTHING = Snapshot(_EMPTY, _EMPTY, (), None)
-
-
 def _joined(before: Snapshot, after: Snapshot) -> Snapshot:
     """Join two copies of a buffer; what came after a jump back of the clock is left out."""
     return after._replace(
@@ -232,7 +227,4 @@ def _following(before: Samples, after: Samples) -> Samples:
     if not before.stamps.size:
         return after
     new = slice(int(np.searchsorted(after.stamps, before.stamps[-1], side="right")), None)
-    return Samples(
-        np.concatenate((before.stamps, after.stamps[new])),
-        np.concatenate((before.values, after.values[new])),
-    )
+    return Samples.joined(before, Samples(after.stamps[new], after.values[new]))

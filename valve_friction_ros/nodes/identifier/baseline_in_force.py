@@ -3,7 +3,6 @@
 import contextlib
 import math
 from collections.abc import Iterable
-from datetime import datetime, timezone
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -19,6 +18,7 @@ from valve_friction_ros.nodes.identifier.parameters import (
     baseline_from,
 )
 from valve_friction_ros.nodes.plumbing.parameters import values_of
+from valve_friction_ros.streams import utc
 
 __all__ = ["BaselineInForce"]
 
@@ -30,7 +30,7 @@ def _value(baseline: Baseline | None) -> float | None:
 
 
 def _described_with_date(kept: KeptBaseline) -> str:
-    date = datetime.fromtimestamp(kept.time / 1e9, timezone.utc)
+    date = utc(kept.time)
     return f"baseline {kept.baseline}, set {date:%Y-%m-%d %H:%M} UTC"
 
 

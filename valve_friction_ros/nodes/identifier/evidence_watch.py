@@ -4,7 +4,6 @@ import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from datetime import datetime, timezone
 
 from rclpy.node import Node
 
@@ -24,9 +23,10 @@ from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
+from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.worker import Worker
-from valve_friction_ros.streams import Arrivals
+from valve_friction_ros.streams import Arrivals, utc
 
 __all__ = ["EvidenceWatch"]
 
@@ -37,11 +37,7 @@ _SHOWN = ("sliding_friction", "static_friction", "spring_constant", "spring_prel
 
 
 def _date(stamp: int) -> str:
-    return f"{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y-%m-%dT%H:%M:%SZ}"
-
-
-def _number(value: float) -> str:
-    return f"{value:.9g}"
+    return f"{utc(stamp):%Y-%m-%dT%H:%M:%SZ}"
 
 
 class EvidenceWatch:
@@ -116,7 +112,6 @@ class EvidenceWatch:
 
     def values(self) -> Mapping[str, str]:
         """Return what the moves say, with intervals, or why they do not."""
-        self._history.settle()
         self._settle()
         self._ledger.keep()
         found = self._evidence
@@ -133,22 +128,18 @@ class EvidenceWatch:
             if reason := why_not_compared(found, self._monitor.baseline):
                 values["evidence reason"] = reason
         if (reference := self._ledger.reference) is not None:
-            values["evidence reference [N]"] = _number(reference.sliding.value)
-            values["evidence reference half width [N]"] = _number(reference.sliding.half_width)
+            values["evidence reference [N]"] = number_text(reference.sliding.value)
+            values["evidence reference half width [N]"] = number_text(reference.sliding.half_width)
             values["evidence reference [time]"] = _date(reference.time)
         if (change := found.change) is not None:
-            values["evidence change_ratio"] = _number(change.ratio)
-            values["evidence change_ratio low"] = _number(change.low)
-            values["evidence change_ratio high"] = _number(change.high)
+            values["evidence change_ratio"] = number_text(change.ratio)
+            values["evidence change_ratio low"] = number_text(change.low)
+            values["evidence change_ratio high"] = number_text(change.high)
             values["evidence change earliest [time]"] = _date(change.earliest)
             values["evidence change latest [time]"] = _date(change.latest)
         diagnosis = self._diagnosis()
-        if diagnosis is not None and (ratio := diagnosis.ratio) is not None:
-            values["evidence friction_ratio"] = _number(ratio.value)
-            values["evidence friction_ratio low"] = _number(ratio.low)
-            values["evidence friction_ratio high"] = _number(ratio.high)
-            values["evidence friction_ratio of"] = ratio.what
-        return values
+        ratio = None if diagnosis is None else diagnosis.ratio
+        return values | ratio_values(ratio, "evidence ")
 
     def close(self) -> None:
         """Write what is not written yet; the writer's thread finishes it."""
@@ -158,17 +149,17 @@ class EvidenceWatch:
         values = {}
         for name in _SHOWN:
             one = self._evidence.parameters[name]
-            values[f"evidence {name} [{one.unit}]"] = _number(one.value)
-            values[f"evidence {name} half width [{one.unit}]"] = _number(one.half_width)
+            values[f"evidence {name} [{one.unit}]"] = number_text(one.value)
+            values[f"evidence {name} half width [{one.unit}]"] = number_text(one.half_width)
             values[f"evidence {name} verdict"] = one.verdict.value
             if one.reason:
                 values[f"evidence {name} reason"] = one.reason
-        values["evidence sliding_speed [m/s]"] = _number(self._evidence.sliding_speed)
+        values["evidence sliding_speed [m/s]"] = number_text(self._evidence.sliding_speed)
         band = self._evidence.parameters["dead_band"]
         travel = self._monitor.settings.valve.travel
         scale, unit = (100 / travel, "%") if math.isfinite(travel) else (1e3, "mm")
-        values[f"evidence dead_band [{unit}]"] = _number(scale * band.value)
-        values[f"evidence dead_band half width [{unit}]"] = _number(scale * band.half_width)
+        values[f"evidence dead_band [{unit}]"] = number_text(scale * band.value)
+        values[f"evidence dead_band half width [{unit}]"] = number_text(scale * band.half_width)
         if band.reason:
             values["evidence dead_band reason"] = band.reason
         return values

@@ -1,7 +1,7 @@
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -10,7 +10,7 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import FrictionMonitor, Level, by_severity
+from valve_friction_ros.health import Finding, FrictionMonitor, Level, by_severity
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
@@ -107,8 +107,7 @@ class Identifier(PolledNode):
         self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
         self._history = HistoryWriter(self, self._monitor, tag)
         earlier = self._history.prepare()
-        evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
-        self._evidence = evidence
+        self._evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
         self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
         self._baseline.begin()
         if earlier is not None:
@@ -123,8 +122,7 @@ class Identifier(PolledNode):
             self._usage,
             ResponseWatch(self),
         )
-        found = [one.level for watch in self._watches for one in watch.findings()]
-        level = max([self._monitor.diagnosis().level, *found])
+        level = self._worst(one for watch in self._watches for one in watch.findings())
         self._alerts = Alerts(self, workers.alerts, self._history, level)
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
@@ -285,10 +283,15 @@ class Identifier(PolledNode):
             return ["no time on /clock, though use_sim_time is set: play a clock, or unset it"]
         return self._inputs.problems(self.get_parameter(INPUT_TIMEOUT.name).value)
 
+    def _worst(self, findings: Iterable[Finding]) -> Level:
+        """Return the most severe level of the diagnosis of friction and of what else is found."""
+        return max([self._monitor.diagnosis().level, *(one.level for one in findings)])
+
     def _publish_diagnostics(self) -> None:
         self._inputs.take()
         self._inputs.follow_publishers()
         now = self.get_clock().now()
+        self._history.settle()
         found = {watch: watch.findings() for watch in self._watches}
         findings = [finding for some in found.values() for finding in some]
         self._history.found_level = max((one.level for one in findings), default=Level.OK)
@@ -301,8 +304,7 @@ class Identifier(PolledNode):
         )
         self._estimate_topic.publish(estimate)
         del found[self._usage]  # the life of a packing, which no samples show
-        levels = [finding.level for some in found.values() for finding in some]
-        level = max([self._monitor.diagnosis().level, *levels])
+        level = self._worst(finding for some in found.values() for finding in some)
         self._alarm.follow(level, estimate.message, self._inputs.names)
         status = friction_status(
             estimate,

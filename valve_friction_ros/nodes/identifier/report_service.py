@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from datetime import datetime, timezone
 from itertools import count
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+from valve_friction_ros.streams import utc
 from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["report_writer", "written_report"]
@@ -55,7 +55,7 @@ def report_writer(
     result, stamp, refusal = monitor.result, monitor.stamp, monitor.refusal
     if result is None or stamp is None:
         raise RefusalError("the valve has no result to report: identify it first")
-    time = datetime.fromtimestamp(stamp / 1e9, timezone.utc)
+    time = utc(stamp)
     title, node_name = history.valve.tag or node.get_name(), node.get_fully_qualified_name()
     baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
     valve_limits, known = monitor.settings.valve_limits, monitor.known

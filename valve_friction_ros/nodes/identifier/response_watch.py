@@ -39,9 +39,6 @@ _EVERY = 0.5
 _MOST_WAITING = 20_000
 """Samples that are taken at once at most, whatever their stamps."""
 
-_NO_COMMAND = Samples(np.empty(0, np.int64), np.empty(0))
-_NOTHING_ARRIVED = Arrivals(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0))
-
 
 class ResponseWatch:
     """Follows ``stem_command``; without one it says nothing and keeps nothing."""
@@ -128,10 +125,8 @@ class ResponseWatch:
             return
         if self._monitor is None or travel != self._travel:
             self._monitor, self._travel = ResponseMonitor(travel), travel
-        parts = zip(*(self._commands or [_NO_COMMAND]), strict=True)
-        command = Samples(*(np.concatenate(part) for part in parts))
-        parts = zip(*(self._arrivals or [_NOTHING_ARRIVED]), strict=True)
-        arrived = Arrivals(*map(np.concatenate, parts))
+        command = Samples.joined(*self._commands)
+        arrived = Arrivals.joined(self._arrivals)
         self._drop()
         self._monitor.take(command, arrived)
         if command.stamps.size:

@@ -17,6 +17,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING
+from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
 from valve_friction_ros.streams import utc
 
 __all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
@@ -25,36 +26,32 @@ __all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
 _EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
 
 
-def _number(value: float | None) -> str:
-    return f"{math.nan if value is None else value:.9g}"
-
-
 def _result_values(shown: Mapping[str, Any], dead_band_share: float) -> dict[str, str]:
     """Return what the diagnostic shows of a result, or of what is kept of one, as `to_dict`."""
     values: dict[str, str] = {}
     for name, parameter in shown["parameters"].items():
         unit = parameter["unit"]
-        values[f"{name} [{unit}]"] = _number(parameter["value"])
-        values[f"{name} half width [{unit}]"] = _number(parameter["half_width"])
+        values[f"{name} [{unit}]"] = number_text(parameter["value"])
+        values[f"{name} half width [{unit}]"] = number_text(parameter["half_width"])
         values[f"{name} verdict"] = parameter["verdict"]
         if parameter["reason"]:
             values[f"{name} reason"] = parameter["reason"]
         if parameter["published"] is not None:
-            values[f"{name} published [{unit}]"] = _number(parameter["published"])
-    values["sliding_speed [m/s]"] = _number(shown["sliding_speed"])
+            values[f"{name} published [{unit}]"] = number_text(parameter["published"])
+    values["sliding_speed [m/s]"] = number_text(shown["sliding_speed"])
     if math.isfinite(dead_band_share):
-        values["dead_band [%]"] = _number(100 * dead_band_share)
+        values["dead_band [%]"] = number_text(100 * dead_band_share)
     if shown["rms"] is not None:
-        values["fit [%]"] = _number(100 * shown["fit"])
-        values["rms [µm]"] = _number(1e6 * shown["rms"])
+        values["fit [%]"] = number_text(100 * shown["fit"])
+        values["rms [µm]"] = number_text(1e6 * shown["rms"])
     if shown["systematic_misfit"] is not None:
-        values["systematic misfit [µm]"] = _number(1e6 * shown["systematic_misfit"])
+        values["systematic misfit [µm]"] = number_text(1e6 * shown["systematic_misfit"])
     values["method"] = shown["method"]
     if shown.get("derivative_window"):
         values["derivative_window [samples]"] = str(shown["derivative_window"])
     for name, unit in _EVIDENCE_UNITS.items():
         if name in shown.get("evidence", {}):
-            values[name + unit] = _number(shown["evidence"][name])
+            values[name + unit] = number_text(shown["evidence"][name])
     settings = shown["settings"]
     values["fixed"] = ", ".join(settings.get("identification", settings).get("fixed", ()))
     values["warnings"] = "; ".join(shown["warnings"])
@@ -66,12 +63,12 @@ def _baseline_values(baseline: Baseline | None) -> dict[str, str]:
     if baseline is None:
         return values
     if baseline.coulomb_friction is not None:
-        values["baseline_coulomb_friction [N]"] = _number(baseline.coulomb_friction)
-        values["baseline half width [N]"] = _number(baseline.half_width)
+        values["baseline_coulomb_friction [N]"] = number_text(baseline.coulomb_friction)
+        values["baseline half width [N]"] = number_text(baseline.half_width)
     if (sliding := baseline.sliding) is not None:
-        values["baseline_sliding_friction [N]"] = _number(sliding.value)
-        values["baseline_sliding_friction half width [N]"] = _number(sliding.half_width)
-        values["baseline_sliding_friction speed [m/s]"] = _number(sliding.speed)
+        values["baseline_sliding_friction [N]"] = number_text(sliding.value)
+        values["baseline_sliding_friction half width [N]"] = number_text(sliding.half_width)
+        values["baseline_sliding_friction speed [m/s]"] = number_text(sliding.speed)
     return values
 
 
@@ -89,8 +86,8 @@ def trend_values(trend: Trend | None) -> dict[str, str]:
     if trend is None or not trend.is_significant:
         return {}
     values = {
-        "friction_drift [N/month]": _number(trend.drift),
-        "friction_drift half width [N/month]": _number(trend.half_width),
+        "friction_drift [N/month]": number_text(trend.drift),
+        "friction_drift half width [N/month]": number_text(trend.half_width),
         "friction_drift of": trend.what,
     }
     if trend.crossing is not None:
@@ -135,11 +132,7 @@ def estimate_status(
         share = dead_band(estimate, monitor.settings.valve)
         values |= _result_values(estimate.to_dict(), share)
     values |= _baseline_values(monitor.baseline)
-    if (ratio := diagnosis.ratio) is not None:
-        values["friction_ratio"] = _number(ratio.value)
-        values["friction_ratio low"] = _number(ratio.low)
-        values["friction_ratio high"] = _number(ratio.high)
-        values["friction_ratio of"] = ratio.what
+    values |= ratio_values(diagnosis.ratio)
     values |= trend_values(trend)
     message = "; ".join([diagnosis.message, *(one.message for one in findings)])
     return _status(level, name, hardware_id, message, values)
@@ -169,8 +162,10 @@ def friction_status(
         values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
     values |= more
     values["buffered_samples"] = str(len(monitor.buffer))
-    known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message
-    message = aged + estimate.message.removeprefix(known)
+    message = estimate.message
+    if monitor.earlier is not None:
+        known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message
+        message = aged + message.removeprefix(known)
     message = "; ".join([*input_problems, *upkeep_problems, message])
     return _status(level, estimate.name, estimate.hardware_id, message, values)
 

@@ -5,7 +5,6 @@ import math
 import time
 import uuid
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timezone
 
 from rclpy.node import Node
 
@@ -19,7 +18,8 @@ from valve_friction_ros.nodes.identifier.service_parameters import (
     REVERSAL_LIMIT,
     TRAVEL_LIMIT,
 )
-from valve_friction_ros.streams import Arrivals, Kind
+from valve_friction_ros.nodes.identifier.value_texts import number_text
+from valve_friction_ros.streams import Arrivals, Kind, utc
 from valve_friction_ros.usage import (
     LimitState,
     Pace,
@@ -41,11 +41,7 @@ _MOST_DAYS = 62
 
 
 def _date(stamp: int) -> str:
-    return f"{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y-%m-%d}"
-
-
-def _number(value: float) -> str:
-    return f"{value:.9g}"
+    return f"{utc(stamp):%Y-%m-%d}"
 
 
 class UsageWatch:
@@ -112,7 +108,6 @@ class UsageWatch:
 
     def values(self) -> Mapping[str, str]:
         """Return the figures since the packing was renewed, and in all."""
-        self._history.settle()
         self._gather()
         if time.monotonic() - self._written_at >= _WRITE_EVERY and self._unwritten:
             self._keep()
@@ -122,15 +117,15 @@ class UsageWatch:
         at_travel = self._node.get_parameter(AIR_TO.name).value == "close"
         values = {
             "packing_renewed [date]": _date(self._renewal) if self._renewal else "not known",
-            "travelled_distance [m]": _number(used.distance),
-            "travelled_distance in all [m]": _number(everything.distance),
+            "travelled_distance [m]": number_text(used.distance),
+            "travelled_distance in all [m]": number_text(everything.distance),
             "reversals": str(used.reversals),
             "reversals in all": str(everything.reversals),
-            "strokes": _number(used.strokes(travel)),
+            "strokes": number_text(used.strokes(travel)),
             "breakaways": str(used.breakaways),
-            "time_watched [s]": _number(used.time_watched / 1e9),
-            "time_watched in all [s]": _number(everything.time_watched / 1e9),
-            "time_near_seat [s]": _number(used.time_near_seat(at_travel) / 1e9),
+            "time_watched [s]": number_text(used.time_watched / 1e9),
+            "time_watched in all [s]": number_text(everything.time_watched / 1e9),
+            "time_near_seat [s]": number_text(used.time_near_seat(at_travel) / 1e9),
             "travel_histogram [s]": ", ".join(f"{one / 1e9:.6g}" for one in used.histogram),
             "counting_dead_band [mm]": f"{1e3 * self._counter.band:.4g}",
         }
@@ -141,8 +136,8 @@ class UsageWatch:
         if self._earlier is None and self._history.path is not None:
             values["usage"] = "of this run only, as the history cannot be read"
         if self._pace is not None:
-            values["travelled_distance pace [m/day]"] = _number(self._pace.distance)
-            values["reversals pace [1/day]"] = _number(self._pace.reversals)
+            values["travelled_distance pace [m/day]"] = number_text(self._pace.distance)
+            values["reversals pace [1/day]"] = number_text(self._pace.reversals)
         for state in self._states():
             if state.expected is not None:
                 values[f"{state.name}_expected [date]"] = _date(state.expected)

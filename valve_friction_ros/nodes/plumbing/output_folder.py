@@ -2,13 +2,13 @@
 
 import contextlib
 from collections.abc import Iterator
-from datetime import datetime, timezone
 from pathlib import Path
 
 from rclpy.node import Node
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.records.data_folder import data_folder
+from valve_friction_ros.streams import utc
 
 __all__ = ["file_name", "output_folder", "valve_name"]
 
@@ -38,4 +38,4 @@ def valve_name(node: Node) -> str:
 
 def file_name(node: Node, stamp: int) -> str:
     """Name a file, without its ending, after the node's valve and a time (ns)."""
-    return f"{valve_name(node)}_{datetime.fromtimestamp(stamp / 1e9, timezone.utc):%Y%m%dT%H%M%SZ}"
+    return f"{valve_name(node)}_{utc(stamp):%Y%m%dT%H%M%SZ}"

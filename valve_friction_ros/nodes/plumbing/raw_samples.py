@@ -129,7 +129,7 @@ def readable(taken: Sequence[TakenMessage], kind: type) -> list[TakenMessage]:
 def pressures_in(messages: Sequence[bytes]) -> Samples:
     """Return the samples of serialised sensor_msgs/FluidPressure messages, Pa."""
     if not messages:
-        return Samples(np.empty(0, np.int64), np.empty(0))
+        return Samples.joined()
     alike = _alike(messages, _pressure_layout)
     if alike is not None:
         return Samples(*alike)
