@@ -29,6 +29,18 @@ settings.register_profile("project", deadline=None, derandomize=True)
 settings.load_profile("project")
 
 
+def pytest_collection_modifyitems(items):
+    """Let each test over the middleware run twice before it counts as failed.
+
+    Fast DDS 2.14.5 at times locks itself up when participants come and go (its issue 6502), and
+    loses an answer that comes before discovery has ended (rmw_fastrtps issue 842). The summary
+    names each test that ran twice.
+    """
+    for item in items:
+        if "ros_environment" in item.fixturenames:
+            item.add_marker(pytest.mark.flaky(reruns=1))
+
+
 class Bench(NamedTuple):
     """A valve with the true parameters of its packing."""
 

@@ -35,6 +35,8 @@ from valve_friction_ros.model import (
 
 PAGE = (Path(__file__).resolve().parents[1] / "doc" / "conventions.md").read_text(encoding="utf-8")
 
+TESTS = Path(__file__).resolve().parent
+
 AREA, REFERENCE = 0.05, 1e5
 VALVE = Valve(diaphragm_area=AREA, pressure_reference=REFERENCE, travel=0.04)
 STIFFNESS, PRELOAD, COULOMB, STATIC, VISCOUS = 1e5, 500.0, 100.0, 150.0, 2e3
@@ -192,3 +194,9 @@ class TestUnits:
         assert {name: each["unit"] for name, each in shown.items()} == {
             name: TABLE[name] for name in shown
         }
+
+
+def test_no_two_modules_of_tests_have_one_name():
+    """Two of one name in different rooms cannot be collected in one run."""
+    names = [path.name for path in TESTS.rglob("*.py") if path.name != "conftest.py"]
+    assert sorted(names) == sorted(set(names))

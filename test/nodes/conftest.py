@@ -12,18 +12,6 @@ _HERE = Path(__file__).parent
 _PROFILE = _HERE / "fast_discovery.xml"
 
 
-def pytest_collection_modifyitems(items):
-    """Let each test over the middleware run twice before it counts as failed.
-
-    Fast DDS 2.14.5 at times locks itself up when participants come and go (its issue 6502), and
-    loses an answer that comes before discovery has ended (rmw_fastrtps issue 842). The summary
-    names each test that ran twice.
-    """
-    for item in items:
-        if _HERE in item.path.parents:
-            item.add_marker(pytest.mark.flaky(reruns=1))
-
-
 @pytest.fixture(scope="session", autouse=True)
 def ros_environment(tmp_path_factory):
     """Nothing leaves this machine, discovery is quick, logs go where they are cleaned up."""

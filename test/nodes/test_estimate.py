@@ -8,7 +8,8 @@ from records import quick_record
 from valve_friction_ros.health import Level
 
 TOPIC = f"{NAMESPACE}/identifier/estimate"
-OF_THE_INPUTS = {"estimate_age [s]", "buffered_samples"}
+BUFFERED = {"buffered_samples", "buffered_pressures", "buffered_positions"}
+OF_THE_INPUTS = {"estimate_age [s]", *BUFFERED}
 
 
 def test_one_message_at_each_change(live):

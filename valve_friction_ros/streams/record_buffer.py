@@ -96,6 +96,11 @@ class RecordBuffer:
         return len(self._pressure) + len(self._position)
 
     @property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of pressures and of positions."""
+        return len(self._pressure), len(self._position)
+
+    @property
     def nbytes(self) -> int:
         """Memory that the samples of both signals take, bytes."""
         return self._pressure.nbytes + self._position.nbytes

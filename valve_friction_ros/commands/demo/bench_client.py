@@ -102,6 +102,14 @@ class BenchClient(Node):
         """Key-value pairs of the latest diagnostic."""
         return {} if self._status is None else {v.key: v.value for v in self._status.values}
 
+    @property
+    def identifier_hears(self) -> bool:
+        """Whether the latest diagnostic counts samples of both signals."""
+        shown = self.diagnostic_values
+        return all(
+            int(shown.get(f"buffered_{signal}", "0")) > 0 for signal in ("pressures", "positions")
+        )
+
     def begin_record(self) -> None:
         """Forget what was gathered and start anew."""
         self._buffer.clear("a new record begins")

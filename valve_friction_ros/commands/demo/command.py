@@ -108,6 +108,7 @@ def _run(client: BenchClient, console: Console) -> _Story:
     """Run the story; return what was seen."""
     with console.status("waiting for the nodes"):
         client.wait(lambda: client.recorded > 0, _START_TIMEOUT, "stem position")
+        client.wait(lambda: client.identifier_hears, _START_TIMEOUT, "samples in the identifier")
     _record(client, console, "packing loose")
     before = identified(client, "packing loose", LOW_FRICTION)
     console.print(f"identified; {client.trigger('set_baseline')}", highlight=False)

@@ -161,7 +161,10 @@ def friction_status(
     if monitor.stamp is not None:
         values["estimate_age [s]"] = f"{(now - monitor.stamp) / 1e9:.3f}"
     values |= more
-    values["buffered_samples"] = str(len(monitor.buffer))
+    pressures, positions = monitor.buffer.counts
+    values["buffered_samples"] = str(pressures + positions)
+    values["buffered_pressures"] = str(pressures)
+    values["buffered_positions"] = str(positions)
     message = estimate.message
     if monitor.earlier is not None:
         known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message
