@@ -1,11 +1,14 @@
 """Installation of valve_friction_ros, for colcon and for pip."""
 
+import re
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "valve_friction_ros"
 HERE = Path(__file__).resolve().parent
+
+(VERSION,) = re.findall("<version>(.*)</version>", (HERE / "package.xml").read_text("utf-8"))
 
 
 def files(pattern: str) -> list[str]:
@@ -15,8 +18,19 @@ def files(pattern: str) -> list[str]:
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version=VERSION,
     description="Karnopp friction of control valves: identified and diagnosed on ROS 2 topics",
+    long_description=(HERE / "README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    classifiers=[
+        "Environment :: Console",
+        "Intended Audience :: Manufacturing",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3",
+        "Topic :: Scientific/Engineering",
+        "Typing :: Typed",
+    ],
     maintainer="valve_friction_ros developers",
     maintainer_email="maintainers@valve-friction-ros.example",
     license="Apache-2.0",

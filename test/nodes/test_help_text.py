@@ -1,5 +1,6 @@
 """``--help`` of the nodes: how to run them, and their parameters, without starting ROS."""
 
+import signal
 import subprocess
 import sys
 
@@ -42,3 +43,18 @@ def test_help_ends_well_and_names_the_parameters(node, parameter, default, optio
     assert first.startswith(f"usage: {node} [--ros-args ")
     listed = yaml.safe_load("\n".join(line for line in rest if line.startswith("  ")))
     assert listed[parameter] == default
+
+
+def test_help_that_nobody_reads_ends_in_silence():
+    """As in `identifier --help | head -1`."""
+    node = subprocess.Popen(
+        [sys.executable, "-c", _START, "simulator", "--help"],
+        cwd=PROJECT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    node.stdout.close()
+    assert node.stderr.read() == ""
+    node.stderr.close()
+    assert node.wait(60) == -signal.SIGPIPE

@@ -19,6 +19,8 @@ def _start(node: str) -> int:
         signal.signal(request, _end)
     module = importlib.import_module(f"valve_friction_ros.nodes.{node}")
     if {"-h", "--help"} & set(sys.argv[1:]):
+        # Whoever stops reading, as `head` does, ends it without a word.
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         words = importlib.import_module("valve_friction_ros.nodes.plumbing.help_text")
         print(words.help_text(node.split(".", maxsplit=1)[0], module.__doc__, module.PARAMETERS))  # noqa: T201
         return 0
