@@ -1,6 +1,7 @@
 """The YAML file that describes a valve: plain, or as a node's parameters."""
 
 import math
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -177,7 +178,7 @@ def _described(values: Mapping[str, Any]) -> ValveFile:
     return ValveFile(valve, MappingProxyType(known), columns, MappingProxyType(settings))
 
 
-def read_valve_file(path: Path, valve: str | None = None) -> ValveFile:
+def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> ValveFile:
     r"""Read a valve from YAML: ``diaphragm_area`` and further known values, in SI units.
 
     A file of parameters of ROS 2 nodes describes a valve too: what it gives to every node, or to
@@ -185,7 +186,7 @@ def read_valve_file(path: Path, valve: str | None = None) -> ValveFile:
 
     Parameters
     ----------
-    path : Path
+    path : path
         The file.
     valve : str, optional
         Namespace of the valve in a file of several.
@@ -211,6 +212,7 @@ def read_valve_file(path: Path, valve: str | None = None) -> ValveFile:
     >>> described.valve.diaphragm_area, described.known["mass"]
     (0.0445, 1.6)
     """
+    path = Path(path)
     return valve_file_of(read_yaml(path), path, valve)
 
 

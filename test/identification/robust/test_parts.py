@@ -1,5 +1,7 @@
 """Parts of the fit with imperfections, each against what can be derived."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from valve_friction_ros.identification.robust.broad_model import ABSENT, BroadMo
 from valve_friction_ros.identification.robust.fitted_record import fitted_record
 from valve_friction_ros.identification.robust.imperfections import TIMING
 from valve_friction_ros.identification.robust.intervals import Budget
+from valve_friction_ros.identification.robust.remarks import sampling_remarks
 from valve_friction_ros.identification.robust.sentences import main_doubt
 from valve_friction_ros.identification.robust.starts import lagging
 from valve_friction_ros.identification.robust.weights import inflation
@@ -24,6 +27,22 @@ def test_noise_does_not_depend_on_the_stamps(jitter, lost):
     time = time[generator.random(time.size) >= lost]
     values = np.sin(time) + 0.01 * generator.standard_normal(time.size)
     assert stamped_noise(StampedSignal(time, values)) == pytest.approx(0.01, rel=0.03)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("lost", [0.0, 0.02, 0.1])
+def test_samples_are_missing_only_where_some_were_lost(jitter, lost):
+    """Stamps in whole milliseconds of an 80 Hz clock: their median pause is 12 ms, not 12.5 ms."""
+    generator = np.random.default_rng(7)
+    time = (np.arange(8000) + jitter * generator.uniform(-1, 1, 8000)) / 80
+    time = np.round(time[generator.random(time.size) >= lost], 3)
+    signal = StampedSignal(time, np.sin(time))
+    said = [one for one in sampling_remarks(StampedRecord(signal, signal)) if "missing" in one]
+    if lost == 0:
+        assert said == []
+    else:
+        share = float(re.match(r"([\d.]+) % of", said[0])[1]) / 100
+        assert share == pytest.approx(1 - time.size / 8000, rel=0.15)
 
 
 def test_minimum_inside_the_bounds_is_that_of_the_form():

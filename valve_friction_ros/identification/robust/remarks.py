@@ -1,6 +1,7 @@
 """What the stamps and values of a record show of how it was sampled."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
@@ -13,8 +14,14 @@ __all__ = ["sampling_remarks"]
 _JITTER = 0.01
 """Scatter of the pauses, over the period, from which on stamps are irregular."""
 
+_IRREGULAR = 0.25
+"""The same, from which on a pause no longer tells whether a sample is missing."""
+
 _DROPS = 0.005
 """Share of samples that are missing from which on they are named."""
+
+_LONG = 1.5
+"""Pause, over the period, from which on a sample may be missing."""
 
 _GAP = 10.0
 _RATES = 1.5
@@ -38,15 +45,27 @@ _SLOW = 0.02
 """Period, s, from which on a slow stem may not be followed through its corners."""
 
 
+def _missing_share(pauses: NDArray[np.float64]) -> float:
+    """Share of the samples that did not come, from `pauses` over the period, outside of gaps.
+
+    A pause is long by a lost sample or by jitter. What jitter adds to it, the pauses beside
+    it lack; so these are counted with it.
+    """
+    near = pauses[pauses <= _GAP]
+    long = np.convolve(near >= _LONG, np.ones(3), "same") > 0
+    ordinary = near[~long] if (~long).any() else near[near < _LONG]
+    missing = float(np.sum(near[long])) / float(np.mean(ordinary)) - np.count_nonzero(long)
+    return max(missing, 0.0) / (near.size + 1 + max(missing, 0.0))
+
+
 def _stamp_remarks(name: str, signal: StampedSignal) -> list[str]:
     pauses = np.diff(signal.time) / signal.period
-    near = pauses[pauses <= _GAP]
-    scatter = float(np.std(pauses[pauses < 1.5]))
-    lost = max(1.0 - 1.0 / float(np.mean(near)), 0.0)
+    scatter = float(np.std(pauses[pauses < _LONG]))
+    lost = _missing_share(pauses)
     remarks = []
     if scatter > _JITTER:
         remarks.append(f"the stamps of {name} jitter by {percentage(scatter)} of their interval")
-    if lost > _DROPS:
+    if lost > _DROPS and scatter < _IRREGULAR:
         remarks.append(f"{percentage(lost)} of the samples of {name} are missing")
     gaps = pauses[pauses > _GAP]
     if gaps.size:

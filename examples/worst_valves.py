@@ -1,0 +1,44 @@
+"""A dashboard in forty lines: all valves of the graph, worst first, as they tell it.
+
+``python examples/worst_valves.py`` beside running identifiers; Ctrl-C ends it. One subscription,
+`/diagnostics`, serves every valve. Each latched `~/estimate` holds the same keys for one valve.
+"""
+
+import contextlib
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+LEVELS = ("OK", "WARN", "ERROR", "STALE")
+
+
+class WorstValves(Node):
+    """Keeps the latest status of each valve, and prints the table when one has changed."""
+
+    def __init__(self) -> None:
+        super().__init__("worst_valves")
+        self._valves: dict[str, tuple[int, str]] = {}
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        known = dict(self._valves)
+        for status in message.status:
+            if status.name.endswith(": friction"):
+                self._valves[status.hardware_id or status.name] = (status.level[0], _line(status))
+        if self._valves != known:
+            for tag, (level, line) in sorted(self._valves.items(), key=lambda one: -one[1][0]):
+                print(f"{LEVELS[level]:5} {tag:12} {line}", flush=True)
+
+
+def _line(status: DiagnosticStatus) -> str:
+    values = {one.key: one.value for one in status.values}
+    ratio = values.get("friction_ratio", "no ratio")
+    return f"NE 107 {values.get('NE 107', '?')}  {ratio:8}  {status.message.partition(':')[0]}"
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(WorstValves())

@@ -1,0 +1,20 @@
+"""The small dashboard in `examples/`, beside a live node."""
+
+from live_nodes import PROJECT
+from records import quick_record
+
+from valve_friction_ros.model import HIGH_FRICTION
+
+SCRIPT = PROJECT / "examples" / "worst_valves.py"
+
+
+def test_it_shows_a_valve_and_what_becomes_of_it(live):
+    live.start_identifier({"valve_tag": "FV-101"})
+    shown = live.start("worst_valves", script=SCRIPT, namespace=None)
+    client = live.client
+    client.wait_until(lambda: "OK    FV-101" in shown.output, "the valve")
+    client.identified(quick_record())
+    assert client.trigger("set_baseline").success
+    client.identified(quick_record(HIGH_FRICTION))
+    client.wait_until(lambda: "ERROR FV-101" in shown.output, "the alarm")
+    assert shown.output.splitlines()[-1].split()[2:5] == ["NE", "107", "F"]
