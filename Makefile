@@ -35,7 +35,7 @@ help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*##  *\(.*\)/make \1|\2/p' Makefile | while IFS='|' read -r target text; do printf '%-16s %s\n' "$$target" "$$text"; done
 
 .PHONY: demo
-demo: venv  ## friction of a simulated valve grows, and is diagnosed, in under two minutes
+demo: $(if $(findstring --dashboard,$(DEMO_ARGS)),venv-dashboard,venv)  ## friction of a simulated valve grows, and is diagnosed, in under two minutes
 	@"$(VENV)/bin/valve_friction" demo $(DEMO_ARGS)
 
 .PHONY: test
@@ -74,10 +74,24 @@ venv:  ## the virtual environment to run the package
 	@$(python-found)
 	@$(INSTALL)
 
+.PHONY: venv-dashboard
+venv-dashboard:  ## the same, with what the dashboard needs
+	@$(python-found)
+	@$(INSTALL) dashboard
+
 .PHONY: venv-test
 venv-test:  ## the same, with what checks it
 	@$(python-found)
 	@$(INSTALL) test
+
+.PHONY: browser
+browser:  ## Chromium for the tests of pages, by apt-get where root runs make; those tests are skipped without it
+	@if command -v chromium >/dev/null; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "Installing Chromium: once, about a minute ..."; \
+	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+	        apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null; \
+	else echo "make: tests of pages in a browser are skipped: run \`apt install chromium\`"; fi
 
 .PHONY: accuracy
 accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--seeds 3" for less

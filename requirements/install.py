@@ -1,7 +1,8 @@
-"""Make or reuse the virtual environment: `python3 requirements/install.py .venv [test | oldest]`.
+"""Make or reuse a virtual environment: `python3 requirements/install.py .venv [WORD]`.
 
-run.txt goes in, ros.txt where no ROS 2 Jazzy is sourced, the package itself as an editable install,
-and with `test` what test.txt lists; with `oldest` oldest.txt in place of run.txt and test.txt.
+run.txt goes in, ros.txt where no ROS 2 Jazzy is sourced, the package itself as an editable install;
+with the word `dashboard` dashboard.txt too, with `test` dashboard.txt and test.txt; with `oldest`
+oldest.txt in place of them all.
 It is made anew when Python, ROS or one of the files changed. Where the versions of oldest.txt
 cannot be had, it ends with one line and the exit code 3.
 This file must parse on any Python, to say that it is too old.
@@ -17,6 +18,11 @@ PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 NOT_HERE = 3
 """Exit code where this machine can have no such environment."""
 MESSAGES = ("diagnostic_msgs", "sensor_msgs", "std_msgs", "std_srvs")
+ADDED = {
+    "dashboard": [("dashboard", "the dashboard needs")],
+    "test": [("dashboard", "the dashboard needs"), ("test", "checks the package")],
+}
+"""The files that a word adds to run.txt, in this order, and what they hold."""
 
 
 def stop(text, *words):
@@ -77,8 +83,17 @@ def read(*path):
         return stream.read()
 
 
-def main(path, test, oldest):
+def refuse_strange(path):
+    """Refuse to clear a folder that is not empty and was not made here."""
+    mark = os.path.join(path, "made-by-make")
+    if os.path.isdir(path) and os.listdir(path) and not os.path.exists(mark):
+        stop("%s was not made by make: move it away, or use another folder as in `make "
+             "VENV=.venv-make`", path)  # fmt: skip
+
+
+def main(path, word):
     """Bring the environment at `path` up to date; its `made-by-make` holds what it came from."""
+    oldest = word == "oldest"
     check_python(oldest)
     import venv
 
@@ -89,7 +104,6 @@ def main(path, test, oldest):
     found = read(path, "made-by-make")
     made = repr((sys.version, os.path.realpath(sys.executable), os.path.abspath(path), PROJECT))
     made += "".join(read(PROJECT, name) for name in sources + wheels)
-    tested = made + read(PROJECT, "requirements/test.txt")
 
     def run(*arguments):
         command = (os.path.join(path, "bin", "python"),) + arguments
@@ -112,10 +126,7 @@ def main(path, test, oldest):
             stream.write(state)
 
     if not found.startswith(made) or not os.path.exists(os.path.join(path, "bin", "python")):
-        mark = os.path.join(path, "made-by-make")
-        if os.path.isdir(path) and os.listdir(path) and not os.path.exists(mark):
-            stop("%s was not made by make: move it away, or use another folder as in `make "
-                 "VENV=.venv-make`", path)  # fmt: skip
+        refuse_strange(path)
         where = "the sourced ROS 2 Jazzy" if system else "ROS 2 Jazzy from wheels"
         print("Making %s with %s: once, about a minute ..." % (path, where), flush=True)
         venv.create(path, system_site_packages=system, clear=True, symlinks=True)
@@ -125,16 +136,20 @@ def main(path, test, oldest):
         install("-e", ".", *(word for name in wheels for word in ("-r", name)))
         finish(made)
         found = made
-    if test and found != tested:
-        print("Adding what checks the package: once, about half a minute ...", flush=True)
-        install("-r", "requirements/test.txt")
-        if not system:
-            run("-m", "pip", "--disable-pip-version-check", "check")
-        finish(tested)
+    for name, what in ADDED.get(word, ()):
+        source = "requirements/%s.txt" % name
+        made += read(PROJECT, source)
+        if not found.startswith(made):
+            print("Adding what %s: once, about half a minute ..." % what, flush=True)
+            install("-r", source)
+            if not system:
+                run("-m", "pip", "--disable-pip-version-check", "check")
+            finish(made)
+            found = made
 
 
 if __name__ == "__main__":
     try:
-        main(os.path.abspath(sys.argv[1]), "test" in sys.argv[2:], "oldest" in sys.argv[2:])
+        main(os.path.abspath(sys.argv[1]), "".join(sys.argv[2:]))
     except KeyboardInterrupt:
         stop("set-up interrupted: run make again to complete it")

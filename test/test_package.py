@@ -72,6 +72,7 @@ LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
     "yaml": ("python3-yaml", "PyYAML"),
 }
 BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
+DASHBOARD_LIBRARIES = {"nicegui", "starlette"}  # the second is what the first is built on
 
 
 def exec_depends():
@@ -99,6 +100,8 @@ def test_manifest_names_every_message_package_and_library():
     for module, path in third_party_imports():
         if module in BAG_LIBRARIES:
             assert path.parent == PROJECT / NAME / "records" / "bags"
+        elif module in DASHBOARD_LIBRARIES:
+            assert path.is_relative_to(PROJECT / NAME / "dashboard")
         else:
             assert LIBRARIES.get(module, (module,))[0] in declared, f"{path.name}: {module}"
 
@@ -133,6 +136,18 @@ def test_setup_names_every_library():
     assert required == {"setuptools", *(name for _, name in LIBRARIES.values())}
     bags = {parted(each)[0] for each in requirements("extras_require")["bags"]}
     assert bags == set(BAG_LIBRARIES.values())
+
+
+def test_the_dashboard_is_an_extra():
+    """Its limits hold for what is pinned, and the README says how it is installed."""
+    (needed,) = requirements("extras_require")["dashboard"]
+    name, limits = parted(needed)
+    lowest, highest = re.fullmatch(r">=(\d+\.\d+),<(\d+)", limits).groups()
+    pinned = pins("dashboard.txt")[name]
+    assert pinned.startswith(f"{lowest}.")
+    assert int(pinned.partition(".")[0]) == int(highest) - 1
+    for command in (f"pip install '{needed}'", "make venv-dashboard"):
+        assert command in (PROJECT / "README.md").read_text()
 
 
 def test_the_oldest_versions_are_those_that_are_tested():
