@@ -24,7 +24,7 @@ from valve_friction_ros.nodes.identifier.alarm_folder import (
 from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
-from valve_friction_ros.nodes.identifier.report_service import report_writer
+from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_FOLDER,
     ALARM_MEGABYTES,
@@ -32,7 +32,6 @@ from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_RECORDING,
     ALARM_RECORDINGS,
 )
-from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import Worker
@@ -70,11 +69,11 @@ class AlarmRecorder:
         node: Node,
         monitor: FrictionMonitor,
         history: HistoryWriter,
-        usage: UsageWatch,
+        reports: ReportWriter,
         worker: Worker,
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
-        self._usage, self._worker = usage, worker
+        self._reports, self._worker = reports, worker
         self._level: Level | None = None
         self._rise: _Rise | None = None
         self._last_rise: tuple[Level, float] | None = None
@@ -161,7 +160,7 @@ class AlarmRecorder:
     def _write_page(self, path: Path) -> None:
         """Write the page into the folder of the bag; it may take its time, and the bag is there."""
         try:
-            write = report_writer(self._node, self._monitor, self._history, self._usage.usage())
+            write = self._reports.of_now()
         except RefusalError:
             return  # an alarm from before a restart has no result
         valve, (most, room), page = valve_name(self._node), self._bounds(), path / PAGE

@@ -33,6 +33,7 @@ from valve_friction_ros.history import (
     current_trend,
     entry_of,
     keep_told_level,
+    read_answers,
     read_moves,
     read_reference,
     read_told_level,
@@ -42,6 +43,7 @@ from valve_friction_ros.history import (
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.response import Move as CommandAnswer
 from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["HistoryWriter"]
@@ -250,6 +252,11 @@ class HistoryWriter:
         """Read what the moves of the valve said first; None without a file."""
         built = self._monitor.settings.valve
         return self._tried(lambda file: read_reference(file, self._valve.name, built))
+
+    def answers(self) -> tuple[CommandAnswer, ...]:
+        """Read the answers of the stem to its command; none without a file."""
+        travel = self._monitor.settings.valve.travel
+        return self._tried(lambda file: read_answers(file, self._valve.name, travel)) or ()
 
     def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
         """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
