@@ -55,7 +55,10 @@ def keep_alarm_recording(
     with writing(file.path) as connection:
         row = valve_id(connection, valve)
         connection.execute(
-            "INSERT OR IGNORE INTO alarm_recording (valve_id, time_ns, level, path, message) "
+            "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns = ?", (row, one.time)
+        )
+        connection.execute(
+            "INSERT OR REPLACE INTO alarm_recording (valve_id, time_ns, level, path, message) "
             "VALUES (?, ?, ?, ?, ?)",
             (row, one.time, int(one.level), str(one.path), one.message),
         )
