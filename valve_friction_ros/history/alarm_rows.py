@@ -1,5 +1,6 @@
 """The recordings of alarms in the history."""
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,7 +66,7 @@ def keep_alarm_recording(
         if days > 0:
             connection.execute(
                 "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns < ?",
-                (row, one.time - round(days * DAY)),
+                (row, min(one.time, time.time_ns()) - round(days * DAY)),
             )
 
 

@@ -156,6 +156,7 @@ class Identifier(PolledNode):
         self._usage.close()
         self._evidence.close()
         self._response.close()
+        self._history.close()
         super().destroy_node()
 
     def poll(self) -> None:
@@ -317,7 +318,7 @@ class Identifier(PolledNode):
             self._monitor,
             now.nanoseconds,
             [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
-            self._history.problems,
+            [*self._history.problems, *filter(None, [self._history.conflict])],
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
                 **self._alarm.values(),
