@@ -17,7 +17,7 @@ SOURCES = Path(__file__).resolve().parents[1] / PACKAGE
 _CORE = {"model", "signals", "identification"}
 _FILES = {*_CORE, "streams", "records"}
 _VALVES = {*_CORE, "streams", "usage", "evidence", "health"}
-_PAGES = {*_VALVES, "history", "records"}
+_PAGES = {*_VALVES, "response", "history", "records"}
 _PICTURES = {*_PAGES, "planning"}
 MAY_IMPORT = {
     "model": set(),
@@ -31,12 +31,12 @@ MAY_IMPORT = {
     "health": {*_CORE, "streams", "evidence"},
     "alerts": {*_CORE, "health"},
     "response": _VALVES,
-    "history": _VALVES,
+    "history": {*_VALVES, "response"},
     "figures": _PICTURES,
     "reports": {*_PICTURES, "figures"},
     "fleet": {*_PICTURES, "figures", "reports"},
     "reproduction": {*_PICTURES, "figures", "reports"},
-    "nodes": {*_FILES, *_PAGES, "reports", "alerts", "response"},
+    "nodes": {*_FILES, *_PAGES, "reports", "alerts"},
 }
 # What each inner room may import of its siblings. The files beside inner rooms hold their shared
 # words and what joins them, so both may import each other; no two files do, directly or around.
@@ -72,6 +72,7 @@ CORE = [
     "records",
     "evidence",
     "health",
+    "response",
     "history",
     "alerts",
     "fleet",

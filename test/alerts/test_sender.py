@@ -1,5 +1,6 @@
 """The sender against real servers: good, away, slow, endless, redirecting, untrusted."""
 
+import contextlib
 import socket
 import threading
 import time
@@ -260,6 +261,57 @@ def test_a_dead_webhook_holds_up_no_other_valve():
     assert dead.state().waiting == 3
     assert sum(thread.name == "alerts" for thread in threading.enumerate()) >= 1
     sender.close()
+
+
+def test_many_slow_hosts_hold_up_no_other_valve():
+    """One after the other, each would cost the last valve a whole try."""
+    hosts, limit = 6, 100 * PATIENCE
+    sender = AlertSender(SECRETS, waits=[3600.0], limit=limit)
+    slow = [sender.outbox() for _ in range(hosts)]
+    quick = sender.outbox()
+    with contextlib.ExitStack() as stack:
+        silent = [stack.enter_context(Receiver(answer=answer_never)) for _ in range(hosts)]
+        receiver = stack.enter_context(Receiver())
+        for outbox, host in zip(slow, silent, strict=True):
+            outbox.address(Webhook.at(host.url))
+            outbox.put(alert())
+        wait_until(lambda: all(host.requests for host in silent))
+        quick.address(Webhook.at(receiver.url))
+        for delivered in (1, 2):
+            quick.put(alert())
+            wait_until(lambda wanted=delivered: quick.state().delivered == wanted)
+        assert [one.state().waiting for one in slow] == [1] * hosts
+        sender.close()
+
+
+def test_threads_are_bounded_and_dead_hosts_leave_room():
+    """Of 16 tries at once half may go to hosts that did not answer before."""
+
+    def tries():
+        return sum(thread.name == "alert" for thread in threading.enumerate())
+
+    sender = AlertSender(SECRETS, waits=[0.5], limit=LIMIT)
+    away = [socket.create_server(("127.0.0.1", 0)) for _ in range(20)]
+    outboxes = [sender.outbox() for _ in away]
+    before, most = tries(), 0
+    with contextlib.ExitStack() as stack:
+        for one in away:
+            stack.enter_context(one)
+        for outbox, one in zip(outboxes, away, strict=True):
+            outbox.address(Webhook.at(f"http://127.0.0.1:{one.getsockname()[1]}/hook"))
+            outbox.put(alert())
+
+        def have_all(ended):
+            nonlocal most
+            most = max(most, tries() - before)
+            return all(ended(outbox.state()) for outbox in outboxes)
+
+        wait_until(lambda: have_all(lambda state: state.problem))
+        assert 8 < most <= 16
+        most = 0
+        wait_until(lambda: have_all(lambda state: state.given_up))
+        assert 0 < most <= 8
+        sender.close()
 
 
 def test_a_silent_host_of_many_valves_takes_one_try_a_round():

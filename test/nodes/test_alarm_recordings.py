@@ -13,6 +13,7 @@ from histories import START as DAWN
 from histories import VALVE, success
 from live_nodes import NAMESPACE, PROJECT, SECOND, START, values_of
 from records import quick_record
+from rosbags.rosbag2 import Reader
 
 from valve_friction_ros.health import Baseline, Level
 from valve_friction_ros.history import (
@@ -76,6 +77,11 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+def samples_in(bag):
+    with Reader(bag) as reader:
+        return reader.message_count
+
+
 def test_an_alarm_is_recorded(live, tmp_path):
     baseline_set(live, {"alarm_recording": 3.0})
     client = live.client
@@ -116,6 +122,70 @@ def test_an_alarm_is_recorded(live, tmp_path):
     (kept,) = client.wait_until(lambda: alarm_recordings(history, NODE), "a row of the alarm")
     assert kept.path == path
     assert kept.message.startswith("excess friction")
+
+
+def test_what_was_before_an_alarm_outlives_a_kill(live, tmp_path):
+    """Killed before the time after the rise is over; what a kill left is neither half nor lost."""
+    node = baseline_set(live, {"alarm_recording": 600.0})
+    client, folder = live.client, tmp_path / "valve_friction_ros" / "alarms"
+    client.identified(TIGHT)
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    (kept,) = client.wait_until(lambda: alarm_recordings(history, NODE), "a row of the alarm")
+    live.kill(node)
+    assert names(folder) == [kept.path.name]
+    assert samples_in(kept.path) == 2 * len(TIGHT)
+    live.start_identifier(FAST)
+    values = client.status_values(lambda one: "alarm_recording" in values_of(one), "its name")
+    assert values["alarm_recording"] == str(kept.path)
+    assert values["alarm_recording level"] == "ERROR"
+
+
+def test_the_whole_recording_takes_the_place_of_its_first_part(live, tmp_path):
+    baseline_set(live, {"alarm_recording": 3.0, "alarm_recordings": 1})
+    client, folder = live.client, tmp_path / "valve_friction_ros" / "alarms"
+    client.identified(TIGHT)
+    client.wait_until(lambda: [*folder.glob("alarm_*")], "the first part")
+    assert "alarm_recording" not in client.last_values()
+    client.send_record(TIGHT, START + 5 * SECOND)
+    path = recorded(client)
+    assert names(folder) == [path.name]
+    assert samples_in(path) == 4 * len(TIGHT)
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    client.wait_until(lambda: len(alarm_recordings(history, NODE)) == 1, "its row")
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of 64 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
+    if subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip("this user may not mount a small disk")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_full_disk_is_told_and_no_torn_bag_stays(live, tmp_path, small_disk):
+    baseline_set(live, {"alarm_folder": str(small_disk)})
+    client = live.client
+    client.identified(TIGHT)
+    values = client.status_values(
+        lambda one: "alarm_recording problem" in values_of(one), "the full disk"
+    )
+    assert values["alarm_recording problem"] == (
+        f"the alarm was not recorded: cannot write an alarm's recording into {small_disk}: "
+        "No space left on device"
+    )
+    wait_beyond_a_recording(client)
+    assert names(small_disk) == []
+    assert "alarm_recording" not in client.last_values()
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    assert alarm_recordings(history, NODE) == ()
+    (done,) = client.set_parameters(NODE, {"alarm_folder": str(tmp_path / "room")})
+    assert done.successful
+    assert alarmed(client).parent == tmp_path / "room"
+    assert "alarm_recording problem" not in client.last_values()
 
 
 def test_it_is_named_after_a_restart(live, tmp_path):

@@ -5,13 +5,18 @@ import re
 import sqlite3
 
 import pytest
-from histories import DAY, START, VALVE, success
+from histories import DAY, OTHER, START, VALVE, success
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 from std_msgs.msg import Float64
 
 from valve_friction_ros.health import Baseline, Level
-from valve_friction_ros.history import KeptBaseline
+from valve_friction_ros.history import (
+    AlarmRecording,
+    HistoryFile,
+    KeptBaseline,
+    keep_alarm_recording,
+)
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 
@@ -93,6 +98,69 @@ def test_an_age_of_days(live, history):
     assert status.message.startswith("excess friction: coulomb friction is 4.00 (")
     assert status.message.endswith(" (identified 5 days ago, before the restart)")
     live.client.wait_until(lambda: "level OK → ERROR: excess" in node.errors, "a logged level")
+
+
+def test_stamps_of_a_time_to_come(live, history, tmp_path):
+    """The clock went back while the node was down: the newest counts, and its age is no number."""
+    now = live.client.node.get_clock().now().nanoseconds
+    history.add(success(now - 9 * DAY, 90.0, baseline=None))
+    history.add(success(now + DAY, 400.0, baseline=None))
+    history.set_baseline(VALVE, KeptBaseline(Baseline(100.0, 1.0), START, START))
+    for place, time in enumerate((now + DAY, now - DAY)):
+        one = AlarmRecording(time, Level.WARN, tmp_path / f"{place}", "excess friction")
+        keep_alarm_recording(history, VALVE, one, days=365.0)
+    live.start_identifier(PATIENT)
+    client = live.client
+    status = client.next_status()
+    assert status.level == ERROR
+    assert status.message.endswith(
+        " (identified at a time to come, by a clock that has gone back since, before the restart)"
+    )
+    assert values_of(status)["alarm_recording"] == str(tmp_path / "1")
+    client.identified(HEALTHY)
+    live.kill(live.nodes[-1])
+    live.start_identifier(PATIENT)
+    status = client.next_status(lambda one: one.level != ERROR, "the newest result")
+    assert AGE.search(status.message)
+
+
+@pytest.mark.parametrize("gone", ["removed", "replaced"])
+def test_a_history_that_goes_while_the_node_runs_costs_no_baseline(live, history, gone):
+    node = live.start_identifier(PATIENT)
+    client = live.client
+    client.identified(HEALTHY)
+    assert client.trigger("set_baseline").success
+    kept = history.baseline(VALVE.name)
+    if gone == "removed":
+        for one in history.path.parent.glob("history.sqlite*"):
+            one.unlink()
+    else:
+        other = HistoryFile(history.path.with_name("other"))
+        other.add(success(START, valve=OTHER))
+        other.path.rename(history.path)
+    client.identified(TIGHT)
+    assert client.statuses[-1][1].level == ERROR
+    client.wait_until(lambda: "baseline in force is kept again" in node.errors, "a warning")
+    again = history.baseline(VALVE.name)
+    assert (again.baseline, again.time) == (kept.baseline, kept.time)
+    live.kill(node)
+    live.start_identifier(PATIENT)
+    assert client.next_status().level == ERROR
+
+
+def test_two_nodes_of_one_valve_are_told(live):
+    live.start_identifier(PATIENT)
+    first = live.nodes[-1]
+    live.start_identifier(PATIENT)
+    told = "another node keeps the history of /fv_101/identifier"
+    status = live.client.next_status(lambda one: told in one.message, "the second node")
+    assert status.level == WARN
+    assert values_of(status)["NE 107"] == "M"
+    live.kill(first)
+    seen = len(live.client.statuses)
+    live.client.wait_until(
+        lambda: any(one.level == OK for _, one in live.client.statuses[seen:]), "one node"
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,18 @@
 """`stem_command` over DDS: moves in service, their figures, limits and blame."""
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, START, STREAM, time_of, values_of
+from live_nodes import NAMESPACE, PROJECT, SECOND, START, STREAM, time_of, values_of
 from rclpy.duration import Duration
+from records import quick_record
 from sensor_msgs.msg import JointState
+
+from valve_friction_ros.history import HistoryFile, read_answers
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
@@ -67,6 +73,45 @@ def test_moves_in_service(live, unit, scale):
     assert values_of(status)["NE 107"] == "M"
     assert "after its command (median of 6 moves, limit 0.8 s)" in status.message
     assert "the pressure itself answers late: check the positioner" in status.message
+
+
+def test_the_figures_outlive_a_kill(live, tmp_path):
+    """They are kept, shown by a node that hears no command yet, in its page and by a command."""
+    slow = {"window": 3600.0, "dead_time_limit": 0.8}
+    node, client = live.start_identifier(slow), live.client
+    commander(live)(TRAVEL)
+    stamps, pressure, position = answer(1.0, 0.5)
+    client.send((stamps, pressure), (stamps, position))
+    before = values_of(client.next_status(lambda one: one.level == WARN, "a late stem"))
+    file = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    client.wait_until(lambda: len(read_answers(file, NODE)) == 6, "the moves in the history")
+    live.kill(node)
+
+    live.start_identifier({**slow, "method": "refined"})
+    status = client.next_status(lambda one: "moves" in values_of(one), "the moves of before")
+    after = values_of(status)
+    assert status.level == WARN
+    assert "after its command (median of 6 moves, limit 0.8 s)" in status.message
+    same = ("moves", "moves until [time]", "dead_time [s]", "T63 high [s]", "dead_time cause")
+    assert [after[key] for key in same] == [before[key] for key in same]
+    assert after["moves until [time]"] == "2023-11-14T22:14:50Z"
+    client.identified(quick_record())
+    page = Path(client.trigger("report").message).read_text(encoding="utf-8")
+    assert "Answer to the command" in page
+    assert "latest 6 steps of stem_command, from 2023-11-14 22:13 to 2023-11-14 22:14" in page
+    shown = subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros", "history", str(file.path)],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert "stem_command: 6 steps, 0 ignored; medians: dead time 1" in shown.stdout, shown.stderr
+    assert client.trigger("reset_usage").success
+    client.status_values(lambda one: values_of(one)["moves"] == "0", "a new packing")
+    assert client.next_status().level == OK
+    assert read_answers(file, NODE) == ()
 
 
 def test_without_a_command_nothing_is_said(live):

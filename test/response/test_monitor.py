@@ -144,6 +144,26 @@ def test_a_swing_that_has_died_away_is_no_hunting():
     assert Hunting(1.0, 0.1, sticks=False) != Hunting(1.0, 0.1, sticks=True)
 
 
+@pytest.mark.parametrize("lag", [0.0, 1.0, 2.5, 4.0])
+def test_a_command_that_swings_within_its_noise_is_followed_and_not_hunted(lag):
+    """Its swing of ±0.6 % is less than the change that noise of 0.3 % lets be seen."""
+    times = np.arange(0, 150.0, 0.1)
+    command = times, 0.5 + 0.006 * np.sin(times / 2) + 0.003 * RNG.standard_normal(times.size)
+    stem = 0.5 + 0.006 * np.sin((times - lag) / 2) + 1e-4 * RNG.standard_normal(times.size)
+    monitor = ResponseMonitor(TRAVEL)
+    feed(monitor, command, (times, stem), (times, 8e4 + SPAN * stem))
+    assert monitor.hunting is None
+
+
+def test_a_stem_that_hunts_under_a_noisy_command():
+    times = np.arange(0, 150.0, 0.1)
+    command = times, 0.5 + 0.003 * RNG.standard_normal(times.size)
+    stem = 0.5 + 0.01 * np.sin(times / 2) + 1e-4 * RNG.standard_normal(times.size)
+    monitor = ResponseMonitor(TRAVEL)
+    feed(monitor, command, (times, stem), (times, 8e4 + SPAN * stem))
+    assert monitor.hunting.period == pytest.approx(4 * np.pi, rel=0.02)
+
+
 @pytest.mark.parametrize("travel", [math.inf, 0.0, math.nan])
 def test_the_travel_must_be_known(travel):
     with pytest.raises(ValueError, match="travel"):

@@ -1,4 +1,4 @@
-"""The thread that sends the alerts of all valves of a process, and the queue of each valve."""
+"""The queues of alerts of all valves of a process, and the threads that send them."""
 
 import contextlib
 import threading
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from valve_friction_ros.alerts.alert import Alert
 from valve_friction_ros.alerts.posting import DeliveryError, post
-from valve_friction_ros.alerts.webhook import Secrets, Webhook
+from valve_friction_ros.alerts.webhook import Place, Secrets, Webhook
 from valve_friction_ros.health import Level
 
 __all__ = ["WAITS", "AlertSender", "Outbox", "OutboxState"]
@@ -21,6 +21,10 @@ _TRIES = 20
 
 WAITS = tuple(accumulate(repeat(1.0, _TRIES - 1), lambda wait, _: min(2 * wait, _LONGEST_WAIT)))
 """Times, s, from each failed try to the next: 1, 2, 4 … 300; an hour in all."""
+
+_MOST_TRIES, _MOST_RETRIES = 16, 8
+"""Hosts that are tried at once, and those among them that have not answered when tried last: so
+dead hosts leave room for the others."""
 
 _MOST_WAITING = 100
 """Alerts of a valve that wait; then the oldest is given up."""
@@ -106,6 +110,11 @@ class Outbox:
             return OutboxState(*counts, self._problem, self._lost, self._settled)
 
     @property
+    def place(self) -> Place | None:
+        """Scheme, host and port that alerts go to; None without a webhook."""
+        return None if self._webhook is None else self._webhook.place
+
+    @property
     def tried(self) -> float:
         """When it was tried last, s of the monotonic clock."""
         return self._tried
@@ -146,10 +155,10 @@ class Outbox:
             else:
                 self._due = time.monotonic() + self._waits[letter.tries - 1]
 
-    def is_due_at(self, place: tuple[str, str, int], now: float) -> bool:
-        """Return whether a try at a scheme, host and port is due; the caller holds the lock."""
-        webhook, due = self._webhook, self.due()
-        return webhook is not None and webhook.place == place and due is not None and due <= now
+    def is_due_at(self, place: Place, now: float) -> bool:
+        """Return whether a try at a host is due; the caller holds the lock."""
+        due = self.due()
+        return self.place == place and due is not None and due <= now
 
     def _give_up(self, letter: _Letter, cause: str) -> None:
         self._given_up += 1
@@ -162,9 +171,11 @@ class Outbox:
 
 
 class AlertSender:
-    """Sends the alerts of many valves in a thread of its own, which begins with the first one.
+    """Sends the alerts of many valves in threads of its own, the first of which begins with them.
 
-    The thread holds up neither its callers nor the end of the process; what waits then is lost.
+    One thread looks for what is due; each try is a thread, one for a host at a time and 16 in all,
+    so that no host that is slow or dead holds up the alerts to another. The threads hold up
+    neither their callers nor the end of the process; what waits then is lost.
 
     Parameters
     ----------
@@ -184,6 +195,9 @@ class AlertSender:
         self._limit = limit
         self._changed = threading.Condition()
         self._outboxes: list[Outbox] = []
+        self._under_way: dict[Place, bool] = {}
+        """Hosts that are tried, and whether they have not answered before."""
+        self._silent: set[Place] = set()
         self._is_closed = False
         self._thread: threading.Thread | None = None
 
@@ -202,44 +216,55 @@ class AlertSender:
         self._changed.notify()
 
     def close(self) -> None:
-        """Send nothing more; returns at once, while a try may still be under way."""
+        """Send nothing more; returns at once, while tries may still be under way."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
 
     def _run(self) -> None:
-        while (outbox := self._next()) is not None:
-            with self._changed:
-                if outbox.due() is None:
-                    continue
-                letter, webhook = outbox.begin()
-            failure = self._failure(letter.alert, webhook)
-            with self._changed:
-                outbox.end(letter, webhook, failure)
-                if failure is not None and not failure.is_answered:
-                    self._fail_together(webhook, failure)
+        """Begin what is due, until the end."""
+        with self._changed:
+            while not self._is_closed:
+                now = time.monotonic()
+                waiting = [(due, one) for one in self._outboxes if (due := one.due()) is not None]
+                for _, outbox in sorted(waiting, key=lambda each: each[1].tried):
+                    self._begin(outbox, now)
+                later = [due for due, _ in waiting if due > now]
+                self._changed.wait(min(later) - now if later else None)
+
+    def _begin(self, outbox: Outbox, now: float) -> None:
+        """Try the first alert of a queue, if it is due and there is room."""
+        place = outbox.place
+        if place is None or place in self._under_way or not outbox.is_due_at(place, now):
+            return
+        is_silent, retries = place in self._silent, sum(self._under_way.values())
+        if len(self._under_way) >= _MOST_TRIES or (is_silent and retries >= _MOST_RETRIES):
+            return
+        self._under_way[place] = is_silent
+        work = outbox, *outbox.begin()
+        threading.Thread(target=self._try, args=work, name="alert", daemon=True).start()
+
+    def _try(self, outbox: Outbox, letter: _Letter, webhook: Webhook) -> None:
+        failure = self._failure(letter.alert, webhook)
+        with self._changed:
+            outbox.end(letter, webhook, failure)
+            del self._under_way[webhook.place]
+            if failure is None or failure.is_answered:
+                self._silent.discard(webhook.place)
+            else:
+                self._silent.add(webhook.place)
+                self._fail_together(webhook, failure)
+            self._changed.notify()
 
     def _fail_together(self, webhook: Webhook, failure: DeliveryError) -> None:
         """Count the failure as a try of all that is due at a host that does not answer.
 
-        So a dead host of many valves holds up the others by one try a round.
+        So a dead host of many valves is tried once a round.
         """
         now = time.monotonic()
         for outbox in self._outboxes:
             if outbox.is_due_at(webhook.place, now):
                 outbox.skip(failure)
-
-    def _next(self) -> Outbox | None:
-        """Wait for the next try, and return its queue; None at the end."""
-        with self._changed:
-            while not self._is_closed:
-                dues = [(due, one) for one in self._outboxes if (due := one.due()) is not None]
-                now = time.monotonic()
-                if ready := [one for due, one in dues if due <= now]:
-                    return min(ready, key=lambda one: one.tried)
-                first = min((due for due, _ in dues), default=None)
-                self._changed.wait(None if first is None else first - now)
-        return None
 
     def _failure(self, alert: Alert, webhook: Webhook) -> DeliveryError | None:
         try:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
-__all__ = ["SIGNATURE", "Secrets", "Webhook", "signature"]
+__all__ = ["SIGNATURE", "Place", "Secrets", "Webhook", "signature"]
 
 SIGNATURE = "X-Valve-Friction-Signature"
 """Header with the signature."""
@@ -16,6 +16,9 @@ SIGNATURE = "X-Valve-Friction-Signature"
 _URL = "VALVE_FRICTION_WEBHOOK_URL"
 _SECRET = "VALVE_FRICTION_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
 _TOKEN = "VALVE_FRICTION_WEBHOOK_TOKEN"  # noqa: S105
+
+Place = tuple[str, str, int]
+"""Scheme, host and port."""
 
 _PORTS = {"https": 443, "http": 80}
 
@@ -79,8 +82,8 @@ class Webhook:
         return cls.at(url, _URL) if url else None
 
     @property
-    def place(self) -> tuple[str, str, int]:
-        """Scheme, host and port."""
+    def place(self) -> Place:
+        """Its host."""
         return self.scheme, self.host, self.port
 
     @property

@@ -59,7 +59,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
         "List what the identifiers have kept: identifications, refusals, baselines, trend, "
-        "usage and recorded alarms."
+        "usage, answers to its command and recorded alarms."
     )
     parser.epilog = (
         "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "

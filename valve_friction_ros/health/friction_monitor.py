@@ -96,10 +96,10 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
 
 
 def _ago(age: int) -> str:
-    """Write an age, ns, as whole units before a comma; nothing where the clock went back."""
+    """Write an age, ns, as whole units before a comma; a clock that went back is told."""
     seconds = age / 1e9
     if seconds < 0:
-        return ""
+        return "at a time to come, by a clock that has gone back since, "
     units = (("days", 86400), ("h", 3600), ("min", 60))
     unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
     return f"{seconds // length:.0f} {unit} ago, "

@@ -5,6 +5,7 @@ from valve_friction_ros.history.alarm_rows import (
     alarm_recordings,
     keep_alarm_recording,
 )
+from valve_friction_ros.history.answer_rows import keep_answers, read_answers
 from valve_friction_ros.history.entry import (
     FrictionPoint,
     HistoryEntry,
@@ -42,11 +43,13 @@ __all__ = [
     "current_trend",
     "entry_of",
     "keep_alarm_recording",
+    "keep_answers",
     "keep_moves",
     "keep_reference",
     "keep_renewal",
     "keep_told_level",
     "keep_usage",
+    "read_answers",
     "read_moves",
     "read_reference",
     "read_told_level",

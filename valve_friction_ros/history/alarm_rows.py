@@ -1,5 +1,6 @@
 """The recordings of alarms in the history."""
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,14 +56,17 @@ def keep_alarm_recording(
     with writing(file.path) as connection:
         row = valve_id(connection, valve)
         connection.execute(
-            "INSERT OR IGNORE INTO alarm_recording (valve_id, time_ns, level, path, message) "
+            "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns = ?", (row, one.time)
+        )
+        connection.execute(
+            "INSERT OR REPLACE INTO alarm_recording (valve_id, time_ns, level, path, message) "
             "VALUES (?, ?, ?, ?, ?)",
             (row, one.time, int(one.level), str(one.path), one.message),
         )
         if days > 0:
             connection.execute(
                 "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns < ?",
-                (row, one.time - round(days * DAY)),
+                (row, min(one.time, time.time_ns()) - round(days * DAY)),
             )
 
 

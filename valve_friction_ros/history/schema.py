@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from valve_friction_ros.history.evidence_table import EVIDENCE_TABLE
 from valve_friction_ros.history.number_rows import NUMBER_TABLES
-from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, TOLD_LEVEL, USAGE
+from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, ANSWERS, TOLD_LEVEL, USAGE
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -161,7 +161,7 @@ UPDATE baseline SET
 """
 """Who set a baseline, at which level, and what it replaced: in an older file the row before it."""
 
-_SERVICE = ";".join((NUMBER_TABLES, USAGE, ALARM_RECORDINGS, TOLD_LEVEL, EVIDENCE_TABLE))
+_SERVICE = ";".join((NUMBER_TABLES, USAGE, ALARM_RECORDINGS, TOLD_LEVEL, EVIDENCE_TABLE, ANSWERS))
 """The tables of the valve in service."""
 
 _ADDED = {

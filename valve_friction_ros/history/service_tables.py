@@ -1,6 +1,6 @@
-"""The tables of the valve in service: its usage, recordings of its alarms, its told level."""
+"""The tables of the valve in service: its usage, alarms, told level and answers."""
 
-__all__ = ["ALARM_RECORDINGS", "TOLD_LEVEL", "USAGE"]
+__all__ = ["ALARM_RECORDINGS", "ANSWERS", "TOLD_LEVEL", "USAGE"]
 
 USAGE = """
 CREATE TABLE usage (
@@ -42,3 +42,33 @@ CREATE TABLE told_level (
 );
 """
 """The level of each valve that its alerts have told last."""
+
+ANSWERS = """
+CREATE TABLE IF NOT EXISTS answer (
+    id INTEGER PRIMARY KEY,
+    valve_id INTEGER NOT NULL REFERENCES valve,
+    travel REAL NOT NULL,
+    stamp INTEGER NOT NULL,
+    change REAL NOT NULL,
+    held REAL NOT NULL,
+    moved INTEGER NOT NULL CHECK (moved IN (0, 1)),
+    settled INTEGER NOT NULL CHECK (settled IN (0, 1)),
+    dead_time REAL,
+    t63 REAL,
+    t86 REAL,
+    overshoot REAL,
+    steady_error REAL,
+    deviation REAL,
+    high_deviation REAL,
+    pressure_delay REAL,
+    pressure_t86 REAL,
+    push REAL,
+    pressure REAL,
+    position REAL,
+    rested INTEGER NOT NULL CHECK (rested IN (0, 1)),
+    pressure_rested INTEGER NOT NULL CHECK (pressure_rested IN (0, 1)),
+    at_stop INTEGER NOT NULL CHECK (at_stop IN (0, 1)),
+    UNIQUE (valve_id, stamp)
+)
+"""
+"""A row for each answer of the stem to a step of its command, shares of the travel beside it."""

@@ -4,6 +4,7 @@ import json
 import sqlite3
 from collections.abc import Iterable
 
+from valve_friction_ros.history.answer_rows import forget_answers
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.evidence_rows import forget_evidence
 from valve_friction_ros.history.file import HistoryFile
@@ -48,7 +49,8 @@ def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[Use
 def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
     """Keep that the packing of a valve was renewed at a time, ns since 1970 (UTC).
 
-    The moves of the packing before go, and their reference: they say nothing of the new one.
+    The moves of the packing before go, their reference, and the answers to the command: they say
+    nothing of the new one.
     Raises HistoryError if it cannot be written.
     """
     with writing(file.path) as connection:
@@ -57,6 +59,7 @@ def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
             "INSERT OR IGNORE INTO packing_renewal (valve_id, time_ns) VALUES (?, ?)", (row, time)
         )
         forget_evidence(connection, row)
+        forget_answers(connection, row)
 
 
 def read_usage(file: HistoryFile, valve: str) -> ValveUsage:

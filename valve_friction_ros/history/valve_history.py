@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.friction_monitor import MonitorSettings
 from valve_friction_ros.history.alarm_rows import AlarmRecording, alarm_recordings
+from valve_friction_ros.history.answer_rows import read_answers
 from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.trend import Trend, trend_of
 from valve_friction_ros.history.usage_rows import read_usage
+from valve_friction_ros.response import ResponseSummary, summarised
 from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["ValveHistory", "current_trend", "valve_histories"]
@@ -35,6 +37,8 @@ class ValveHistory:
         What the valve has done, at any time.
     alarms : tuple of AlarmRecording
         The recordings of its alarms, oldest first.
+    response : ResponseSummary
+        Its answers to steps of its command, with the travel of the last one.
     """
 
     valve: KeptValve
@@ -44,6 +48,7 @@ class ValveHistory:
     baselines: tuple[KeptBaseline, ...] = ()
     usage: ValveUsage = field(default_factory=ValveUsage)
     alarms: tuple[AlarmRecording, ...] = ()
+    response: ResponseSummary = field(default_factory=lambda: summarised(()))
 
 
 def valve_histories(
@@ -68,7 +73,9 @@ def valve_histories(
         usage = read_usage(history, valve.name)
         recorded = alarm_recordings(history, valve.name)
         alarms = tuple(one for one in recorded if since <= one.time < until)
-        found.append(ValveHistory(valve, entries, kept, trend, baselines, usage, alarms))
+        answers = read_answers(history, valve.name)
+        response = summarised([one for one in answers if since <= one.stamp < until])
+        found.append(ValveHistory(valve, entries, kept, trend, baselines, usage, alarms, response))
     return tuple(found)
 
 

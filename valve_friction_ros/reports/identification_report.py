@@ -29,6 +29,7 @@ from valve_friction_ros.reports.identification_tables import (
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
 from valve_friction_ros.reports.published_words import published_words
+from valve_friction_ros.reports.response_section import response_section
 from valve_friction_ros.reports.usage_section import usage_section
 from valve_friction_ros.reports.valve_status import date_line, valve_status
 from valve_friction_ros.reports.valve_table import valve_table
@@ -64,9 +65,9 @@ def identification_report(record: IdentifiedRecord) -> Page:
 
     The status, the diagnosis in one sentence and the date, then parameters, uncertainty budget,
     friction against its baseline, the other numbers of the valve against theirs, trend, use, the
-    record, the valve signature, the evidence of the method, the measured against the simulated
-    position, the residual, notes, settings and versions. Parts that a method does not have are
-    left out.
+    answer to the command, the record, the valve signature, the evidence of the method, the measured
+    against the simulated position, the residual, notes, settings and versions. Parts that a method
+    does not have are left out.
     """
     return Page(
         f"Friction of {record.name}",
@@ -92,6 +93,8 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
         yield _trend(record.history)
     if (use := usage_section(record.usage, record.valve)) is not None:
         yield use
+    if record.response is not None and (answers := response_section(record.response)) is not None:
+        yield answers
     yield _record(record)
     yield _signature(record)
     drawing = result.drawing

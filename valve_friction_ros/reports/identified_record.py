@@ -18,6 +18,7 @@ from valve_friction_ros.health import (
 from valve_friction_ros.history import ValveHistory
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["IdentifiedRecord"]
@@ -49,6 +50,8 @@ class IdentifiedRecord:
         What was identified of this valve before.
     usage : ValveUsage
         What the valve has done.
+    response : ResponseSummary or None
+        Its answers to steps of its command.
     valve_limits : ValveLimits
         Bounds of what else may change on the valve.
     known : KnownNumbers or None
@@ -65,6 +68,7 @@ class IdentifiedRecord:
     healthy: Recording | None = field(default=None, repr=False)
     history: ValveHistory | None = field(default=None, repr=False)
     usage: ValveUsage = field(default_factory=ValveUsage, repr=False)
+    response: ResponseSummary | None = field(default=None, repr=False)
     valve_limits: ValveLimits = field(default_factory=ValveLimits)
     known: KnownNumbers | None = field(default=None, repr=False)
 

@@ -5,6 +5,7 @@ from valve_friction_ros.response.hunting import Hunting
 from valve_friction_ros.response.monitor import ResponseMonitor
 from valve_friction_ros.response.move import Move
 from valve_friction_ros.response.summary import (
+    FIGURES,
     SIZES,
     ResponseLimits,
     ResponseSummary,
@@ -14,6 +15,7 @@ from valve_friction_ros.response.summary import (
 )
 
 __all__ = [
+    "FIGURES",
     "SIZES",
     "Cause",
     "Hunting",

@@ -30,6 +30,10 @@ _NEAR = 0.1
 """Share of a swing at either end that counts as resting there: a sine is there for 0.41 of the
 time, a triangle for 0.2, a square for all of it."""
 
+_DRIVEN = 0.25
+"""Share of a swing by which the command itself may swing with it: noise hides it where it is small,
+so that the command seems to stand still."""
+
 _SQUARE, _SWINGING = 0.7, 0.5
 
 _Values = NDArray[np.float64]
@@ -89,13 +93,36 @@ def _near_ends(values: _Values, gate: float) -> float:
     return float(np.mean((values <= low + near) | (values >= high - near)))
 
 
-def hunting(stem: Samples, pressure: Samples, since: int, travel: float) -> Hunting | None:
+def _means(times: _Values, wanted: _Values, edges: _Values) -> _Values:
+    """Return the means of a command, which holds its value until its next sample, between edges."""
+    areas = np.concatenate([[0.0], np.cumsum(wanted[:-1] * np.diff(times))])
+    last = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
+    means: _Values = np.diff(areas[last] + wanted[last] * (edges - times[last])) / np.diff(edges)
+    return means
+
+
+def _own_swing(turns: _Values, times: _Values, wanted: _Values) -> float:
+    """Return how much the command swings with a stem that turns at these times.
+
+    It is the change of its mean from one swing to the next, and that a quarter of a period later,
+    as the square root of the sum of their squares: so the lag of the stem does not matter. Of a
+    sine it is 4/π of the amplitude.
+    """
+    edges = turns, (turns[1:] + turns[:-1]) / 2
+    changes = [np.median(np.abs(np.diff(_means(times, wanted, each)))) for each in edges]
+    return float(np.hypot(*changes))
+
+
+def hunting(
+    stem: Samples, pressure: Samples, wanted: Samples, since: int, travel: float
+) -> Hunting | None:
     """Look for a limit cycle since the command stands still.
 
     Parameters
     ----------
-    stem, pressure : Samples
-        Position, m, and pressure, Pa, at about ten samples a second.
+    stem, pressure, wanted : Samples
+        Position, m, pressure, Pa, and command, m, at about ten samples a second or, of the command,
+        when it changes.
     since : int
         Since when the command stands still, ns.
     travel : float
@@ -104,7 +131,7 @@ def hunting(stem: Samples, pressure: Samples, since: int, travel: float) -> Hunt
     Returns
     -------
     Hunting or None
-        None without five regular swings.
+        None without five regular swings, or where the command itself swings with them.
     """
     held = stem.stamps >= since
     times, x = (stem.stamps[held] - since) / 1e9, stem.values[held] / travel
@@ -124,6 +151,9 @@ def hunting(stem: Samples, pressure: Samples, since: int, travel: float) -> Hunt
     ):
         return None
     if times[-1] - times[turns[-1]] > _OVER * halves.max():
+        return None
+    asked = (wanted.stamps - since) / 1e9, wanted.values / travel
+    if _own_swing(times[turns], *asked) > _DRIVEN * float(np.median(swings)):
         return None
     cycle = slice(turns[0], turns[-1] + 1)
     p = np.interp(times[cycle] * 1e9 + since, pressure.stamps, pressure.values)

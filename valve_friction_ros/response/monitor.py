@@ -2,8 +2,10 @@
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from valve_friction_ros.response.command_steps import Change, CommandHolds
 from valve_friction_ros.response.hunting import Hunting, hunting
@@ -57,15 +59,18 @@ class ResponseMonitor:
     ----------
     travel : float
         Travel of the stem, m; finite.
+    earlier : sequence of Move
+        Moves from before, oldest first; the latest count.
     """
 
-    def __init__(self, travel: float) -> None:
+    def __init__(self, travel: float, earlier: Sequence[Move] = ()) -> None:
         if not 0 < travel < math.inf:
             raise ValueError("the travel must be finite")
         self._travel = travel
-        self._moves: deque[Move] = deque(maxlen=_RECENT)
+        self._moves: deque[Move] = deque(earlier, maxlen=_RECENT)
+        self._ended: deque[Move] = deque(maxlen=_RECENT)
         self.left_out = 0
-        self._summary = summarised(())
+        self._summary = summarised(tuple(self._moves))
         self.forget()
 
     def forget(self) -> None:
@@ -74,6 +79,7 @@ class ResponseMonitor:
         self._ahead: deque[tuple[int, float]] = deque(maxlen=_MOST_AHEAD)
         self._fast = {kind: SampleBuffer(_LONGEST + 5.0) for kind in _SIGNALS}
         self._slow = {kind: SampleBuffer(_HUNTING_WINDOW) for kind in _SIGNALS}
+        self._wanted = SampleBuffer(_HUNTING_WINDOW)
         self._offset = 0.0
         self._command = math.nan
         self._steady_since: int | None = None
@@ -107,6 +113,12 @@ class ResponseMonitor:
     def summary(self) -> ResponseSummary:
         """The latest 200 moves."""
         return self._summary
+
+    def drain(self) -> tuple[Move, ...]:
+        """Return the moves that have ended since the last call, the latest 200."""
+        ended = tuple(self._ended)
+        self._ended.clear()
+        return ended
 
     def deviation(self) -> tuple[Spread, float]:
         """Return mean and 95 % quantile in time of the magnitude, and the mean with its sign.
@@ -158,6 +170,8 @@ class ResponseMonitor:
             stamps, values = (np.array(part) for part in zip(*due, strict=True))
             inside = np.clip(values, 0.0, self._travel)
             changes += self._holds.take(Samples(stamps, inside))
+            new = _first_of_ticks(stamps, _SLOW_TICK, self._wanted.last_stamp)
+            self._wanted.extend(Samples(stamps[new], inside[new]))
             self._command = float(inside[-1])
             if self._steady_since is None:
                 self._steady_since = int(stamps[0])
@@ -177,9 +191,7 @@ class ResponseMonitor:
         good = np.isfinite(samples.values)
         stamps, values = samples.stamps[good], samples.values[good]
         for buffers, tick in ((self._fast, _TICK), (self._slow, _SLOW_TICK)):
-            last = buffers[kind].last_stamp
-            ticks = stamps // tick
-            first = np.diff(ticks, prepend=-1 if last is None else last // tick) > 0
+            first = _first_of_ticks(stamps, tick, buffers[kind].last_stamp)
             if first.any():
                 chosen = Samples(stamps[first], values[first])
                 if buffers is self._slow and kind is Kind.POSITION:
@@ -217,6 +229,7 @@ class ResponseMonitor:
             self.left_out += 1
             return
         self._moves.append(move)
+        self._ended.append(move)
         self._summary = summarised(tuple(self._moves))
 
     def _move(self, change: Change, end: int) -> Move | None:
@@ -236,10 +249,15 @@ class ResponseMonitor:
                 self._end(newest)
         if newest >= self._hunting_at and self._steady_since is not None:
             self._hunting_at = newest + round(_HUNTING_PERIOD * _SECOND)
-            stem, pressure = self._slow[Kind.POSITION], self._slow[Kind.PRESSURE]
-            self._hunting = hunting(
-                stem.samples(), pressure.samples(), self._steady_since, self._travel
-            )
+            stem, pressure = (self._slow[kind].samples() for kind in (Kind.POSITION, Kind.PRESSURE))
+            wanted = self._wanted.samples()
+            self._hunting = hunting(stem, pressure, wanted, self._steady_since, self._travel)
+
+
+def _first_of_ticks(stamps: NDArray[np.int64], tick: int, last: int | None) -> NDArray[np.bool_]:
+    """Return which samples are the first of their tick, ns, and of a later one than the last."""
+    ticks = stamps // tick
+    return np.diff(ticks, prepend=-1 if last is None else last // tick) > 0
 
 
 _SIGNALS = (Kind.PRESSURE, Kind.POSITION)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,10 +21,13 @@ from valve_friction_ros.response.blame import (
 from valve_friction_ros.response.hunting import Hunting
 from valve_friction_ros.response.move import Move
 
-__all__ = ["SIZES", "ResponseLimits", "ResponseSummary", "Spread", "found", "summarised"]
+__all__ = ["FIGURES", "SIZES", "ResponseLimits", "ResponseSummary", "Spread", "found", "summarised"]
 
 SIZES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, math.inf)
 """Bounds of the classes of steps, share of the travel."""
+
+FIGURES = ("dead_time", "t63", "t86", "overshoot", "steady_error", "steady_deviation")
+"""Names of the figures of a summary that are spreads."""
 
 _FEWEST = 5
 """Moves whose median is compared with a limit."""
@@ -49,6 +52,14 @@ class Spread(NamedTuple):
             return cls(math.nan, math.nan, math.nan, 0)
         low, median, high = (float(q) for q in np.percentile(finite, (10, 50, 90)))
         return cls(median, low, high, len(finite))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a mapping of plain values, None where nothing is known."""
+        return {name: _known(value) for name, value in self._asdict().items()}
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 @dataclass(frozen=True)
@@ -109,6 +120,16 @@ class ResponseSummary:
     ignored: tuple[Move, ...]
     by_size: tuple[tuple[int, int], ...]
     travel_per_pressure: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a mapping of plain values, None where nothing is known; times in s."""
+        return {
+            "moves": len(self.moves),
+            "ignored": len(self.ignored),
+            "largest_ignored": self.largest_ignored,
+            "smallest_answered": _known(self.smallest_answered),
+            **{name: getattr(self, name).to_dict() for name in FIGURES},
+        }
 
     @property
     def largest_ignored(self) -> float:

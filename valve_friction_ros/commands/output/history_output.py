@@ -86,6 +86,7 @@ def as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
                 "baselines": [_shown(kept) for kept in history.baselines],
                 "usage": usage_as_json(history.usage),
                 "alarm_recordings": alarms_as_json(history.alarms),
+                "response": history.response.to_dict(),
                 "entries": [_shown(entry) for entry in history.entries],
             }
             for history in histories
@@ -189,7 +190,7 @@ def print_table(histories: Sequence[ValveHistory]) -> None:
         console.print(table)
         for line in _trend_lines(history.trend):
             console.print(line)
-        for line in service_lines(history.usage, history.alarms):
+        for line in service_lines(history.usage, history.alarms, history.response):
             console.print(line)
         console.print()
 

@@ -9,8 +9,10 @@ from typing import Any
 from valve_friction_ros.commands.output.formatting import plain_console
 from valve_friction_ros.commands.output.valve_table import valve_table
 from valve_friction_ros.history import AlarmRecording, KeptValve
+from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.outside_text import harmless, printable
 from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.streams import utc
 from valve_friction_ros.usage import BINS, DAY, Usage, UsedDay, ValveUsage
 
@@ -50,14 +52,20 @@ def alarms_as_json(alarms: Sequence[AlarmRecording]) -> list[dict[str, Any]]:
     return [{**one.to_dict(), "time": _time(one.time)} for one in alarms]
 
 
-def service_lines(usage: ValveUsage, alarms: Sequence[AlarmRecording]) -> list[str]:
-    """Return what stands below the list of a valve: its usage, and its latest alarm recording."""
+def service_lines(
+    usage: ValveUsage,
+    alarms: Sequence[AlarmRecording] = (),
+    response: ResponseSummary | None = None,
+) -> list[str]:
+    """Return what stands below the list of a valve: its usage, its answers, its latest alarm."""
     lines = []
     if usage.days:
         since = f"since {_date(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
         lines.append(f"usage: {_words(usage.since_renewal)}, {since}")
         if usage.renewal:
             lines.append(f"usage: {_words(usage.total)}, in all")
+    if response is not None and response.moves:
+        lines.append(f"stem_command: {_answers(response)}")
     if alarms:
         last = alarms[-1]
         lines.append(
@@ -65,6 +73,20 @@ def service_lines(usage: ValveUsage, alarms: Sequence[AlarmRecording]) -> list[s
             f"{printable(str(last.path))}"
         )
     return lines
+
+
+def _answers(response: ResponseSummary) -> str:
+    """Return the medians of the answers."""
+    seconds = (("dead time", "dead_time"), ("T63", "t63"), ("T86", "t86"))
+    shares = (("overshoot", "overshoot"), ("steady error", "steady_error"))
+    figures = [
+        *(f"{word} {getattr(response, name).median:.3g} s" for word, name in seconds),
+        *(f"{word} {percentage(getattr(response, name).median)}" for word, name in shares),
+    ]
+    return (
+        f"{len(response.moves)} steps, {len(response.ignored)} ignored; medians: "
+        f"{', '.join(figures)}"
+    )
 
 
 def _words(usage: Usage) -> str:
@@ -110,7 +132,7 @@ def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool 
             first, last = (_date(usage.days[place].day * DAY) for place in (0, -1))
             console.print(f"usage: {_words(usage.total)}, from {first} to {last}")
         else:
-            for line in service_lines(usage, ()):
+            for line in service_lines(usage):
                 console.print(line)
         if (pace := usage.pace()) is not None:
             console.print(

@@ -24,7 +24,7 @@ from valve_friction_ros.nodes.identifier.alarm_folder import (
 from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
-from valve_friction_ros.nodes.identifier.report_service import report_writer
+from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_FOLDER,
     ALARM_MEGABYTES,
@@ -32,7 +32,6 @@ from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_RECORDING,
     ALARM_RECORDINGS,
 )
-from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import Worker
@@ -46,7 +45,7 @@ _LATE = 1.0
 
 
 class _Rise(NamedTuple):
-    """A rise of the level: the level, when, what was said, and the buffer of that time."""
+    """A rise of the level: the level, when, what was said, the buffer of that time, its bag."""
 
     level: Level
     time: int
@@ -54,10 +53,14 @@ class _Rise(NamedTuple):
     before: Snapshot
     newest: int | None
     clock: float
+    first: "Future[AlarmRecording] | None" = None
 
 
 class AlarmRecorder:
     """Saves the buffer from before and after a rise of the level, one at a time.
+
+    What was before is saved at once, so that it outlives a killed node; the bag with what came
+    after takes its place.
 
     The level is that of what samples can show: silent inputs, a history that cannot be written and
     the life of a packing do not count. The level at the start is none that has risen. After a rise,
@@ -70,14 +73,15 @@ class AlarmRecorder:
         node: Node,
         monitor: FrictionMonitor,
         history: HistoryWriter,
-        usage: UsageWatch,
+        reports: ReportWriter,
         worker: Worker,
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
-        self._usage, self._worker = usage, worker
+        self._reports, self._worker = reports, worker
         self._level: Level | None = None
         self._rise: _Rise | None = None
         self._last_rise: tuple[Level, float] | None = None
+        self._first: Future[AlarmRecording] | None = None
         self._bag: Future[AlarmRecording] | None = None
         self._page: Future[str | None] | None = None
         self._latest = history.last_alarm()
@@ -88,10 +92,12 @@ class AlarmRecorder:
         before, self._level = self._level, level
         self._settle()
         if before is not None and level > before:
-            self._risen(level, message)
+            self._risen(level, message, names)
         is_writing = self._bag is not None or self._page is not None
         if self._rise is not None and not is_writing and self._is_over(self._rise):
-            self._write_bag(self._rise, names)
+            after, _ = self._monitor.input()
+            whole = _joined(self._rise.before, after)
+            self._bag = self._written(self._rise, whole, names, self._rise.first)
             self._rise = None
 
     def values(self) -> dict[str, str]:
@@ -109,7 +115,7 @@ class AlarmRecorder:
     def _parameter(self, name: str) -> float:
         return float(self._node.get_parameter(name).value)
 
-    def _risen(self, level: Level, message: str) -> None:
+    def _risen(self, level: Level, message: str, names: StreamNames) -> None:
         last, now = self._last_rise, time.monotonic()
         if self._parameter(ALARM_RECORDING.name) <= 0:
             return
@@ -122,7 +128,9 @@ class AlarmRecorder:
         if last is not None and now - last[1] < pause and level <= last[0]:
             return
         buffer, stamp = self._monitor.buffer, self._node.get_clock().now().nanoseconds
-        self._rise = _Rise(level, stamp, message, buffer.snapshot(), buffer.newest_stamp, now)
+        rise = _Rise(level, stamp, message, buffer.snapshot(), buffer.newest_stamp, now)
+        self._first = self._written(rise, rise.before, names)
+        self._rise = rise._replace(first=self._first)
         self._last_rise = level, now
 
     def _is_over(self, rise: _Rise) -> bool:
@@ -133,19 +141,27 @@ class AlarmRecorder:
             return True
         return time.monotonic() - rise.clock >= after + _LATE
 
-    def _write_bag(self, rise: _Rise, names: StreamNames) -> None:
+    def _written(
+        self,
+        rise: _Rise,
+        samples: Snapshot,
+        names: StreamNames,
+        first: Future[AlarmRecording] | None = None,
+    ) -> Future[AlarmRecording]:
+        """Have the worker write a bag, which takes the place of the first one of the rise."""
         node = self._node
-        after, settings = self._monitor.input()
         given = node.get_parameter(ALARM_FOLDER.name).value
         most, room = self._bounds()
-        valve, samples = valve_name(node), _joined(rise.before, after)
+        valve = valve_name(node)
         name = recording_name(valve, rise.time, rise.level)
-        write = bag_writer(node, settings.valve, names)
+        write = bag_writer(node, self._monitor.settings.valve, names)
 
         def write_bag() -> AlarmRecording:
+            # The worker has done it: it does one thing after the other.
+            before = None if first is None or first.exception() else first.result().path
             with output_folder(given, "alarms", "an alarm's recording") as folder:
-                remove_oldest(folder, valve, most - 1, room)
-                path = write(folder, name, samples)
+                remove_oldest(folder, valve, most - (before is None), room, new=before)
+                path = write(folder, name, samples, before)
                 size = size_of(path)
                 if size > room:
                     remove_recording(path)
@@ -156,12 +172,12 @@ class AlarmRecorder:
                 remove_oldest(folder, valve, most, room, new=path)
             return AlarmRecording(rise.time, rise.level, path, rise.message)
 
-        self._bag = self._worker.submit(write_bag)
+        return self._worker.submit(write_bag)
 
     def _write_page(self, path: Path) -> None:
         """Write the page into the folder of the bag; it may take its time, and the bag is there."""
         try:
-            write = report_writer(self._node, self._monitor, self._history, self._usage.usage())
+            write = self._reports.of_now()
         except RefusalError:
             return  # an alarm from before a restart has no result
         valve, (most, room), page = valve_name(self._node), self._bounds(), path / PAGE
@@ -186,6 +202,10 @@ class AlarmRecorder:
 
     def _settle(self) -> None:
         """Take the outcome of what was written, if it has ended."""
+        if self._first is not None and self._first.done():
+            first, self._first = self._first, None
+            with self._trouble_told("the alarm was not recorded"):
+                self._keep(first.result())
         if self._page is not None and self._page.done():
             page, self._page = self._page, None
             with self._trouble_told("the page was not written"):
@@ -201,17 +221,22 @@ class AlarmRecorder:
             with bugs_reported(self._node):
                 yield
         except (RefusalError, InternalError) as error:
-            self._problem = f"{what}: {error}"
-            self._node.get_logger().warning(self._problem)
+            before, self._problem = self._problem, f"{what}: {error}"
+            if self._problem != before:
+                self._node.get_logger().warning(self._problem)
 
     def _saved(self, recording: AlarmRecording) -> None:
         self._latest, self._problem = recording, None
         self._node.get_logger().info(f"the alarm is recorded: {recording.path}")
+        self._keep(recording)
+        with self._trouble_told("the page was not written"):
+            self._write_page(recording.path)
+
+    def _keep(self, recording: AlarmRecording) -> None:
+        """Keep in the history that the alarm was recorded."""
         valve, days = self._history.valve, self._parameter(HISTORY_DAYS.name)
         keep = partial(keep_alarm_recording, valve=valve, one=recording, days=days)
         self._history.keep_soon(keep)
-        with self._trouble_told("the page was not written"):
-            self._write_page(recording.path)
 
 
 def _joined(before: Snapshot, after: Snapshot) -> Snapshot:

@@ -34,22 +34,23 @@ async def saved_bag(
 
     def write() -> Path:
         with output_folder(given, "saved", "a bag") as folder:
-            return write_into(folder, name, snapshot)
+            return write_into(folder, name, snapshot, None)
 
     return await done_in(worker, write)
 
 
 def bag_writer(
     node: Node, valve: Valve, names: StreamNames
-) -> Callable[[Path, str, Snapshot], Path]:
+) -> Callable[[Path, str, Snapshot, Path | None], Path]:
     """Return what writes a snapshot as a bag into a folder, by a name, in any thread.
 
-    It returns the path of the bag, and raises RefusalError if the libraries that bags need are not
-    there or the snapshot is empty, and OSError.
+    The last argument is a bag that it replaces, if any. It returns the path of the bag, and raises
+    RefusalError if the libraries that bags need are not there or the snapshot is empty, and
+    OSError.
     """
     described = {name: node.get_parameter(name).value for name in SETTINGS}
 
-    def write(folder: Path, name: str, snapshot: Snapshot) -> Path:
+    def write(folder: Path, name: str, snapshot: Snapshot, replaced: Path | None) -> Path:
         # Costs memory and time at the start, and most nodes never save.
         try:
             with bag_libraries():
@@ -57,6 +58,6 @@ def bag_writer(
         except ValueError as error:
             raise RefusalError(str(error)) from None
 
-        return write_bag(folder, name, snapshot, names, valve, described)
+        return write_bag(folder, name, snapshot, names, valve, described, replaced)
 
     return write

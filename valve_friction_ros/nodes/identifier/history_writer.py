@@ -33,15 +33,18 @@ from valve_friction_ros.history import (
     current_trend,
     entry_of,
     keep_told_level,
+    read_answers,
     read_moves,
     read_reference,
     read_told_level,
     read_usage,
     valve_histories,
 )
+from valve_friction_ros.nodes.identifier.history_guard import HistoryGuard
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.response import Move as CommandAnswer
 from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["HistoryWriter"]
@@ -77,6 +80,9 @@ class HistoryWriter:
             raise ValueError(
                 f"{HISTORY_FILE.name} {path}: {error} Set HOME or ROS_HOME, or name another file"
             ) from None
+        self._guard = None
+        if self._file is not None:
+            self._guard = HistoryGuard(self._file.path, self._valve.name)
         self._writer = Worker("history", finishes=True)
         self._waiting: deque[Callable[[HistoryFile], None]] = deque(maxlen=_MOST_WAITING)
         self._problem: str | None = None
@@ -102,6 +108,16 @@ class HistoryWriter:
         if (busy := self._writer.busy_for()) > _LONGEST:
             return [f"the history is not written: {self.path} has not answered for {busy:.0f} s"]
         return [f"the history is not written: {self._problem}"] if self._problem else []
+
+    @property
+    def conflict(self) -> str | None:
+        """That another node keeps the history of this valve, too, if so."""
+        return None if self._guard is None else self._guard.conflict
+
+    def close(self) -> None:
+        """Leave the history to another node."""
+        if self._guard is not None:
+            self._guard.release()
 
     def values(self) -> dict[str, str]:
         """Return the value of the diagnostic that says that nothing is kept, if so."""
@@ -145,6 +161,9 @@ class HistoryWriter:
         """
         name = self._valve.name
         self._tried(HistoryFile.prepare)
+        if self._guard is not None:
+            self._guard.ask()
+            self._guard.note()
         self._baseline = last = self._tried(lambda file: file.baseline(name))
         if last is not None:
             self._former = self._tried(lambda file: file.baseline(name, until=last.time))
@@ -232,9 +251,14 @@ class HistoryWriter:
         self.keep_soon(lambda file: keep_told_level(file, valve, level))
 
     def last_alarm(self) -> AlarmRecording | None:
-        """Read the latest recording of an alarm, if any."""
-        found = self._tried(lambda file: alarm_recordings(file, self._valve.name))
-        return found[-1] if found else None
+        """Read the latest recording of an alarm, if any.
+
+        Those of a time to come, from before the clock went back, are the latest if all are.
+        """
+        found = self._tried(lambda file: alarm_recordings(file, self._valve.name)) or ()
+        now = self._node.get_clock().now().nanoseconds
+        past = [one for one in found if one.time <= now]
+        return max(past or found, key=lambda one: one.time, default=None)
 
     async def keep_change(self, change: Callable[[HistoryFile], None]) -> None:
         """Make a change in the writer's thread, and wait until it is written."""
@@ -251,6 +275,11 @@ class HistoryWriter:
         built = self._monitor.settings.valve
         return self._tried(lambda file: read_reference(file, self._valve.name, built))
 
+    def answers(self) -> tuple[CommandAnswer, ...]:
+        """Read the answers of the stem to its command; none without a file."""
+        travel = self._monitor.settings.valve.travel
+        return self._tried(lambda file: read_answers(file, self._valve.name, travel)) or ()
+
     def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
         """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
 
@@ -265,7 +294,9 @@ class HistoryWriter:
             self._under_way.append(self._writer.submit(self._write_waiting, self._file))
 
     def settle(self) -> None:
-        """Take the outcomes of `keep_soon` that are there."""
+        """Take the outcomes of `keep_soon` that are there, and claim what was not granted."""
+        if self._guard is not None:
+            self._guard.ask()
         while self._under_way and self._under_way[0].done():
             with self._failures_remembered():
                 self._under_way.pop(0).result()
@@ -301,6 +332,26 @@ class HistoryWriter:
         return trend(file)
 
     def _write_waiting(self, file: HistoryFile) -> None:
+        if self._guard is None or not self._waiting:
+            return
+        if self._guard.is_another:
+            self._keep_again(file)
+        self._write_all(file)
+        self._guard.note()
+
+    def _keep_again(self, file: HistoryFile) -> None:
+        """Keep the baseline in force where the file was removed, or another one has none."""
+        name, kept = self._valve.name, self._baseline
+        told = "its baseline counts after a restart"
+        if kept is not None and not (file.path.exists() and file.baselines(name)):
+            file.set_baseline(self._valve, kept)
+            told = "the baseline in force is kept again"
+        self._node.get_logger().warning(
+            f"{file.path} was removed or replaced while the node runs: what it held of the valve "
+            f"is gone; {told}"
+        )
+
+    def _write_all(self, file: HistoryFile) -> None:
         while self._waiting:
             change = self._waiting[0]
             change(file)

@@ -30,7 +30,7 @@ from valve_friction_ros.nodes.identifier.parameters import (
     monitor_settings,
     require_valid,
 )
-from valve_friction_ros.nodes.identifier.report_service import written_report
+from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
@@ -115,12 +115,18 @@ class Identifier(PolledNode):
             results.publish(earlier, self._monitor)
         self._history.read_trend()
         self._usage = UsageWatch(self, self._monitor, self._history)
-        self._alarm = AlarmRecorder(self, self._monitor, self._history, self._usage, workers.files)
+        self._response = ResponseWatch(self, self._history)
+        self._reports = ReportWriter(
+            self, self._monitor, self._history, self._usage, self._response
+        )
+        self._alarm = AlarmRecorder(
+            self, self._monitor, self._history, self._reports, workers.files
+        )
         self._watches: tuple[Watch, ...] = (
             WholeValve(self._monitor),
             self._evidence,
             self._usage,
-            ResponseWatch(self),
+            self._response,
         )
         level = self._worst(one for watch in self._watches for one in watch.findings())
         self._alerts = Alerts(self, workers.alerts, self._history, level)
@@ -149,6 +155,8 @@ class Identifier(PolledNode):
         self._jump_handle.unregister()
         self._usage.close()
         self._evidence.close()
+        self._response.close()
+        self._history.close()
         super().destroy_node()
 
     def poll(self) -> None:
@@ -250,9 +258,7 @@ class Identifier(PolledNode):
         return str(await saved_bag(self, self._monitor, self._inputs.names, self._workers.files))
 
     async def _report(self) -> str:
-        files = self._workers.files
-        usage = self._usage.usage()
-        return str(await written_report(self, self._monitor, self._history, usage, files))
+        return str(await self._reports.written(self._workers.files))
 
     async def _set_baseline(self) -> str:
         answer = await self._baseline.set()
@@ -273,6 +279,7 @@ class Identifier(PolledNode):
     async def _reset_usage(self) -> str:
         self._inputs.take()
         self._evidence.renew()
+        self._response.renew()
         answer = await self._usage.reset()
         self._publish_diagnostics()
         return answer
@@ -311,7 +318,7 @@ class Identifier(PolledNode):
             self._monitor,
             now.nanoseconds,
             [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
-            self._history.problems,
+            [*self._history.problems, *filter(None, [self._history.conflict])],
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
                 **self._alarm.values(),

@@ -12,78 +12,88 @@ from valve_friction_ros.history import HistoryError, ValveHistory
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
+from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
+from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
 from valve_friction_ros.streams import utc
-from valve_friction_ros.usage import ValveUsage
 
-__all__ = ["report_writer", "written_report"]
-
-
-async def written_report(
-    node: Node,
-    monitor: FrictionMonitor,
-    history: HistoryWriter,
-    usage: ValveUsage,
-    worker: ThreadPoolExecutor,
-) -> Path:
-    """Write a page on the last result, in a thread of `worker`; return its path.
-
-    Raises RefusalError if there is no result, or the page cannot be written.
-    """
-    write_page = report_writer(node, monitor, history, usage)
-    given = node.get_parameter(REPORT_FOLDER.name).value
-    name = file_name(node, monitor.stamp or 0)
-
-    def write() -> Path:
-        with output_folder(given, "reports", "a report") as folder:
-            folder.mkdir(parents=True, exist_ok=True)
-            path = _free_name(folder, name)
-            write_page(path)
-            return path
-
-    return await done_in(worker, write)
+__all__ = ["ReportWriter"]
 
 
-def report_writer(
-    node: Node, monitor: FrictionMonitor, history: HistoryWriter, usage: ValveUsage
-) -> Callable[[Path], None]:
-    """Return what writes the page on the last result of now to a path, in any thread.
+class ReportWriter:
+    """Writes pages on the last result, with what is known of the valve beside it."""
 
-    Raises RefusalError if there is no result; what it returns raises OSError.
-    """
-    result, stamp, refusal = monitor.result, monitor.stamp, monitor.refusal
-    if result is None or stamp is None:
-        raise RefusalError("the valve has no result to report: identify it first")
-    time = utc(stamp)
-    title, node_name = history.valve.tag or node.get_name(), node.get_fully_qualified_name()
-    baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
-    valve_limits, known = monitor.settings.valve_limits, monitor.known
-    healthy = None if kept is None or kept.baseline != baseline else kept.record
-    notes = () if refusal is None else (f"a later record was refused: {refusal}",)
+    def __init__(
+        self,
+        node: Node,
+        monitor: FrictionMonitor,
+        history: HistoryWriter,
+        usage: UsageWatch,
+        response: ResponseWatch,
+    ) -> None:
+        self._node, self._monitor, self._history = node, monitor, history
+        self._usage, self._response = usage, response
 
-    def write(path: Path) -> None:
-        # Costs memory and time at the start, and most nodes never report.
-        from valve_friction_ros import reports  # noqa: PLC0415
+    async def written(self, worker: ThreadPoolExecutor) -> Path:
+        """Write a page on the last result, in a thread of `worker`; return its path.
 
-        before, unread = _read(history)
-        record = reports.IdentifiedRecord(
-            name=title,
-            source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
-            dated=f"identified {time:%Y-%m-%d %H:%M} UTC",
-            result=result,
-            baseline=baseline,
-            limits=limits,
-            valve_limits=valve_limits,
-            known=known,
-            notes=(*notes, *unread),
-            healthy=healthy,
-            history=before,
-            usage=usage,
-        )
-        reports.write_report(reports.identification_report(record), path)
+        Raises RefusalError if there is no result, or the page cannot be written.
+        """
+        write_page = self.of_now()
+        given = self._node.get_parameter(REPORT_FOLDER.name).value
+        name = file_name(self._node, self._monitor.stamp or 0)
 
-    return write
+        def write() -> Path:
+            with output_folder(given, "reports", "a report") as folder:
+                folder.mkdir(parents=True, exist_ok=True)
+                path = _free_name(folder, name)
+                write_page(path)
+                return path
+
+        return await done_in(worker, write)
+
+    def of_now(self) -> Callable[[Path], None]:
+        """Return what writes the page on the last result of now to a path, in any thread.
+
+        Raises RefusalError if there is no result; what it returns raises OSError.
+        """
+        monitor, history = self._monitor, self._history
+        result, stamp, refusal = monitor.result, monitor.stamp, monitor.refusal
+        if result is None or stamp is None:
+            raise RefusalError("the valve has no result to report: identify it first")
+        time = utc(stamp)
+        title = history.valve.tag or self._node.get_name()
+        node_name = self._node.get_fully_qualified_name()
+        baseline, limits, kept = monitor.baseline, monitor.settings.limits, history.baseline
+        valve_limits, known = monitor.settings.valve_limits, monitor.known
+        healthy = None if kept is None or kept.baseline != baseline else kept.record
+        notes = () if refusal is None else (f"a later record was refused: {refusal}",)
+        usage, response = self._usage.usage(), self._response.summary
+
+        def write(path: Path) -> None:
+            # Costs memory and time at the start, and most nodes never report.
+            from valve_friction_ros import reports  # noqa: PLC0415
+
+            before, unread = _read(history)
+            record = reports.IdentifiedRecord(
+                name=title,
+                source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
+                dated=f"identified {time:%Y-%m-%d %H:%M} UTC",
+                result=result,
+                baseline=baseline,
+                limits=limits,
+                valve_limits=valve_limits,
+                known=known,
+                notes=(*notes, *unread),
+                healthy=healthy,
+                history=before,
+                usage=usage,
+                response=response,
+            )
+            reports.write_report(reports.identification_report(record), path)
+
+        return write
 
 
 def _read(history: HistoryWriter) -> tuple[ValveHistory | None, list[str]]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from time import monotonic
 from typing import Any
@@ -12,8 +13,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros.health import Finding
+from valve_friction_ros.history import keep_answers
 from valve_friction_ros.nodes.identifier.command_trouble import CommandTrouble
-from valve_friction_ros.nodes.identifier.parameters import INPUT_TIMEOUT
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, INPUT_TIMEOUT
 from valve_friction_ros.nodes.identifier.service_parameters import (
     COMMAND_UNIT,
     RESPONSE_LIMITS,
@@ -25,8 +28,8 @@ from valve_friction_ros.nodes.plumbing.parameters import values_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream
 from valve_friction_ros.nodes.plumbing.raw_samples import positions_in, readable
-from valve_friction_ros.response import SIZES, ResponseMonitor, ResponseSummary, found
-from valve_friction_ros.streams import Arrivals, Kind, Samples
+from valve_friction_ros.response import SIZES, Move, ResponseMonitor, ResponseSummary, found
+from valve_friction_ros.streams import Arrivals, Kind, Samples, utc
 
 __all__ = ["ResponseWatch"]
 
@@ -36,22 +39,33 @@ _SILENCE = 1.0
 _EVERY = 0.5
 """Time, s, of samples that is taken at once: each call costs as much as a thousand samples."""
 
+_WRITE_EVERY = 5.0
+"""Time between two writings, s. A killed node loses so much, and the move under way."""
+
 _MOST_WAITING = 20_000
 """Samples that are taken at once at most, whatever their stamps."""
 
 
 class ResponseWatch:
-    """Follows ``stem_command``; without one it says nothing and keeps nothing."""
+    """Follows ``stem_command``; without one it says nothing, but what earlier runs have kept."""
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
+    def __init__(self, node: Node, history: HistoryWriter) -> None:
+        self._node, self._history = node, history
         self._polled = PolledSubscription(node, JointState, "stem_command", stream(), raw=True)
         self._input = InputWatch(node, self._polled.subscription)
         self._drop()
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
+        self._written_at = monotonic()
+        if earlier := history.answers():
+            self._begin(earlier)
         self._trouble = CommandTrouble()
         self._standing = self._wrong = ""
+
+    def _begin(self, earlier: Sequence[Move] = ()) -> ResponseMonitor:
+        self._travel = float(self._value(TRAVEL))
+        self._monitor = ResponseMonitor(self._travel, earlier)
+        return self._monitor
 
     def _drop(self) -> None:
         """Drop what was gathered."""
@@ -119,19 +133,43 @@ class ResponseWatch:
     def _work(self) -> None:
         """Hand on what was gathered; another travel, or an empty gathering, begins anew."""
         travel = float(self._value(TRAVEL))
+        if travel != self._travel:
+            self.close()
         if not math.isfinite(travel):
             self._drop()
             self._monitor = None
             return
-        if self._monitor is None or travel != self._travel:
-            self._monitor, self._travel = ResponseMonitor(travel), travel
+        monitor = self._monitor
+        if monitor is None or travel != self._travel:
+            monitor = self._begin()
         command = Samples.joined(*self._commands)
         arrived = Arrivals.joined(self._arrivals)
         self._drop()
-        self._monitor.take(command, arrived)
+        monitor.take(command, arrived)
         if command.stamps.size:
-            why = self._standing or _clock_problem(self._monitor.clock_offset)
+            why = self._standing or _clock_problem(monitor.clock_offset)
             self._trouble.take(why or self._wrong, not why, monotonic())
+
+    @property
+    def summary(self) -> ResponseSummary | None:
+        """The answers that count; None without any command."""
+        return None if self._monitor is None else self._monitor.summary
+
+    def renew(self) -> None:
+        """Begin anew, as the packing is renewed; the renewal that is kept says so to the file."""
+        self.close()
+        if self._monitor is not None:
+            self._begin()
+
+    def close(self) -> None:
+        """Write what is not written yet; the writer's thread finishes it."""
+        self._written_at = monotonic()
+        if self._monitor is not None and (moves := self._monitor.drain()):
+            days = self._node.get_parameter(HISTORY_DAYS.name).value
+            valve = self._history.valve
+            self._history.keep_soon(
+                partial(keep_answers, valve=valve, travel=self._travel, moves=moves, days=days)
+            )
 
     def findings(self) -> Sequence[Finding]:
         """Return what is wrong with the answers."""
@@ -159,6 +197,8 @@ class ResponseWatch:
 
     def values(self) -> Mapping[str, str]:
         """Return the figures of the latest moves."""
+        if monotonic() - self._written_at >= _WRITE_EVERY:
+            self.close()
         monitor = self._monitor
         why = self._standing or self._trouble.problem
         problem = {"stem_command problem": why} if why else {}
@@ -200,8 +240,11 @@ def _deviation_values(monitor: ResponseMonitor) -> dict[str, str]:
 
 
 def _move_values(summary: ResponseSummary, left_out: int) -> dict[str, str]:
-    values = {
-        "moves": str(len(summary.moves)),
+    values = {"moves": str(len(summary.moves))}
+    if summary.moves:
+        for name, one in (("since", summary.moves[0]), ("until", summary.moves[-1])):
+            values[f"moves {name} [time]"] = f"{utc(one.stamp):%Y-%m-%dT%H:%M:%SZ}"
+    values |= {
         "moves ignored": str(len(summary.ignored)),
         "changes left out": str(left_out),
         "largest ignored step [%]": _number(100 * summary.largest_ignored),

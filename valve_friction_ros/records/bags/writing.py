@@ -1,5 +1,6 @@
 """A buffer's content as a bag, so that it can be kept, sent and identified again."""
 
+import contextlib
 import errno
 import heapq
 import os
@@ -119,6 +120,7 @@ def write_bag(
     names: StreamNames,
     valve: Valve,
     settings: Mapping[str, Any],
+    replaced: Path | None = None,
 ) -> Path:
     """Write a snapshot as a bag of MCAP, with the stamps it was received with; return its path.
 
@@ -126,7 +128,8 @@ def write_bag(
     half a bag. The folder is made if it is not there; where the name is taken, a number is put
     after it. Rejected samples are only counted, in the metadata. A valve file lies in the bag, with
     the settings of the identification by the names of `records.valve_keys`: `valve_friction
-    identify BAG` gives the numbers that the snapshot gives.
+    identify BAG` gives the numbers that the snapshot gives. A bag of this folder that is
+    `replaced` goes once the new one is whole.
 
     Raises RefusalError if there is nothing to write, and OSError if it cannot be written; then
     nothing is left behind.
@@ -144,6 +147,9 @@ def write_bag(
         description = yaml.safe_dump({**asdict(valve), **settings}, sort_keys=False)
         (whole / VALVE_FILE).write_text(description, encoding="utf-8")
         _flush(whole)
+        if replaced is not None:
+            with contextlib.suppress(FileNotFoundError):
+                replaced.rename(workplace / "replaced")
         return _moved(whole, folder, name)
     finally:
         shutil.rmtree(workplace, ignore_errors=True)
