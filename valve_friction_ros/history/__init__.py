@@ -20,6 +20,7 @@ from valve_friction_ros.history.evidence_rows import (
     read_reference,
 )
 from valve_friction_ros.history.file import HistoryError, HistoryFile
+from valve_friction_ros.history.recent_ratios import KeptRatio, ratios_after
 from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
 from valve_friction_ros.history.usage_rows import keep_renewal, keep_usage, read_usage
@@ -34,6 +35,7 @@ __all__ = [
     "HistoryError",
     "HistoryFile",
     "KeptBaseline",
+    "KeptRatio",
     "KeptValve",
     "Limit",
     "Trend",
@@ -47,6 +49,7 @@ __all__ = [
     "keep_renewal",
     "keep_told_level",
     "keep_usage",
+    "ratios_after",
     "read_moves",
     "read_reference",
     "read_told_level",

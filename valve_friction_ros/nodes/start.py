@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 
-__all__ = ["identifier", "identifiers", "pressure_source", "simulator"]
+__all__ = ["dashboard", "identifier", "identifiers", "pressure_source", "simulator"]
 
 
 def _end(*_: object) -> None:
@@ -29,6 +29,11 @@ def _start(node: str) -> int:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(exit_code)
+
+
+def dashboard() -> int:
+    """Run the node `dashboard`."""
+    return _start("dashboard.node")
 
 
 def identifier() -> int:
