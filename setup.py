@@ -36,7 +36,9 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.10",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "**/*.xml", "**/*.html", "dashboard/pages/*.js", "dashboard/pages/*.css"]},
+    package_data={
+        NAME: ["py.typed", "**/*.xml", "**/*.html", "dashboard/pages/*.js", "dashboard/pages/*.css"]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

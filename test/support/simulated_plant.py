@@ -1,4 +1,4 @@
-"""The diagnostics of many made-up valves, as identifiers publish them; also a process of its own."""
+"""Diagnostics of many made-up valves, as identifiers publish them; also a process of its own."""
 
 import math
 import random

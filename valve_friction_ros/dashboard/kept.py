@@ -28,6 +28,15 @@ _CACHED = 8
 """Valves whose histories are kept in memory."""
 
 
+def _stamp_of(path: Path) -> tuple[int, int, int]:
+    """Return time, size and number of a file, zeros where it is not there."""
+    try:
+        status = path.stat()
+    except OSError:
+        return (0, 0, 0)
+    return (status.st_mtime_ns, status.st_size, status.st_ino)
+
+
 class KeptHistory:
     """What the history file says of all valves and of each.
 
@@ -58,15 +67,8 @@ class KeptHistory:
         """Return what changes when the file does, its journal included."""
         if self._file is None:
             return ()
-        path, found = self._file.path, []
-        for one in (path, path.with_name(path.name + "-wal")):
-            try:
-                status = one.stat()
-            except OSError:
-                found.append((0, 0, 0))
-            else:
-                found.append((status.st_mtime_ns, status.st_size, status.st_ino))
-        return tuple(found)
+        path = self._file.path
+        return tuple(map(_stamp_of, (path, path.with_name(path.name + "-wal"))))
 
     def refresh(self) -> bool:
         """Read what is new, if the file has changed; return whether it has."""

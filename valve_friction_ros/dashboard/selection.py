@@ -9,7 +9,16 @@ from urllib.parse import urlencode
 from valve_friction_ros.dashboard.plant import Heard
 from valve_friction_ros.health import StatusSignal
 
-__all__ = ["SIGNALS", "SORTS", "STATES", "Selection", "levels_in", "selected", "state_of", "worst_first"]
+__all__ = [
+    "SIGNALS",
+    "SORTS",
+    "STATES",
+    "Selection",
+    "levels_in",
+    "selected",
+    "state_of",
+    "worst_first",
+]
 
 STATES = ("error", "silent", "warn", "ok", "unknown")
 """States of a valve, the worst first."""
@@ -149,5 +158,3 @@ def levels_in(valves: Iterable[Heard]) -> dict[str, int]:
     for valve in valves:
         counts[state_of(valve)] += 1
     return counts
-
-

@@ -30,7 +30,18 @@ _USAGE = (
     "counting_dead_band",
     "usage",
 )
-_COMMAND = ("command ", "moves", "changes left", "largest ", "smallest ", "moved by ", "stem_command")
+_COMMAND = (
+    "command ",
+    "moves",
+    "changes left",
+    "largest ",
+    "smallest ",
+    "moved by ",
+    "stem_command",
+)
+
+
+_NO_DEAD_BAND = Quantity("dead_band", math.nan, unit="%")
 
 
 class Status(NamedTuple):
@@ -113,7 +124,7 @@ class ValveView:
     reason: str = ""
     identified: int | None = None
     ratio: Interval | None = None
-    dead_band: Quantity = Quantity("dead_band", math.nan, unit="%")
+    dead_band: Quantity = _NO_DEAD_BAND
     parameters: tuple[Quantity, ...] = ()
     baseline: tuple[Quantity, ...] = ()
     drift: Drift | None = None

@@ -23,10 +23,17 @@ from valve_friction_ros.history.file import HistoryError, HistoryFile
 from valve_friction_ros.history.recent_ratios import KeptRatio, ratios_after
 from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
+from valve_friction_ros.history.trend_words import (
+    LIMIT_NAMES,
+    drift_text,
+    end_of_trend,
+    friction_of,
+)
 from valve_friction_ros.history.usage_rows import keep_renewal, keep_usage, read_usage
 from valve_friction_ros.history.valve_history import ValveHistory, current_trend, valve_histories
 
 __all__ = [
+    "LIMIT_NAMES",
     "MONTH",
     "AlarmRecording",
     "Crossing",
@@ -42,7 +49,10 @@ __all__ = [
     "ValveHistory",
     "alarm_recordings",
     "current_trend",
+    "drift_text",
+    "end_of_trend",
     "entry_of",
+    "friction_of",
     "keep_alarm_recording",
     "keep_moves",
     "keep_reference",

@@ -9,7 +9,7 @@ __all__ = ["KeptRatio", "ratios_after"]
 
 
 class KeptRatio(NamedTuple):
-    """Friction of a valve over its baseline: the row, the valve's name, the time (ns), the ratio."""
+    """Friction of a valve over its baseline, and the row, valve's name and time (ns) of it."""
 
     row: int
     valve: str

@@ -39,7 +39,13 @@ _COLUMNS = [
         ("heard", "Heard", "", ""),
     )
 ]
-_STATE_TEXT = {"error": "error", "silent": "silent", "warn": "warn", "ok": "good", "unknown": "unknown"}
+_STATE_TEXT = {
+    "error": "error",
+    "silent": "silent",
+    "warn": "warn",
+    "ok": "good",
+    "unknown": "unknown",
+}
 
 
 class _PlantPage:

@@ -107,7 +107,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stop.is_followed = True
             rclpy.try_shutdown()
             return cannot_start(error)
-        board = Board(options, node.plant, KeptHistory(options.history_file), node.calls, node.signals)
+        board = Board(
+            options, node.plant, KeptHistory(options.history_file), node.calls, node.signals
+        )
         address = f"http://{options.host}:{options.port}/"
 
         def tell() -> None:

@@ -3,7 +3,7 @@
 import asyncio
 import time
 from concurrent.futures import Future
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Any
 
 from rclpy.node import Node
@@ -86,9 +86,6 @@ class ServiceCalls:
 
     def step(self, node: Node) -> None:
         """Go on with all calls; in the node's thread."""
-        while True:
-            try:
-                self._under_way.append(self._asked.get_nowait())
-            except Empty:
-                break
+        while not self._asked.empty():
+            self._under_way.append(self._asked.get_nowait())
         self._under_way = [one for one in self._under_way if not one.step(node)]

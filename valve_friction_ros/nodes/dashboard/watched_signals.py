@@ -82,8 +82,7 @@ class WatchedSignals:
 
 
 def _subscribed(node: PolledNode, identifier: str) -> list[PolledSubscription]:
-    """Subscribe to the topics of an identifier: the pressure, then the stem; none until both are
-    known."""
+    """Subscribe to the pressure and the stem of an identifier; to none until both are known."""
     namespace, _, name = identifier.rpartition("/")
     try:
         topics = node.get_subscriber_names_and_types_by_node(name, namespace or "/")
