@@ -9,9 +9,11 @@ from valve_friction_ros.dashboard.sparkline import Sparkline, sparkline
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
+    HistoryMark,
     KeptRatio,
     KeptValve,
     ValveHistory,
+    history_mark,
     ratios_after,
     valve_histories,
 )
@@ -53,6 +55,7 @@ class KeptHistory:
         self._file = None if path is None else HistoryFile(path)
         self._lock = threading.Lock()
         self._seen: tuple[object, ...] = ()
+        self._mark: HistoryMark | None = None
         self._row = 0
         self._ratios: defaultdict[str, deque[KeptRatio]] = defaultdict(
             lambda: deque(maxlen=_MOST_RATIOS)
@@ -77,20 +80,23 @@ class KeptHistory:
             if self._file is None or state == self._seen:
                 return False
             since = time.time_ns() - _SPARK_DAYS * _DAY
+            self._seen = state
             try:
+                mark = history_mark(self._file)
+                if mark == self._mark and self.problem is None:
+                    return False
                 self.valves = self._file.valves()
                 found = ratios_after(self._file, self._row, since)
             except HistoryError as error:
-                self.problem = str(error)
-                self._seen = state
-                return True
-            self.problem = None
+                is_new, self.problem = str(error) != self.problem, str(error)
+                self.revision += is_new
+                return is_new
+            self.problem, self._mark = None, mark
             for one in found:
                 self._ratios[one.valve].append(one)
                 self._sparks.pop(one.valve, None)
                 self._row = max(self._row, one.row)
             self._histories.clear()
-            self._seen = state
             self.revision += 1
             return True
 

@@ -23,6 +23,7 @@ SIGNAL_WORDS = {
     "M": "maintenance required",
     "": "good",
 }
+_SHORT = {"F": "failure", "C": "check", "S": "out of spec", "M": "maintenance"}
 _STATE_WORDS = {"silent": "silent", "unknown": "unknown", "ok": "good"}
 
 Row = dict[str, Any]
@@ -34,17 +35,23 @@ def state_words(valve: Heard) -> str:
     state = state_of(valve)
     if state in ("silent", "unknown"):
         return _STATE_WORDS[state]
-    return SIGNAL_WORDS[valve.view.signal.value] if valve.view.signal.value else state
+    return (
+        _SHORT[valve.view.signal.value]
+        if valve.view.signal.value
+        else _STATE_WORDS.get(state, state)
+    )
 
 
 def number_and_width(value: float, half_width: float) -> tuple[str, str]:
-    """Write a number and half the width of its interval, to the digits that it has."""
+    """Write a number and half the width of its interval, to four digits at most."""
     if not math.isfinite(value):
         return "–", ""
     if not math.isfinite(half_width) or half_width <= 0:
         return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}", ""
-    places = max(0, 1 - math.floor(math.log10(half_width)))
-    if places > 4 or abs(value) >= 1e6:
+    of_width = 1 - math.floor(math.log10(half_width))
+    of_value = 3 - math.floor(math.log10(abs(value))) if value else 3
+    places = min(max(0, min(of_width, of_value)), 6)
+    if abs(value) >= 1e6:
         return f"{value:.4g}", f"± {two_digits(half_width)}"
     return f"{value:.{places}f}".replace("-", "−"), f"± {two_digits(half_width)}"
 

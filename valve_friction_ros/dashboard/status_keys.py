@@ -72,7 +72,7 @@ def quantity(values: Mapping[str, str], name: str, unit: str) -> Quantity:
 
 def entries_of(values: Mapping[str, str], keys: Iterable[str]) -> tuple[Entry, ...]:
     """Return some values as entries, with numbers of four digits."""
-    return tuple(_entry(key, values[key]) for key in keys)
+    return tuple(_entry(key, values[key]) for key in keys if values[key])
 
 
 def _entry(key: str, text: str) -> Entry:
@@ -80,13 +80,13 @@ def _entry(key: str, text: str) -> Entry:
     name, unit = (match["name"], match["unit"] or "") if match else (key, "")
     value = number(text)
     shown = printable(text, _LONGEST) if math.isnan(value) and text != "nan" else _rounded(value)
-    unit = "" if unit == "date" else unit
+    unit = "" if unit in ("date", "time") else unit
     return Entry(printable(name.replace("_", " "), _LONGEST), shown, printable(unit, 40))
 
 
 def _rounded(value: float) -> str:
     if math.isnan(value):
         return "–"
-    if value == round(value) and abs(value) < 1e9:
+    if abs(value) < 1e9 and value == round(value):
         return f"{value:.0f}"
     return f"{value:.4g}"

@@ -16,8 +16,18 @@ from valve_friction_ros.dashboard.status_keys import (
 from valve_friction_ros.health import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
 
-__all__ = ["Drift", "Expected", "Interval", "Status", "ValveView", "identifier_in", "view_of"]
+__all__ = [
+    "Drift",
+    "Expected",
+    "Interval",
+    "Sources",
+    "Status",
+    "ValveView",
+    "identifier_in",
+    "view_of",
+]
 
+_SOURCES = ("pressure_topic", "stem_topic", "stem_joint")
 _SUFFIX = ": friction"
 _LONGEST = 2000
 _USAGE = (
@@ -72,6 +82,14 @@ class Expected(NamedTuple):
     latest: str
 
 
+class Sources(NamedTuple):
+    """Where the samples of a valve come from; empty names where that is unknown."""
+
+    pressure_topic: str = ""
+    stem_topic: str = ""
+    joint: str = ""
+
+
 class Drift(NamedTuple):
     """Drift of the friction, N a month, half its interval's width, and the limit ahead, if any."""
 
@@ -79,6 +97,9 @@ class Drift(NamedTuple):
     half_width: float
     of: str
     expected: Expected | None
+
+
+_NO_SOURCES = Sources()
 
 
 @dataclass(frozen=True)
@@ -111,6 +132,8 @@ class ValveView:
         Frictions of the baseline; empty without one.
     drift : Drift or None
         A significant drift.
+    sources : Sources
+        Topics of its samples.
     fit, evidence, usage, command, counters : tuple of Entry
         Further values, by what they are about.
     """
@@ -128,6 +151,7 @@ class ValveView:
     parameters: tuple[Quantity, ...] = ()
     baseline: tuple[Quantity, ...] = ()
     drift: Drift | None = None
+    sources: Sources = _NO_SOURCES
     fit: tuple[Entry, ...] = ()
     evidence: tuple[Entry, ...] = ()
     usage: tuple[Entry, ...] = ()
@@ -169,6 +193,7 @@ def view_of(node: str, status: Status) -> ValveView:
         parameters=parameters,
         baseline=_baseline(values),
         drift=_drift(values),
+        sources=Sources(*(values.get(key, "") for key in _SOURCES)),
         **_groups(values, {one.name for one in parameters}),
     )
 

@@ -20,7 +20,12 @@ from valve_friction_ros.history.evidence_rows import (
     read_reference,
 )
 from valve_friction_ros.history.file import HistoryError, HistoryFile
-from valve_friction_ros.history.recent_ratios import KeptRatio, ratios_after
+from valve_friction_ros.history.recent_ratios import (
+    HistoryMark,
+    KeptRatio,
+    history_mark,
+    ratios_after,
+)
 from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
 from valve_friction_ros.history.trend_words import (
@@ -41,6 +46,7 @@ __all__ = [
     "HistoryEntry",
     "HistoryError",
     "HistoryFile",
+    "HistoryMark",
     "KeptBaseline",
     "KeptRatio",
     "KeptValve",
@@ -53,6 +59,7 @@ __all__ = [
     "end_of_trend",
     "entry_of",
     "friction_of",
+    "history_mark",
     "keep_alarm_recording",
     "keep_moves",
     "keep_reference",

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 from valve_friction_ros.history.file import HistoryFile
-from valve_friction_ros.history.schema import reading
+from valve_friction_ros.history.schema import has_table, reading
 
-__all__ = ["KeptRatio", "ratios_after"]
+__all__ = ["HistoryMark", "KeptRatio", "history_mark", "ratios_after"]
 
 
 class KeptRatio(NamedTuple):
@@ -15,6 +15,37 @@ class KeptRatio(NamedTuple):
     valve: str
     time: int
     ratio: float
+
+
+class HistoryMark(NamedTuple):
+    """Last identification and baseline of a file, and its count of alarms and valves.
+
+    It changes when one of these is added; usage and moves, which are written often, leave it.
+    """
+
+    identification: int
+    baseline: int
+    alarms: int
+    valves: int
+
+
+def history_mark(file: HistoryFile) -> HistoryMark:
+    """Return the mark of a file as it is now.
+
+    Raises HistoryError if the file cannot be read.
+    """
+    with reading(file.path) as connection:
+
+        def one(query: str) -> int:
+            return int(connection.execute(query).fetchone()[0])
+
+        has_alarms = has_table(connection, "alarm_recording")
+        return HistoryMark(
+            one("SELECT coalesce(max(id), 0) FROM identification"),
+            one("SELECT coalesce(max(id), 0) FROM baseline"),
+            one("SELECT count(*) FROM alarm_recording") if has_alarms else 0,
+            one("SELECT count(*) FROM valve"),
+        )
 
 
 def ratios_after(file: HistoryFile, row: int, since: int) -> tuple[KeptRatio, ...]:

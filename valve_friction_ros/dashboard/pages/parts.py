@@ -8,6 +8,9 @@ from nicegui import ui
 from valve_friction_ros.dashboard.pages.theme import element
 from valve_friction_ros.dashboard.status_keys import Entry
 
+_LONG = 40
+"""Characters from which a value stands below its name."""
+
 __all__ = ["EntryList", "card", "chip", "table", "text"]
 
 
@@ -89,5 +92,6 @@ class EntryList:
             with element("dl", "vf-dl"):
                 for entry in entries:
                     text("dt", entry.name)
-                    with element("dd"):
+                    long = len(entry.text) > _LONG
+                    with element("dd", "vf-dd-long" if long else ""):
                         self._values.append(ui.label(""))

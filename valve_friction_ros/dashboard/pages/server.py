@@ -60,7 +60,7 @@ def serve(board: Board, started: Callable[[], None]) -> None:
         show_welcome_message=False,
         tailwind=False,
         binding_refresh_interval=None,
-        reconnect_timeout=10.0,
+        reconnect_timeout=5.0,
         timeout_graceful_shutdown=_GRACE,
     )
 

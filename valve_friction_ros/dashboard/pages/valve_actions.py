@@ -77,7 +77,7 @@ class ValveActions:
                 return
             await self._call(service)
 
-        made = ui.button(title, on_click=act).props("no-caps unelevated dense")
+        made = ui.button(title, on_click=act, color=None).props("no-caps unelevated dense")
         return made.classes("vf-act" + (" vf-act-first" if service == "identify" else ""))
 
     async def _agreed(self, service: str) -> bool:
@@ -107,12 +107,13 @@ class ValveActions:
                 else "This undoes the last setting of the baseline."
             ).classes("vf-none")
             with element("div", "vf-actions"):
-                ui.button("Cancel", on_click=lambda: dialog.submit(False)).props(
+                ui.button("Cancel", on_click=lambda: dialog.submit(False), color=None).props(
                     "flat no-caps autofocus"
                 )
                 ui.button(
                     "Set baseline" if is_set else "Restore baseline",
                     on_click=lambda: dialog.submit(True),
+                    color=None,
                 ).props("unelevated no-caps").classes("vf-act-first")
         agreed = bool(await dialog)
         dialog.delete()

@@ -69,13 +69,12 @@ def draw_baselines(history: ValveHistory | None, zone: ZoneInfo) -> None:
         text("p", "No baseline was set.", "vf-none")
         return
     table(
-        ("time", "from then on", "before", "by"),
+        ("time", "from then on", "before"),
         [
             (
                 moment(one.time, zone),
                 baseline_words(one.in_force),
                 baseline_words(one.replaced),
-                one.by.replace("_", " "),
             )
             for one in reversed(history.baselines[-_MOST:])
         ],

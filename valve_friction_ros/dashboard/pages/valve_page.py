@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 from urllib.parse import urlencode
 from zoneinfo import ZoneInfo
 
@@ -88,7 +89,7 @@ class _ValvePage:
     def _draw_cards(self) -> None:
         with card("Friction over time", "vf-wide") as self._trend_body:
             text("p", "The history is being read …", "vf-none")
-        with card("Parameters", "vf-tall") as self._parameters_body:
+        with card("Parameters") as self._parameters_body:
             pass
         with card("Pressure and stem", "vf-wide", "last 60 s, while this page is open"):
             self._live = ui.echart(live_chart(self._strip.span)).classes("vf-chart-live")
@@ -96,6 +97,15 @@ class _ValvePage:
             self._live_note = text("p", "No sample has come yet.", "vf-none")
         with card("Signature", "", "stem over pressure"):
             self._loop_body = element("div")
+        with card("Identifications", "vf-wide vf-long") as self._entries_body:
+            pass
+        with element("div", "vf-stack"):
+            with card("Baselines") as self._baselines_body:
+                pass
+            with card("Alarms") as self._alarms_body:
+                pass
+            with card("Reports and recordings") as self._files_body:
+                pass
         self._lists = {}
         for key, title, empty in (
             ("evidence", "Moves in service", "No move has been counted."),
@@ -106,14 +116,6 @@ class _ValvePage:
         ):
             with card(title):
                 self._lists[key] = EntryList(empty)
-        with card("Identifications", "vf-wide") as self._entries_body:
-            pass
-        with card("Baselines", "vf-wide") as self._baselines_body:
-            pass
-        with card("Alarms", "vf-wide") as self._alarms_body:
-            pass
-        with card("Reports and recordings", "vf-wide") as self._files_body:
-            pass
 
     async def _tick(self) -> None:
         self._beat += 1
@@ -243,12 +245,13 @@ class _ValvePage:
         kept, zone = self._history, self._page.zone
         self._draw_trend(kept, problem)
         self._draw_loop(kept)
-        for body, draw in (
+        draws: tuple[tuple[ui.element, Callable[[], None]], ...] = (
             (self._entries_body, lambda: draw_identifications(kept, zone, self._compare)),
             (self._baselines_body, lambda: draw_baselines(kept, zone)),
             (self._alarms_body, lambda: draw_alarms(kept, zone)),
             (self._files_body, lambda: draw_files(files or [], zone)),
-        ):
+        )
+        for body, draw in draws:
             body.clear()
             with body:
                 draw()

@@ -1,5 +1,7 @@
 """A plant's valves in a browser: their diagnosis, history and signals, and their services."""
 
+import contextlib
+import ctypes
 import sys
 import threading
 import time
@@ -10,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.dashboard import Plant, Status
+from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_from
 from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls
 from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
@@ -22,11 +25,13 @@ from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 
 __all__ = ["PARAMETERS", "Dashboard", "main"]
 
+_ARENA_MAX = -8
+"""M_ARENA_MAX of malloc.h."""
 _PAUSE = 0.05
 """Time between two turns, s: for so long messages gather."""
 _MISSING = (
-    "the dashboard needs NiceGUI, which is not installed: run "
-    "`pip install 'valve_friction_ros[dashboard]'`"
+    "cannot start: the dashboard needs NiceGUI, which is not installed: "
+    "run `pip install 'nicegui>=3.18,<4'`"
 )
 
 
@@ -39,8 +44,12 @@ class Dashboard(PolledNode):
         self.options = options_from(values_of(self, PARAMETERS))
         self.plant = Plant(self.options.silence)
         self.calls = ServiceCalls()
-        self.signals = WatchedSignals()
+        self.signals = WatchedSignals(self._sources_of)
         self._diagnostics = PolledSubscription(self, DiagnosticArray, "/diagnostics", stream())
+
+    def _sources_of(self, identifier: str) -> Sources:
+        heard = self.plant.valve(identifier, time.monotonic())
+        return Sources() if heard is None else heard.view.sources
 
     def poll(self) -> None:
         """Take what has been heard, and go on with what is asked."""
@@ -86,6 +95,12 @@ class _Turning:
         self._executor.shutdown(0.1)
 
 
+def _spare_memory() -> None:
+    """Let all threads share two arenas of glibc's memory: one a thread takes 50 MB more."""
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).mallopt(_ARENA_MAX, 2)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
     try:
@@ -97,6 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(_MISSING, file=sys.stderr)  # noqa: T201
         return 2
+    _spare_memory()
     with StopRequest() as stop:
         try:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

@@ -1,6 +1,7 @@
 """Signals of the valves whose pages are open."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,6 +9,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.dashboard.live_strip import LiveStrip
+from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.raw_samples import (
@@ -36,16 +38,57 @@ def _quality() -> QoSProfile:
 class _Watch:
     strip: LiveStrip
     lookers: int = 0
-    streams: list[PolledSubscription] = field(default_factory=list)
+    sources: Sources = field(default_factory=Sources)
+    streams: tuple[PolledSubscription, ...] = ()
+
+    def follow(self, node: PolledNode, sources: Sources) -> None:
+        """Subscribe to the topics of the valve, anew where they have changed."""
+        if sources != self.sources:
+            self.end(node)
+            self.sources = sources
+            if sources.pressure_topic and sources.stem_topic:
+                self.streams = (
+                    PolledSubscription(
+                        node, FluidPressure, sources.pressure_topic, _quality(), raw=True
+                    ),
+                    PolledSubscription(node, JointState, sources.stem_topic, _quality(), raw=True),
+                )
+
+    def end(self, node: PolledNode) -> None:
+        """End the subscriptions."""
+        for stream in self.streams:
+            node.destroy_subscription(stream.subscription)
+        self.streams, self.sources = (), Sources()
+
+    def take(self) -> None:
+        """Hand over what has arrived; what is no such message is left out."""
+        if not self.streams:
+            return
+        pressures, stems = (
+            readable(stream.take(), kind)
+            for stream, kind in zip(self.streams, (FluidPressure, JointState), strict=True)
+        )
+        if pressures:
+            self.strip.add(0, *pressures_in([one.message for one in pressures]))
+        if stems:
+            found = positions_in([one.message for one in stems], self.sources.joint)
+            known = np.isfinite(found.values)
+            self.strip.add(1, found.stamps[known], found.values[known])
 
 
 class WatchedSignals:
     """Subscribes to what an identifier subscribes to, as long as somebody looks.
 
     Pages count in and out from any thread; the node's thread subscribes.
+
+    Parameters
+    ----------
+    sources_of : callable
+        Returns the topics of a valve, by the name of its identifier.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, sources_of: Callable[[str], Sources]) -> None:
+        self._sources_of = sources_of
         self._lock = threading.Lock()
         self._watches: dict[str, _Watch] = {}
         self._dropped: list[_Watch] = []
@@ -73,48 +116,7 @@ class WatchedSignals:
             watches, dropped = dict(self._watches), self._dropped
             self._dropped = []
         for watch in dropped:
-            for stream in watch.streams:
-                node.destroy_subscription(stream.subscription)
+            watch.end(node)
         for name, watch in watches.items():
-            if not watch.streams:
-                watch.streams = _subscribed(node, name)
-            _take(watch)
-
-
-def _subscribed(node: PolledNode, identifier: str) -> list[PolledSubscription]:
-    """Subscribe to the pressure and the stem of an identifier; to none until both are known."""
-    namespace, _, name = identifier.rpartition("/")
-    try:
-        topics = node.get_subscriber_names_and_types_by_node(name, namespace or "/")
-    except Exception:  # noqa: BLE001 - rclpy's NodeNameNonExistentError and kin: it is not there
-        return []
-    found = {}
-    for topic, kinds in topics:
-        for kind, type_name in (
-            (FluidPressure, "sensor_msgs/msg/FluidPressure"),
-            (JointState, "sensor_msgs/msg/JointState"),
-        ):
-            if type_name in kinds:
-                found.setdefault(kind, topic)
-    if len(found) < 2:
-        return []
-    return [
-        PolledSubscription(node, kind, found[kind], _quality(), raw=True)
-        for kind in (FluidPressure, JointState)
-    ]
-
-
-def _take(watch: _Watch) -> None:
-    """Hand over what has arrived; what is no such message is left out."""
-    if not watch.streams:
-        return
-    pressures, stems = (
-        readable(stream.take(), kind)
-        for stream, kind in zip(watch.streams, (FluidPressure, JointState), strict=True)
-    )
-    if pressures:
-        watch.strip.add(0, *pressures_in([one.message for one in pressures]))
-    if stems:
-        found = positions_in([one.message for one in stems], "")
-        known = np.isfinite(found.values)
-        watch.strip.add(1, found.stamps[known], found.values[known])
+            watch.follow(node, self._sources_of(name))
+            watch.take()
