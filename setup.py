@@ -36,7 +36,9 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.10",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "**/*.xml", "**/*.html"]},
+    package_data={
+        NAME: ["py.typed", "**/*.xml", "**/*.html", "dashboard/pages/*.js", "dashboard/pages/*.css"]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -64,6 +66,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
+            "dashboard = valve_friction_ros.nodes.start:dashboard",
             "identifier = valve_friction_ros.nodes.start:identifier",
             "identifiers = valve_friction_ros.nodes.start:identifiers",
             "simulator = valve_friction_ros.nodes.start:simulator",

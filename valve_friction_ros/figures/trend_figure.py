@@ -7,12 +7,11 @@ from matplotlib.figure import Figure
 from valve_friction_ros.figures.page import labelled_in, legend_above
 from valve_friction_ros.figures.trend_panel import (
     draw_history,
-    drift_text,
     entitle,
     set_dates,
     span_of_time,
 )
-from valve_friction_ros.history import ValveHistory
+from valve_friction_ros.history import ValveHistory, drift_text
 
 __all__ = ["MOST_PANELS", "drift_text", "report_trend_figure", "trend_figure"]
 

@@ -9,17 +9,24 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.figures.panels import COLOURS
-from valve_friction_ros.health import Baseline, friction_words
-from valve_friction_ros.history import FrictionPoint, Trend, ValveHistory, trended
-from valve_friction_ros.identification import SLIDING, Verdict, two_digits
+from valve_friction_ros.health import friction_words
+from valve_friction_ros.history import (
+    LIMIT_NAMES,
+    FrictionPoint,
+    Trend,
+    ValveHistory,
+    drift_text,
+    end_of_trend,
+    friction_of,
+    trended,
+)
+from valve_friction_ros.identification import SLIDING, Verdict
 from valve_friction_ros.outside_text import printable
-from valve_friction_ros.streams import utc
 
 __all__ = ["draw_history", "drift_text", "entitle", "set_dates", "span_of_time"]
 
 _ESTIMATE, _TREND = COLOURS[:2]
 _LIMITS = {"warn_ratio": "#E69F00", "error_ratio": "#B2182B", "low_ratio": "#762A83"}
-_NAMES = {"warn_ratio": "worth maintenance", "error_ratio": "excess", "low_ratio": "may leak"}
 _MARGIN = 0.03
 """Height of the marks of refusals, as a share of the panel."""
 
@@ -38,17 +45,10 @@ def _dates(times: ArrayLike) -> NDArray[np.datetime64]:
     return np.asarray(times, dtype=np.int64).astype("datetime64[ns]")
 
 
-def _end_of_trend(trend: Trend) -> int:
-    """Return the time up to which a trend is drawn, ns."""
-    if trend.crossing is None:
-        return trend.end
-    return min(trend.crossing.latest, trend.end + 2 * (trend.end - trend.begin))
-
-
 def _end(history: ValveHistory) -> int:
     """Return the time up to which a valve is drawn, ns."""
     last, trend = history.entries[-1].time, history.trend
-    return last if trend is None else max(last, _end_of_trend(trend))
+    return last if trend is None else max(last, end_of_trend(trend))
 
 
 def span_of_time(histories: Sequence[ValveHistory], now: int | None) -> tuple[int, int]:
@@ -123,7 +123,7 @@ def _draw_limits(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> No
     of = trended(history.entries[-1].baseline)
     levels = np.array(
         [
-            np.nan if entry.baseline is None else _level(entry.baseline, of)
+            np.nan if (level := friction_of(entry.baseline, of)) is None else level
             for entry in history.entries
         ]
     )
@@ -143,14 +143,8 @@ def _draw_limits(axes: Axes, history: ValveHistory, span: tuple[int, int]) -> No
             color=colour,
             ls="--",
             lw=1.2,
-            label=f"{_NAMES[name]} ({name})",
+            label=f"{LIMIT_NAMES[name]} ({name})",
         )
-
-
-def _level(baseline: Baseline, of: str) -> float:
-    if of == SLIDING:
-        return np.nan if baseline.sliding is None else baseline.sliding.value
-    return np.nan if baseline.coulomb_friction is None else baseline.coulomb_friction
 
 
 def _what(history: ValveHistory) -> str:
@@ -220,7 +214,7 @@ def _draw_refusals(axes: Axes, history: ValveHistory) -> None:
 
 
 def _draw_trend(axes: Axes, trend: Trend) -> None:
-    time = np.linspace(0.0, float(_end_of_trend(trend) - trend.begin), 200)
+    time = np.linspace(0.0, float(end_of_trend(trend) - trend.begin), 200)
     dates, line = _dates(time + trend.begin), trend.line.at(time)
     half_width = trend.line.half_width(time)
     axes.plot(dates, line, color=_TREND, lw=1.5, label="trend, 95 % band")
@@ -234,12 +228,3 @@ def _draw_trend(axes: Axes, trend: Trend) -> None:
             ms=9,
             label="limit expected",
         )
-
-
-def drift_text(trend: Trend) -> str:
-    """Return the drift with its interval, and when a limit is expected to be crossed."""
-    text = f"{trend.drift:+.3g} ± {two_digits(trend.half_width)} N a month".replace("-", "−")
-    if trend.crossing is None:
-        return text
-    when = utc(trend.crossing.time)
-    return f"{text}; {_NAMES[trend.crossing.limit.value]} expected {when:%Y-%m-%d}"

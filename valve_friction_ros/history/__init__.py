@@ -21,12 +21,25 @@ from valve_friction_ros.history.evidence_rows import (
     read_reference,
 )
 from valve_friction_ros.history.file import HistoryError, HistoryFile
+from valve_friction_ros.history.recent_ratios import (
+    HistoryMark,
+    KeptRatio,
+    history_mark,
+    ratios_after,
+)
 from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
+from valve_friction_ros.history.trend_words import (
+    LIMIT_NAMES,
+    drift_text,
+    end_of_trend,
+    friction_of,
+)
 from valve_friction_ros.history.usage_rows import keep_renewal, keep_usage, read_usage
 from valve_friction_ros.history.valve_history import ValveHistory, current_trend, valve_histories
 
 __all__ = [
+    "LIMIT_NAMES",
     "MONTH",
     "AlarmRecording",
     "Crossing",
@@ -34,14 +47,20 @@ __all__ = [
     "HistoryEntry",
     "HistoryError",
     "HistoryFile",
+    "HistoryMark",
     "KeptBaseline",
+    "KeptRatio",
     "KeptValve",
     "Limit",
     "Trend",
     "ValveHistory",
     "alarm_recordings",
     "current_trend",
+    "drift_text",
+    "end_of_trend",
     "entry_of",
+    "friction_of",
+    "history_mark",
     "keep_alarm_recording",
     "keep_answers",
     "keep_moves",
@@ -49,6 +68,7 @@ __all__ = [
     "keep_renewal",
     "keep_told_level",
     "keep_usage",
+    "ratios_after",
     "read_answers",
     "read_moves",
     "read_reference",

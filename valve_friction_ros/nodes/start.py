@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 
-__all__ = ["identifier", "identifiers", "pressure_source", "simulator"]
+__all__ = ["dashboard", "identifier", "identifiers", "pressure_source", "simulator"]
 
 
 def _end(*_: object) -> None:
@@ -29,6 +29,12 @@ def _start(node: str) -> int:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(exit_code)
+
+
+def dashboard() -> int:
+    """Run the node `dashboard`, which computes nothing that is compiled."""
+    os.environ["NUMBA_DISABLE_JIT"] = "1"  # numba takes 110 MB
+    return _start("dashboard.node")
 
 
 def identifier() -> int:

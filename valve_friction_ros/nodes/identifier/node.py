@@ -322,6 +322,7 @@ class Identifier(PolledNode):
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
                 **self._alarm.values(),
+                **self._inputs.values(),
                 **self._history.values(),
                 **self._schedule.values(),
                 **self._readiness.values(),

@@ -64,6 +64,11 @@ class ValveInputs:
         """The topics, fully resolved, and the joint."""
         return StreamNames(self._pressure.watch.topic, self._stem.watch.topic, self._joint)
 
+    def values(self) -> dict[str, str]:
+        """Return the values of the diagnostic: where the samples come from."""
+        pressure, stem, joint = self.names
+        return {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
+
     def take(self) -> None:
         """Take the samples that have arrived."""
         pressures, stems = self._pressure.take(), self._stem.take()

@@ -18,7 +18,7 @@ from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
 from valve_friction_ros.nodes.plumbing.worker import workers_have_ended
 
-__all__ = ["run_node", "run_nodes"]
+__all__ = ["WRONG_REQUESTS", "cannot_start", "run_node", "run_nodes"]
 
 _PAUSE = 0.1
 _LIVELY_PAUSE = 0.02
@@ -33,11 +33,11 @@ _CLEAN_UP = 2.7
 _WORKERS_PATIENCE = 2.0
 """Time, s, that the end of the process leaves to what is being written."""
 
-_WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
+WRONG_REQUESTS = (NameValidationException, ParameterException, RuntimeError, ValueError)
 """What rclpy and the nodes raise where arguments, parameters or quality of service are wrong."""
 
 
-def _cannot_start(error: Exception) -> int:
+def cannot_start(error: Exception) -> int:
     """Write what was wrong in one line, and return the exit code."""
     cause = " ".join(str(error).split())
     if "log directory" in cause or "logging directory" in cause:  # rcl's words
@@ -110,9 +110,9 @@ def _run_until(
     arm()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    except _WRONG_REQUESTS as error:
+    except WRONG_REQUESTS as error:
         disarm()
-        return _cannot_start(error)
+        return cannot_start(error)
     try:
         try:
             for node in create():
@@ -120,8 +120,8 @@ def _run_until(
                 arm()
                 if stop.has_come:
                     return 0
-        except _WRONG_REQUESTS as error:
-            return _cannot_start(error)
+        except WRONG_REQUESTS as error:
+            return cannot_start(error)
         executor = TurnExecutor()
         for node in nodes:
             executor.add_node(node)

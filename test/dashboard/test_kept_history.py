@@ -1,0 +1,147 @@
+"""The history as the pages read it, and the charts of it."""
+
+import json
+import math
+import sqlite3
+from contextlib import closing
+from zoneinfo import ZoneInfo
+
+import pytest
+from histories import DAY, OTHER, START, VALVE, refused, success
+
+from valve_friction_ros.dashboard.charts import trend_chart
+from valve_friction_ros.dashboard.compared import compared, side_of_entry, side_of_view
+from valve_friction_ros.dashboard.kept import KeptHistory
+from valve_friction_ros.dashboard.status_keys import Quantity
+from valve_friction_ros.dashboard.valve_view import ValveView
+from valve_friction_ros.health import Baseline
+from valve_friction_ros.history import HistoryFile, KeptBaseline, history_mark, keep_usage
+from valve_friction_ros.usage import Usage, UsedDay
+
+NOW = START + 40 * DAY
+BASELINE = Baseline(150.0, 3.0)
+
+
+@pytest.fixture(autouse=True)
+def now(monkeypatch):
+    monkeypatch.setattr("time.time_ns", lambda: NOW)
+
+
+@pytest.fixture
+def file(tmp_path):
+    made = HistoryFile(tmp_path / "history.sqlite")
+    made.set_baseline(VALVE, KeptBaseline(BASELINE, START, START))
+    for day in range(30):
+        made.add(success(START + day * DAY, 150.0 + day, baseline=BASELINE))
+    made.add(refused(START + 31 * DAY, baseline=BASELINE))
+    return made
+
+
+def test_it_is_read_again_when_it_has_changed(file):
+    kept = KeptHistory(file.path)
+    assert kept.refresh()
+    assert not kept.refresh()
+    assert kept.valves == (VALVE,)
+    before = kept.spark(VALVE.name)
+    assert len(kept.valve(VALVE.name).entries) == 31
+    file.add(success(START + 32 * DAY, 300.0, baseline=BASELINE))
+    file.add(success(START + 32 * DAY, 100.0, valve=OTHER))
+    assert kept.refresh()
+    assert kept.spark(VALVE.name) != before
+    assert len(kept.valve(VALVE.name).entries) == 32
+    assert kept.spark(OTHER.name) is None  # without a baseline there is no ratio
+    assert {one.name for one in kept.valves} == {VALVE.name, OTHER.name}
+
+
+def test_what_is_written_often_draws_nothing_anew(file):
+    kept = KeptHistory(file.path)
+    kept.refresh()
+    mark, revision = history_mark(file), kept.revision
+    keep_usage(file, VALVE, "run", [UsedDay(20_000, 0, Usage(1.0, 2, 3, (4,) * 20))])
+    assert history_mark(file) == mark
+    assert not kept.refresh()
+    assert kept.revision == revision
+
+
+def test_a_file_that_is_missing_or_broken_is_a_problem_and_heals(tmp_path, file):
+    path = tmp_path / "later.sqlite"
+    kept = KeptHistory(path)
+    assert kept.refresh()
+    assert "no such file" in kept.problem
+    path.write_bytes(b"not a database, but long enough to be looked at" * 40)
+    kept.refresh()
+    assert "not a database" in kept.problem
+    path.write_bytes(file.path.read_bytes())
+    assert kept.refresh()
+    assert kept.problem is None
+    assert kept.spark(VALVE.name).days == 29
+
+
+def test_without_a_file_nothing_is_kept():
+    kept = KeptHistory(None)
+    assert not kept.refresh()
+    assert kept.valve(VALVE.name) is None
+    assert "no history_file" in kept.problem
+
+
+def test_it_is_read_while_another_process_writes(file):
+    with closing(sqlite3.connect(file.path, isolation_level=None)) as writer:
+        writer.execute("BEGIN IMMEDIATE")
+        writer.execute("UPDATE valve SET tag = 'half-way'")
+        kept = KeptHistory(file.path)
+        kept.refresh()
+        assert kept.valves == (VALVE,)
+        writer.execute("ROLLBACK")
+
+
+def series(chart, name):
+    return next(one for one in chart["series"] if one["name"] == name)
+
+
+def test_the_chart_shows_what_the_figure_shows(file):
+    kept = KeptHistory(file.path)
+    kept.refresh()
+    history = kept.valve(VALVE.name)
+    chart = trend_chart(history, ZoneInfo("UTC"), NOW)
+    json.dumps(chart, allow_nan=False)  # what goes to the browser
+    points = series(chart, "identified")["data"]
+    assert points[0] == [START // 1_000_000, 150.0]
+    assert [y for _, y in points] == [150.0 + day for day in range(30)]
+    low, high, pause = series(chart, "95 % interval")["data"][:3]
+    assert (low[1], high[1], pause[1]) == (147.0, 153.0, None)
+    assert {y for _, y in series(chart, "baseline")["data"]} == {150.0}
+    warn = history.entries[0].limits.warn_ratio
+    assert {y for _, y in series(chart, "worth maintenance")["data"]} == {150.0 * warn}
+    assert len(series(chart, "refused")["data"]) == 1
+    (time, level), trend = series(chart, "limit expected")["data"][0], history.trend
+    assert (time, level) == (trend.crossing.time // 1_000_000, pytest.approx(trend.crossing.level))
+    middle = series(chart, "trend")["data"]
+    assert middle[0][1] == pytest.approx(trend.line.at(0.0), rel=1e-5)
+
+
+def test_the_time_axis_is_the_clock_of_the_zone(file):
+    kept = KeptHistory(file.path)
+    kept.refresh()
+    chart = trend_chart(kept.valve(VALVE.name), ZoneInfo("Asia/Kolkata"), NOW)
+    assert series(chart, "identified")["data"][0][0] == START // 1_000_000 + 5.5 * 3600 * 1000
+
+
+def test_two_identifications_side_by_side(file):
+    first, *_, last = (one for one in file.entries() if not one.refusal)
+    rows = {one.name: one for one in compared(side_of_entry(first), side_of_entry(last))}
+    friction = rows["coulomb_friction"]
+    assert friction.ratio == pytest.approx(179 / 150)
+    assert friction.half_width == pytest.approx(179 / 150 * math.hypot(3 / 150, 3 / 179))
+    assert friction.verdict == "differs"
+    assert rows["mass"].verdict == ""  # it was given on both sides
+    assert rows["static_friction"].ratio_words == "–"
+
+
+def test_what_one_side_lacks_is_open():
+    one = ValveView("/a/identifier", "A", parameters=(Quantity("mass", 2.0, 0.1, "kg"),))
+    other = ValveView("/b/identifier", "B", parameters=(Quantity("spring_constant", 0.0, 0.1),))
+    mass, spring = compared(side_of_view(one), side_of_view(other))
+    assert math.isnan(mass.ratio)
+    assert math.isnan(spring.ratio)
+    same = compared(side_of_view(one), side_of_view(one))[0]
+    assert (same.ratio, same.verdict) == (1.0, "no difference seen")

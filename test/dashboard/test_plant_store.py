@@ -1,0 +1,117 @@
+"""The store of a plant: filled by one thread, drained by others."""
+
+import threading
+
+from simulated_plant import values_of_valve
+
+from valve_friction_ros.dashboard import Plant, Status
+from valve_friction_ros.dashboard.plant import MOST_VALVES
+from valve_friction_ros.dashboard.plant_rows import RowFeed, number_and_width, row_of
+from valve_friction_ros.dashboard.sparkline import sparkline
+
+DAY = 86_400_000_000_000
+
+
+def test_a_valve_is_silent_after_a_while(plant):
+    assert not any(one.is_silent for one in plant.valves(104.9))
+    assert all(one.is_silent for one in plant.valves(105.1))
+    plant.hear(Status(*values_of_valve(3)), 105.0)
+    silent = [one.view.tag for one in plant.valves(106.0) if not one.is_silent]
+    assert silent == ["FV-104"]
+
+
+def test_what_the_history_knows_is_missed():
+    plant = Plant(5.0)
+    plant.expect([("/area_1/fv_101/identifier", "FV-101"), ("/x/identifier", "X")])
+    plant.hear(Status(*values_of_valve(0)), 100.0)
+    first, second = plant.valves(101.0)
+    assert (first.silent_for, first.is_silent) == (1.0, False)
+    assert (second.view.tag, second.silent_for, second.is_silent) == ("X", None, True)
+    assert second.view.level is None
+
+
+def test_names_from_outside_do_not_fill_the_memory():
+    plant = Plant(5.0)
+    for index in range(MOST_VALVES + 10):
+        plant.hear(Status(f"/v{index}/identifier: friction", 0, "", "", {}), 0.0)
+    assert len(plant.valves(0.0)) == MOST_VALVES
+    plant.hear(Status("/v3/identifier: friction", 2, "", "late", {}), 1.0)
+    assert plant.valve("/v3/identifier", 1.0).view.sentence == "late"
+
+
+def test_it_is_filled_while_it_is_drained():
+    """Trap: a collection that changes while it is walked through."""
+    plant, stop, failures = Plant(5.0), threading.Event(), []
+
+    def fill():
+        index = 0
+        while not stop.is_set():
+            plant.hear(Status(f"/v{index % 3000}/identifier: friction", 0, "", "", {}), 0.0)
+            index += 1
+
+    def drain():
+        try:
+            for _ in range(30):
+                plant.valves(0.0)
+        except RuntimeError as error:
+            failures.append(error)
+
+    filling = threading.Thread(target=fill)
+    filling.start()
+    drains = [threading.Thread(target=drain) for _ in range(2)]
+    for one in drains:
+        one.start()
+    for one in drains:
+        one.join()
+    stop.set()
+    filling.join()
+    assert not failures
+
+
+def news(plant, feed, now, wall=1000.0):
+    return feed.news(plant.valves(now), lambda _: None, wall)
+
+
+def test_a_browser_is_sent_what_has_changed(plant):
+    feed = RowFeed(lambda node: f"/valve?node={node}")
+    first = news(plant, feed, 101.0)
+    assert [row["i"] for row in first["rows"]] == first["order"] == list(range(9))
+    # The next beat changes counters that the table does not show: only the clock is sent.
+    for index in range(9):
+        plant.hear(Status(*values_of_valve(index, beat=1)), 102.0)
+    again = news(plant, feed, 102.1, 1001.0)
+    made = {row["i"] for row in again.pop("rows", [])}
+    assert again == {"now": 1001.0}
+    assert not made - set(range(9))
+    silent = news(plant, feed, 110.0, 1009.0)
+    assert {row["state"] for row in silent["rows"]} == {"silent"}
+    assert {row["last"] for row in silent["rows"]} == {1001}
+    assert news(plant, feed, 111.0, 1010.4) == {"now": 1010.4}
+
+
+def test_a_row_has_fixed_keys_only(plant):
+    """The browser library evaluates keys that begin with a colon: none is from outside."""
+    plant.hear(
+        Status("/x/identifier: friction", 1, ":evil", ":evil", {":evil": "alert(1)", "a": ":b"}), 1
+    )
+    keys = [tuple(row_of(one, None, 0.0, "")) for one in plant.valves(100.0)]
+    assert len(set(keys)) == 1
+    assert not any(key.startswith(":") for key in keys[0])
+
+
+def test_numbers_have_the_digits_that_their_intervals_leave():
+    assert number_and_width(612.3456, 14.8) == ("612", "± 15")
+    assert number_and_width(5.21113, 0.0028) == ("5.211", "± 0.0028")
+    assert number_and_width(-3.14159, 0.21) == ("−3.14", "± 0.21")
+    assert number_and_width(float("nan"), 1.0) == ("–", "")
+    assert number_and_width(1.6, 0.0) == ("1.6", "")
+
+
+def test_a_sparkline_grows_upwards():
+    drawn = sparkline([0, DAY, 2 * DAY, 3 * DAY], [1.0, 1.2, 1.4, 2.0])
+    heights = [float(step.split()[1]) for step in drawn.path[1:].split("L")]
+    assert heights == sorted(heights, reverse=True)
+    assert drawn.days == 3
+    assert drawn.base.startswith(f"M0 {heights[0]}")
+    assert sparkline([0], [1.0]) is None
+    assert sparkline([0, DAY], [float("nan"), -1.0]) is None

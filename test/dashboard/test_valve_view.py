@@ -1,0 +1,115 @@
+"""A valve as it is shown, read from its diagnostic status."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from simulated_plant import values_of_valve
+
+from valve_friction_ros.dashboard import Status, view_of
+from valve_friction_ros.dashboard.valve_view import identifier_in
+from valve_friction_ros.health import Level, StatusSignal
+
+NODE = "/fv_101/identifier"
+
+
+def view(level=0, message="friction normal", hardware_id="FV-101", **values):
+    return view_of(NODE, Status(f"{NODE}: friction", level, hardware_id, message, values))
+
+
+def keyed(**changes):
+    values = {
+        "coulomb_friction [N]": "600",
+        "coulomb_friction half width [N]": "12",
+        "coulomb_friction verdict": "identified",
+        "spring_constant [N/m]": "2e5",
+        "spring_constant half width [N/m]": "4e3",
+        "spring_constant verdict": "identified",
+        "dead_band [%]": "21",
+        **changes,
+    }
+    return view_of(NODE, Status("", 1, "", "", values))
+
+
+def test_all_that_an_identifier_says_is_read():
+    name, level, tag, message, values = values_of_valve(4)  # a valve whose friction has grown
+    shown = view_of(identifier_in(name), Status(name, level, tag, message, values))
+    assert (shown.tag, shown.level, shown.signal) == (tag, Level.WARN, StatusSignal("M"))
+    assert shown.sentence == message
+    assert shown.ratio.low < shown.ratio.value < shown.ratio.high
+    assert shown.drift.expected.date == "2027-02-11"
+    by_name = {one.name: one for one in shown.parameters}
+    assert by_name["static_friction"].reason == "no slip jump was seen"
+    assert math.isnan(by_name["static_friction"].value)
+    assert by_name["mass"].verdict == "fixed"
+    assert by_name["spring_preload"].unit == "N"
+    (baseline,) = shown.baseline
+    assert baseline.name == "coulomb_friction"
+    # What has no place of its own is in exactly one list.
+    lists = (shown.fit, shown.evidence, shown.usage, shown.command, shown.counters)
+    names = [one.name for some in lists for one in some]
+    assert len(names) == len(set(names))
+    assert {"rms", "evidence moves", "reversals", "buffered samples"} <= set(names)
+
+
+def test_the_time_of_the_estimate_is_utc():
+    shown = view(estimate_time="2026-03-04T05:06:07.250000Z")
+    assert shown.identified == 1_772_600_767_250_000_000
+
+
+def test_the_interval_of_the_dead_band():
+    """(F_c + F_s)/k with F_s = F_c: 2 % of the friction, 2 % of the spring, independent."""
+    assert keyed().dead_band.half_width == pytest.approx(21 * math.hypot(0.02, 0.02))
+    fixed = keyed(**{"spring_constant verdict": "fixed"})
+    assert fixed.dead_band.half_width == pytest.approx(21 * 0.02)
+    slip = {"static_friction [N]": "900", "static_friction half width [N]": "48",
+            "static_friction verdict": "weak", "spring_constant verdict": "fixed"}  # fmt: skip
+    assert keyed(**slip).dead_band.half_width == pytest.approx(21 * 60 / 1500)
+
+
+def test_a_level_that_is_none_is_unknown():
+    assert view(level=3).level is None
+    assert view(level=2).level is Level.ERROR
+
+
+def test_without_a_tag_the_namespace_names_the_valve():
+    assert view(hardware_id="").tag == "fv_101"
+
+
+@pytest.mark.parametrize(
+    ("name", "node"),
+    [
+        ("/fv_101/identifier: friction", NODE),
+        ("/fv_101/identifier: temperature", None),
+        ("cpu: friction", None),
+        (": friction", None),
+        ("/" + "x" * 300 + ": friction", None),
+    ],
+)
+def test_only_identifiers_are_valves(name, node):
+    assert identifier_in(name) == node
+
+
+@given(
+    level=st.integers(0, 255),
+    words=st.text(max_size=50),
+    values=st.dictionaries(
+        st.one_of(
+            st.text(max_size=30),
+            st.sampled_from(
+                ["NE 107", "friction_ratio", "dead_band [%]", "estimate_time", "limit_expected",
+                 "coulomb_friction half width [N]", "coulomb_friction verdict",
+                 "friction_drift [N/month]"]
+            ),
+        ),
+        st.one_of(st.text(max_size=20), st.sampled_from(["nan", "inf", "-1", "0", "1e400"])),
+    ),
+)  # fmt: skip
+def test_nothing_that_is_heard_is_an_error(level, words, values):
+    """Anybody may publish: whatever comes is shown, without control characters."""
+    shown = view_of(NODE, Status(words, level, words, words, values))
+    assert shown.sentence.isprintable()
+    assert shown.tag.isprintable()
+    for some in (shown.fit, shown.evidence, shown.usage, shown.command, shown.counters):
+        assert all(one.text.isprintable() and one.name.isprintable() for one in some)

@@ -1,0 +1,35 @@
+"""All that the pages draw from."""
+
+from dataclasses import dataclass
+
+from valve_friction_ros.dashboard.graph import Operator, Signals
+from valve_friction_ros.dashboard.kept import KeptHistory
+from valve_friction_ros.dashboard.options import DashboardOptions
+from valve_friction_ros.dashboard.plant import Plant
+
+__all__ = ["Board"]
+
+
+@dataclass(frozen=True)
+class Board:
+    """What a dashboard shows, and whom it asks.
+
+    Attributes
+    ----------
+    options : DashboardOptions
+        How it was started.
+    plant : Plant
+        The valves as they were heard.
+    kept : KeptHistory
+        Their history.
+    operator : Operator
+        Calls their services.
+    signals : Signals
+        Hears their signals.
+    """
+
+    options: DashboardOptions
+    plant: Plant
+    kept: KeptHistory
+    operator: Operator
+    signals: Signals

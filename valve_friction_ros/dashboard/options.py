@@ -1,0 +1,65 @@
+"""How the dashboard is started."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+__all__ = ["DashboardOptions", "zone_of"]
+
+_LOCAL = ("127.0.0.1", "::1", "localhost")
+
+
+def zone_of(name: str) -> ZoneInfo:
+    """Return a time zone by its IANA name; raises ValueError for an unknown one."""
+    try:
+        return ZoneInfo(name)
+    except (ZoneInfoNotFoundError, ValueError, OSError):
+        raise ValueError(
+            f"time_zone {name!r} is unknown: give an IANA name such as UTC or Europe/Berlin"
+        ) from None
+
+
+@dataclass(frozen=True)
+class DashboardOptions:
+    """Address, files and times of a dashboard.
+
+    Attributes
+    ----------
+    host, port : str, int
+        Where it listens.
+    history_file : Path or None
+        The history of the valves; None: there is none.
+    folders : mapping of str to Path
+        What it serves files from, by name: ``reports``, ``bags``, ``alarms``.
+    time_zone : str
+        Zone of the times, where the address names no other.
+    silence : float
+        Time without a message after which a valve is silent, s.
+
+    Raises
+    ------
+    ValueError
+        If the host is not this machine, the port or the silence is impossible, or the zone unknown.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    history_file: Path | None = None
+    reports: Path | None = None
+    bags: Path | None = None
+    alarms: Path | None = None
+    time_zone: str = "UTC"
+    silence: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Refuse impossible options."""
+        if self.host not in _LOCAL:
+            raise ValueError(
+                f"host {self.host!r} is not this machine, and there is no log-in: use 127.0.0.1, "
+                "and reach it by `ssh -L`"
+            )
+        if not 0 < self.port < 65536:
+            raise ValueError(f"port {self.port} is impossible: give one from 1 to 65535")
+        if not self.silence > 0:
+            raise ValueError(f"silence must be above 0 s, got {self.silence:g}")
+        zone_of(self.time_zone)

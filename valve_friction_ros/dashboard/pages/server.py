@@ -1,0 +1,96 @@
+"""The server of the pages."""
+
+import socket
+from collections.abc import Awaitable, Callable
+
+from fastapi import Request, Response
+from fastapi.responses import FileResponse
+from nicegui import app, run, ui
+
+from valve_friction_ros.dashboard.board import Board
+from valve_friction_ros.dashboard.pages.compare_page import compare_page
+from valve_friction_ros.dashboard.pages.plant_page import plant_page
+from valve_friction_ros.dashboard.pages.theme import load_style
+from valve_friction_ros.dashboard.pages.valve_page import valve_page
+from valve_friction_ros.dashboard.valve_files import ValveFiles
+
+__all__ = ["require_free", "serve"]
+
+_Draw = Callable[[Board, dict[str, str]], Awaitable[None] | None]
+
+_GRACE = 1
+"""Time, s, that open connections have at the end."""
+
+
+def require_free(host: str, port: int) -> None:
+    """Raise ValueError if an address cannot be listened at."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as tried:
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind((host, port))
+        except OSError as error:
+            raise ValueError(
+                f"{host}:{port} cannot be listened at ({error.strerror}): give another port"
+            ) from None
+
+
+def serve(board: Board, started: Callable[[], None]) -> None:
+    """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened."""
+    load_style()
+    pages: dict[str, _Draw] = {"/": plant_page, "/valve": valve_page, "/compare": compare_page}
+    for path, draw in pages.items():
+        _add_page(board, path, draw)
+
+    _add_files(ValveFiles.of(board.options))
+
+    async def begin() -> None:
+        await run.io_bound(board.kept.refresh)
+        started()
+
+    app.on_startup(begin)
+    ui.run(
+        host=board.options.host,
+        port=board.options.port,
+        title="Valve friction",
+        dark=None,
+        language="en-US",
+        reload=False,
+        show=False,
+        show_welcome_message=False,
+        tailwind=False,
+        binding_refresh_interval=None,
+        reconnect_timeout=5.0,
+        timeout_graceful_shutdown=_GRACE,
+    )
+
+
+def _add_page(board: Board, path: str, draw: _Draw) -> None:
+    @ui.page(path)
+    async def page(request: Request) -> None:
+        drawing = draw(board, dict(request.query_params))
+        if drawing is not None:
+            await drawing
+
+
+_SANDBOX = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+"""What a report may do: it is a file from outside, so it runs no script and loads nothing."""
+
+
+def _add_files(files: ValveFiles) -> None:
+    """Offer reports and bags, from their folders alone."""
+
+    def offered(kind: str, path: str) -> Response:
+        found = files.found(kind, path)
+        if found is None:
+            return Response("There is no such file.", 404, media_type="text/plain")
+        is_page = found.suffix.lower() == ".html"
+        headers = {"Content-Security-Policy": _SANDBOX, "X-Content-Type-Options": "nosniff"}
+        return FileResponse(
+            found,
+            media_type="text/html" if is_page else "application/octet-stream",
+            filename=None if is_page else found.name,
+            headers=headers,
+        )
+
+    app.add_api_route("/files/{kind}/{path:path}", offered, methods=["GET"])

@@ -1,0 +1,100 @@
+"""The valves of a plant as they were heard last: filled by callbacks, drained by pages."""
+
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from valve_friction_ros.dashboard.valve_view import Status, ValveView, identifier_in, view_of
+
+__all__ = ["MOST_VALVES", "Heard", "Plant"]
+
+MOST_VALVES = 5000
+"""Most valves that are kept: the names come from outside, and might never end."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A valve, and how long ago it was heard.
+
+    Attributes
+    ----------
+    number : int
+        Number of the valve in this run of the dashboard.
+    view : ValveView
+        What is known of it.
+    silent_for : float or None
+        Time since its last message, s; None where it has never been heard.
+    is_silent : bool
+        Whether that is too long.
+    """
+
+    number: int
+    view: ValveView
+    silent_for: float | None
+    is_silent: bool
+
+
+class _Valve:
+    """The newest status of a valve; its view is made when somebody looks."""
+
+    def __init__(self, number: int, view: ValveView) -> None:
+        self.number = number
+        self.at: float | None = None
+        self.unread: Status | None = None
+        self.view = view
+
+
+class Plant:
+    """What is known of each valve, behind a lock: any thread may write and read.
+
+    A page never draws in a callback of ROS: it takes `valves` in a timer of its own.
+
+    Parameters
+    ----------
+    silence : float
+        Time without a message, s, after which a valve counts as silent.
+    """
+
+    def __init__(self, silence: float) -> None:
+        self._silence = silence
+        self._lock = threading.Lock()
+        self._valves: dict[str, _Valve] = {}
+
+    def hear(self, status: Status, at: float) -> None:
+        """Take a status that came at a time, s of the monotonic clock; ignore another node's."""
+        node = identifier_in(status.name)
+        if node is None:
+            return
+        with self._lock:
+            if (valve := self._entry(node, "")) is not None:
+                valve.at, valve.unread = at, status
+
+    def expect(self, valves: Iterable[tuple[str, str]]) -> None:
+        """Show valves, (identifier, tag) each, that were never heard: silent until they are."""
+        with self._lock:
+            for node, tag in valves:
+                self._entry(node, tag)
+
+    def _entry(self, node: str, tag: str) -> _Valve | None:
+        valve = self._valves.get(node)
+        if valve is None and len(self._valves) < MOST_VALVES:
+            view = view_of(node, Status("", 3, tag, "", {}))
+            valve = self._valves[node] = _Valve(len(self._valves), view)
+        return valve
+
+    def valves(self, now: float) -> list[Heard]:
+        """Return all valves as they are at a time, s of the monotonic clock, in a fixed order."""
+        with self._lock:
+            return [self._heard(node, valve, now) for node, valve in self._valves.items()]
+
+    def valve(self, node: str, now: float) -> Heard | None:
+        """Return the valve of an identifier, if it is known."""
+        with self._lock:
+            valve = self._valves.get(node)
+            return None if valve is None else self._heard(node, valve, now)
+
+    def _heard(self, node: str, valve: _Valve, now: float) -> Heard:
+        if valve.unread is not None:
+            valve.view, valve.unread = view_of(node, valve.unread), None
+        age = None if valve.at is None else max(0.0, now - valve.at)
+        return Heard(valve.number, valve.view, age, age is None or age > self._silence)

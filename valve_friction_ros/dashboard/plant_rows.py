@@ -1,0 +1,150 @@
+"""Rows of the plant's table: texts and numbers ready for the browser, and what has changed."""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from valve_friction_ros.dashboard.plant import Heard
+from valve_friction_ros.dashboard.selection import state_of
+from valve_friction_ros.dashboard.sparkline import Sparkline
+from valve_friction_ros.dashboard.valve_view import Interval, ValveView
+from valve_friction_ros.identification import two_digits
+
+__all__ = ["SIGNAL_WORDS", "RowFeed", "row_of", "state_words"]
+
+_SAY = 240
+_LOWEST, _HIGHEST = 0.25, 4.0
+"""Ends of the bar of a ratio, a logarithmic axis."""
+
+SIGNAL_WORDS = {
+    "F": "failure",
+    "C": "check function",
+    "S": "out of specification",
+    "M": "maintenance required",
+    "": "good",
+}
+_SHORT = {"F": "failure", "C": "check", "S": "out of spec", "M": "maintenance"}
+_STATE_WORDS = {"silent": "silent", "unknown": "unknown", "ok": "good"}
+
+Row = dict[str, Any]
+"""A row under fixed keys: no key is ever a text from outside."""
+
+
+def state_words(valve: Heard) -> str:
+    """Return the state of a valve in a word or two."""
+    state = state_of(valve)
+    if state in ("silent", "unknown"):
+        return _STATE_WORDS[state]
+    return (
+        _SHORT[valve.view.signal.value]
+        if valve.view.signal.value
+        else _STATE_WORDS.get(state, state)
+    )
+
+
+def number_and_width(value: float, half_width: float) -> tuple[str, str]:
+    """Write a number and half the width of its interval, to four digits at most."""
+    if not math.isfinite(value):
+        return "–", ""
+    if not math.isfinite(half_width) or half_width <= 0:
+        return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}", ""
+    of_width = 1 - math.floor(math.log10(half_width))
+    of_value = 3 - math.floor(math.log10(abs(value))) if value else 3
+    places = min(max(0, min(of_width, of_value)), 6)
+    if abs(value) >= 1e6:
+        return f"{value:.4g}", f"± {two_digits(half_width)}"
+    return f"{value:.{places}f}".replace("-", "−"), f"± {two_digits(half_width)}"
+
+
+def _place(ratio: float) -> float:
+    span = math.log(_HIGHEST / _LOWEST)
+    bounded = min(max(ratio, _LOWEST), _HIGHEST) if ratio > 0 else _LOWEST
+    return round(100 * math.log(bounded / _LOWEST) / span, 1)
+
+
+def _ratio(ratio: Interval | None) -> Row:
+    if ratio is None:
+        return {"ratio": "–", "between": "", "bar": None}
+    between = f"{ratio.low:.2f}–{ratio.high:.2f}" if math.isfinite(ratio.low) else ""
+    bar = [_place(one) if math.isfinite(one) else _place(ratio.value) for one in ratio[:3]]
+    return {"ratio": f"{ratio.value:.2f}", "between": between, "bar": bar}
+
+
+def _drift(view: ValveView) -> Row:
+    if view.drift is None:
+        return {"drift": "–", "expected": ""}
+    value, width = number_and_width(view.drift.value, view.drift.half_width)
+    sign = "+" if view.drift.value > 0 else ""
+    expected = view.drift.expected
+    return {
+        "drift": f"{sign}{value} {width}".strip(),
+        "expected": f"limit {expected.date}" if expected else "",
+    }
+
+
+def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row:
+    """Return the row of a valve; `wall` is the time of day, s since 1970."""
+    view = valve.view
+    dead, dead_width = number_and_width(view.dead_band.value, view.dead_band.half_width)
+    friction = view.parameter("coulomb_friction")
+    if not friction.is_known:
+        friction = view.parameter("sliding_friction")
+    value, width = number_and_width(friction.value, friction.half_width)
+    silent = valve.is_silent and valve.silent_for is not None
+    return {
+        "i": valve.number,
+        "tag": view.tag,
+        "place": view.namespace,
+        "href": href,
+        "state": state_of(valve),
+        "ne": "" if valve.is_silent else view.signal.value,
+        "word": state_words(valve),
+        "say": view.sentence[:_SAY] or ("no message has been heard" if valve.is_silent else ""),
+        **_ratio(view.ratio),
+        "dead": dead,
+        "deadw": dead_width,
+        "fc": value,
+        "fcw": width,
+        **_drift(view),
+        "spark": spark.path if spark else "",
+        "base": spark.base if spark else "",
+        "days": spark.days if spark else 0,
+        "made": None if view.identified is None else view.identified // 1_000_000_000,
+        "last": round(wall - (valve.silent_for or 0.0)) if silent else None,
+    }
+
+
+class RowFeed:
+    """What one browser has been sent, so that it is sent only what has changed.
+
+    Parameters
+    ----------
+    href : callable
+        Returns the address of a valve's page, from the name of its identifier.
+    """
+
+    def __init__(self, href: Callable[[str], str]) -> None:
+        self._href = href
+        self._sent: dict[int, Row] = {}
+        self._order: list[int] = []
+
+    def news(
+        self, shown: Iterable[Heard], sparks: Callable[[str], Sparkline | None], wall: float
+    ) -> Row:
+        """Return the clock, the rows that have changed, and the order if it has."""
+        rows, order = [], []
+        for valve in shown:
+            order.append(valve.number)
+            row = row_of(valve, sparks(valve.view.node), wall, self._href(valve.view.node))
+            before = self._sent.get(valve.number)
+            if before is not None and row["last"] and before["last"]:
+                row["last"] = before["last"]  # the same moment, but for the rounding
+            if row != before:
+                self._sent[valve.number] = row
+                rows.append(row)
+        news: Row = {"now": round(wall, 1)}
+        if rows:
+            news["rows"] = rows
+        if order != self._order:
+            news["order"] = self._order = order
+        return news

@@ -1,0 +1,64 @@
+"""Ratios of a plant's valves in the history, read from where one has stopped before."""
+
+from typing import NamedTuple
+
+from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.schema import has_table, reading
+
+__all__ = ["HistoryMark", "KeptRatio", "history_mark", "ratios_after"]
+
+
+class KeptRatio(NamedTuple):
+    """Friction of a valve over its baseline, and the row, valve's name and time (ns) of it."""
+
+    row: int
+    valve: str
+    time: int
+    ratio: float
+
+
+class HistoryMark(NamedTuple):
+    """Last identification and baseline of a file, and its count of alarms and valves.
+
+    It changes when one of these is added; usage and moves, which are written often, leave it.
+    """
+
+    identification: int
+    baseline: int
+    alarms: int
+    valves: int
+
+
+def history_mark(file: HistoryFile) -> HistoryMark:
+    """Return the mark of a file as it is now.
+
+    Raises HistoryError if the file cannot be read.
+    """
+    with reading(file.path) as connection:
+
+        def one(query: str) -> int:
+            return int(connection.execute(query).fetchone()[0])
+
+        has_alarms = has_table(connection, "alarm_recording")
+        return HistoryMark(
+            one("SELECT coalesce(max(id), 0) FROM identification"),
+            one("SELECT coalesce(max(id), 0) FROM baseline"),
+            one("SELECT count(*) FROM alarm_recording") if has_alarms else 0,
+            one("SELECT count(*) FROM valve"),
+        )
+
+
+def ratios_after(file: HistoryFile, row: int, since: int) -> tuple[KeptRatio, ...]:
+    """Return the ratios of all valves in rows after one, made since a time, ns; oldest row first.
+
+    Raises HistoryError if the file cannot be read.
+    """
+    with reading(file.path) as connection:
+        rows = connection.execute(
+            "SELECT identification.id, valve.name, time_ns, ratio FROM identification "
+            "JOIN valve ON valve.id = valve_id "
+            "WHERE identification.id > ? AND time_ns >= ? AND ratio IS NOT NULL "
+            "ORDER BY identification.id",
+            (row, since),
+        ).fetchall()
+    return tuple(KeptRatio(*one) for one in rows)

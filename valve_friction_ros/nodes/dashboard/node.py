@@ -1,0 +1,146 @@
+"""A plant's valves in a browser: their diagnosis, history and signals, and their services."""
+
+import contextlib
+import ctypes
+import sys
+import threading
+import time
+from collections.abc import Sequence
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.signals import SignalHandlerOptions
+
+from valve_friction_ros.dashboard import Plant, Status
+from valve_friction_ros.dashboard.valve_view import Sources
+from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_from
+from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls
+from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
+from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.qos import stream
+from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, cannot_start
+from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
+
+__all__ = ["PARAMETERS", "Dashboard", "main"]
+
+_ARENA_MAX = -8
+"""M_ARENA_MAX of malloc.h."""
+_PAUSE = 0.05
+"""Time between two turns, s: for so long messages gather."""
+_MISSING = (
+    "cannot start: the dashboard needs NiceGUI, which is not installed: "
+    "run `pip install 'nicegui>=3.18,<4'`"
+)
+
+
+class Dashboard(PolledNode):
+    """Hears the valves and fills their store; calls services for the pages."""
+
+    def __init__(self) -> None:
+        super().__init__("dashboard")
+        declare_parameters(self, PARAMETERS)
+        self.options = options_from(values_of(self, PARAMETERS))
+        self.plant = Plant(self.options.silence)
+        self.calls = ServiceCalls()
+        self.signals = WatchedSignals(self._sources_of)
+        self._diagnostics = PolledSubscription(self, DiagnosticArray, "/diagnostics", stream())
+
+    def _sources_of(self, identifier: str) -> Sources:
+        heard = self.plant.valve(identifier, time.monotonic())
+        return Sources() if heard is None else heard.view.sources
+
+    def poll(self) -> None:
+        """Take what has been heard, and go on with what is asked."""
+        now = time.monotonic()
+        for taken in self._diagnostics.take():
+            for status in taken.message.status:
+                self.plant.hear(_status(status), now)
+        self.signals.step(self)
+        self.calls.step(self)
+
+
+def _status(message: DiagnosticStatus) -> Status:
+    return Status(
+        message.name,
+        message.level[0],
+        message.hardware_id,
+        message.message,
+        {one.key: one.value for one in message.values},
+    )
+
+
+class _Turning:
+    """Takes the node's turns in a thread, as long as the context lasts."""
+
+    def __init__(self, node: Dashboard) -> None:
+        self._node = node
+        self._stop = threading.Event()
+        self._executor = TurnExecutor()
+        self._executor.add_node(node)
+        self._thread = threading.Thread(target=self._run, name="graph", daemon=True)
+
+    def _run(self) -> None:
+        while not self._stop.wait(_PAUSE) and rclpy.ok():
+            self._executor.turn()
+            self._node.poll_guarded()
+
+    def __enter__(self) -> None:
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join(1.0)
+        self._executor.shutdown(0.1)
+
+
+def _spare_memory() -> None:
+    """Let all threads share two arenas of glibc's memory: one a thread takes 50 MB more."""
+    with contextlib.suppress(AttributeError, OSError):
+        ctypes.CDLL(None).mallopt(_ARENA_MAX, 2)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
+    try:
+        from valve_friction_ros.dashboard.board import Board  # noqa: PLC0415
+        from valve_friction_ros.dashboard.kept import KeptHistory  # noqa: PLC0415
+        from valve_friction_ros.dashboard.pages import server  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if error.name and error.name.split(".")[0] == __name__.split(".", maxsplit=1)[0]:
+            raise
+        print(_MISSING, file=sys.stderr)  # noqa: T201
+        return 2
+    _spare_memory()
+    with StopRequest() as stop:
+        try:
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            node = Dashboard()
+            options = node.options
+            server.require_free(options.host, options.port)
+        except WRONG_REQUESTS as error:
+            stop.is_followed = True
+            rclpy.try_shutdown()
+            return cannot_start(error)
+        board = Board(
+            options, node.plant, KeptHistory(options.history_file), node.calls, node.signals
+        )
+        address = f"http://{options.host}:{options.port}/"
+
+        def tell() -> None:
+            node.get_logger().info(f"ready: open {address}")
+
+        try:
+            with _Turning(node):
+                if not stop.has_come:
+                    server.serve(board, tell)
+                stop.is_followed = True
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""Signals of the valves whose pages are open."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import FluidPressure, JointState
+
+from valve_friction_ros.dashboard.live_strip import LiveStrip
+from valve_friction_ros.dashboard.valve_view import Sources
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.raw_samples import (
+    positions_in,
+    pressures_in,
+    readable,
+)
+
+__all__ = ["WatchedSignals"]
+
+_SPAN = 60.0
+"""Seconds of signal that are shown."""
+
+
+def _quality() -> QoSProfile:
+    """Take what is published either way, without holding a publisher up."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=5000,
+        reliability=ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.VOLATILE,
+    )
+
+
+@dataclass
+class _Watch:
+    strip: LiveStrip
+    lookers: int = 0
+    sources: Sources = field(default_factory=Sources)
+    streams: tuple[PolledSubscription, ...] = ()
+
+    def follow(self, node: PolledNode, sources: Sources) -> None:
+        """Subscribe to the topics of the valve, anew where they have changed."""
+        if sources != self.sources:
+            self.end(node)
+            self.sources = sources
+            if sources.pressure_topic and sources.stem_topic:
+                self.streams = (
+                    PolledSubscription(
+                        node, FluidPressure, sources.pressure_topic, _quality(), raw=True
+                    ),
+                    PolledSubscription(node, JointState, sources.stem_topic, _quality(), raw=True),
+                )
+
+    def end(self, node: PolledNode) -> None:
+        """End the subscriptions."""
+        for stream in self.streams:
+            node.destroy_subscription(stream.subscription)
+        self.streams, self.sources = (), Sources()
+
+    def take(self) -> None:
+        """Hand over what has arrived; what is no such message is left out."""
+        if not self.streams:
+            return
+        pressures, stems = (
+            readable(stream.take(), kind)
+            for stream, kind in zip(self.streams, (FluidPressure, JointState), strict=True)
+        )
+        if pressures:
+            self.strip.add(0, *pressures_in([one.message for one in pressures]))
+        if stems:
+            found = positions_in([one.message for one in stems], self.sources.joint)
+            known = np.isfinite(found.values)
+            self.strip.add(1, found.stamps[known], found.values[known])
+
+
+class WatchedSignals:
+    """Subscribes to what an identifier subscribes to, as long as somebody looks.
+
+    Pages count in and out from any thread; the node's thread subscribes.
+
+    Parameters
+    ----------
+    sources_of : callable
+        Returns the topics of a valve, by the name of its identifier.
+    """
+
+    def __init__(self, sources_of: Callable[[str], Sources]) -> None:
+        self._sources_of = sources_of
+        self._lock = threading.Lock()
+        self._watches: dict[str, _Watch] = {}
+        self._dropped: list[_Watch] = []
+
+    def watch(self, node: str) -> LiveStrip:
+        """Count a page in; return where its samples go."""
+        with self._lock:
+            watch = self._watches.setdefault(node, _Watch(LiveStrip(_SPAN)))
+            watch.lookers += 1
+            return watch.strip
+
+    def unwatch(self, node: str) -> None:
+        """Count a page out."""
+        with self._lock:
+            watch = self._watches.get(node)
+            if watch is None:
+                return
+            watch.lookers -= 1
+            if watch.lookers <= 0:
+                self._dropped.append(self._watches.pop(node))
+
+    def step(self, node: PolledNode) -> None:
+        """Subscribe, take and unsubscribe; in the node's thread."""
+        with self._lock:
+            watches, dropped = dict(self._watches), self._dropped
+            self._dropped = []
+        for watch in dropped:
+            watch.end(node)
+        for name, watch in watches.items():
+            watch.follow(node, self._sources_of(name))
+            watch.take()
