@@ -31,6 +31,7 @@ SUB_COMMANDS = {
     "validate": "simulate a recording with an identified model",
     "call": "have a running identifier identify, set its baseline, save, report or clear",
     "history": "list, export and draw what the nodes have identified",
+    "dashboard-account": "make an account of the dashboard, with the hash of a password",
     "reproduce-paper": "run the paper's programme and write a report",
     "demo": "tighten the packing of a simulated valve that is monitored",
 }
@@ -60,7 +61,7 @@ def _imported(name: str) -> SubCommand:
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
     """Return the sub-command and its arguments; end the process where there is none."""
-    listed = "\n".join(f"  {name:<16} {text}" for name, text in SUB_COMMANDS.items())
+    listed = "\n".join(f"  {name:<17} {text}" for name, text in SUB_COMMANDS.items())
     parser = OneLineParser(
         prog=PROGRAM,
         usage=f"{PROGRAM} SUB-COMMAND ...",

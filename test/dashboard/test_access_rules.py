@@ -1,0 +1,340 @@
+"""Where a dashboard listens without accounts, how often one may try, how long a session lasts."""
+
+import asyncio
+import json
+import subprocess
+
+import pytest
+from quick_accounts import PASSWORD, quick_account, quick_hash
+
+from valve_friction_ros.dashboard.access import (
+    Access,
+    Account,
+    HashedPassword,
+    LogIn,
+    Refusal,
+    Role,
+    Sessions,
+)
+from valve_friction_ros.dashboard.access.attempt_limit import AttemptLimit
+from valve_friction_ros.dashboard.access.headers import host_of, is_own_origin, own_path
+
+ANNA = quick_account()
+
+
+class Clock:
+    def __init__(self):
+        self.now = 1000.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.1.1", "::1", "localhost"])
+def test_this_machine_needs_no_account(host):
+    access = Access(host)
+    assert not access.accounts
+    assert access.warning == ""
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.1.2.3", "fd00::1", "plant.example", ""])
+def test_any_other_address_needs_accounts(host):
+    with pytest.raises(ValueError, match="there are no accounts: make one by `valve_friction dash"):
+        Access(host)
+    assert "passwords and sessions can be read on the way" in Access(host, accounts=(ANNA,)).warning
+
+
+def test_a_name_for_others_needs_accounts():
+    """Behind a proxy on this machine the address is its own, and others come in all the same."""
+    with pytest.raises(ValueError, match="no accounts"):
+        Access(host_names=("valves.example",))
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tls")
+    certificate, key = folder / "cert.pem", folder / "key.pem"
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256",
+         "-nodes", "-days", "2", "-subj", "/CN=localhost", "-keyout", key, "-out", certificate],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    key.chmod(0o600)
+    return certificate, key
+
+
+def test_tls_needs_a_pair(pair, tmp_path):
+    certificate, key = pair
+    assert Access("0.0.0.0", accounts=(ANNA,), certificate=certificate, key=key).warning == ""
+    with pytest.raises(ValueError, match="give both or none"):
+        Access(certificate=certificate)
+    with pytest.raises(ValueError, match="cannot be used"):
+        Access(certificate=key, key=key)
+    with pytest.raises(OSError, match=r"missing\.pem"):
+        Access(certificate=tmp_path / "missing.pem", key=key)
+    locked = tmp_path / "locked.pem"
+    subprocess.run(
+        ["openssl", "pkcs8", "-topk8", "-in", key, "-out", locked, "-passout", "pass:secret"],
+        check=True,
+    )
+    locked.chmod(0o600)
+    with pytest.raises(ValueError, match="without a password"):
+        Access(certificate=certificate, key=locked)
+    locked.chmod(0o644)
+    with pytest.raises(ValueError, match="open to others"):
+        Access(certificate=certificate, key=locked)
+
+
+@pytest.mark.parametrize(
+    ("called", "answers"),
+    [
+        ("127.0.0.1:8080", True),
+        ("localhost:8080", True),
+        ("LOCALHOST.", True),
+        ("evil.example:8080", False),
+        ("127.0.0.1.evil.example", False),
+        ("10.0.0.9", False),
+        ("", False),
+        ("[", False),
+    ],
+)
+def test_names_that_a_local_dashboard_answers_to(called, answers):
+    assert Access().answers_to(host_of(called), "127.0.0.1") == answers
+
+
+def test_names_that_an_open_dashboard_answers_to():
+    access = Access("0.0.0.0", host_names=("Valves.example",), accounts=(ANNA,))
+    for called, address in (
+        ("valves.example", "10.0.0.5"),
+        ("10.0.0.5:8080", "10.0.0.5"),
+        ("[fd00::1]:8080", "fd00::1"),
+    ):
+        assert access.answers_to(host_of(called), address)
+    assert not access.answers_to(host_of("10.0.0.6"), "10.0.0.5")
+    assert not access.answers_to(host_of("rebound.example"), "10.0.0.5")
+
+
+@pytest.mark.parametrize(
+    ("origin", "is_own"),
+    [
+        (None, True),
+        ("http://127.0.0.1:8080", True),
+        ("https://127.0.0.1:8080", True),
+        ("http://127.0.0.1:8081", False),
+        ("http://127.0.0.1", False),
+        ("http://evil.example", False),
+        ("http://127.0.0.1:8080@evil.example", False),
+        ("null", False),
+        ("", False),
+        ("http://[", False),
+    ],
+)
+def test_origins(origin, is_own):
+    assert is_own_origin(origin, "127.0.0.1:8080") == is_own
+
+
+WAYS_OUT = [
+    "//evil.example",
+    "https://evil.example",
+    "/\\evil.example",
+    "\\\\evil",
+    "/\t/evil.example",
+    "/a\nb",
+    "javascript:x",
+    "",
+]
+
+
+@pytest.mark.parametrize("text", WAYS_OUT)
+def test_no_way_out_by_the_log_in(text):
+    assert own_path(text) == "/"
+
+
+def test_a_page_is_gone_back_to():
+    assert own_path("/valve?node=/fv_101/identifier&zone=UTC") == (
+        "/valve?node=/fv_101/identifier&zone=UTC"
+    )
+
+
+def test_a_limit_slides():
+    clock = Clock()
+    limit = AttemptLimit(3, 60.0, clock)
+    for seconds in (0, 10, 20):
+        clock.now = 1000.0 + seconds
+        assert limit.wait("a") == 0
+        limit.count("a")
+    assert limit.wait("a") == 40
+    assert limit.wait("b") == 0
+    clock.now = 1060.0
+    assert limit.wait("a") == 0
+    limit.count("a")
+    assert limit.wait("a") == 10
+    limit.forgive("a")
+    assert limit.wait("a") == 0
+
+
+def test_a_limit_forgets_the_oldest_of_too_many_keys():
+    limit = AttemptLimit(1, 60.0, Clock())
+    for number in range(10_001):
+        limit.count(str(number))
+    assert limit.wait("0") == 0
+    assert limit.wait("1") == limit.wait("10000") == 60
+
+
+def log_in(clock, *accounts):
+    sessions = Sessions(accounts, 60.0, clock)
+    return LogIn(Access(accounts=accounts), sessions, clock), sessions
+
+
+def test_the_log_in_takes_the_right_password_only():
+    clock = Clock()
+    door, sessions = log_in(clock, ANNA, quick_account("bo", Role.VIEW, "another password"))
+
+    async def visit():
+        token = await door.attempt("anna", PASSWORD, "10.0.0.1")
+        assert sessions.account_of(token) is ANNA
+        for name, password in (("anna", "another password"), ("bo", PASSWORD), ("cy", PASSWORD),
+                               ("", ""), ("anna", ""), ("anna", "x" * 5000)):  # fmt: skip
+            assert await door.attempt(name, password, "10.0.0.1") == Refusal(0)
+
+    asyncio.run(visit())
+
+
+@pytest.mark.parametrize("name", ["anna", "nobody"])
+def test_an_address_has_ten_wrong_tries(name):
+    """A known and an unknown name have the same answers."""
+    clock = Clock()
+    door, _ = log_in(clock, ANNA)
+
+    async def visit():
+        answers = [await door.attempt(name, "wrong", "10.0.0.1") for _ in range(12)]
+        assert answers == [Refusal(0)] * 10 + [Refusal(900)] * 2
+        assert await door.attempt("anna", PASSWORD, "10.0.0.1") == Refusal(900)
+        assert isinstance(await door.attempt("anna", PASSWORD, "10.0.0.2"), str)
+        clock.now += 900.0
+        assert isinstance(await door.attempt("anna", PASSWORD, "10.0.0.1"), str)
+
+    asyncio.run(visit())
+
+
+@pytest.mark.parametrize("name", ["anna", "nobody"])
+def test_a_name_has_twenty_wrong_tries_from_everywhere(name):
+    door, _ = log_in(Clock(), ANNA)
+
+    async def visit():
+        answers = [await door.attempt(name, "wrong", f"10.0.0.{i}") for i in range(22)]
+        assert answers == [Refusal(0)] * 20 + [Refusal(900)] * 2
+
+    asyncio.run(visit())
+
+
+def test_a_right_password_between_the_wrong_ones_does_not_help():
+    door, _ = log_in(Clock(), ANNA, quick_account("mallory"))
+
+    async def visit():
+        for _ in range(10):
+            assert await door.attempt("anna", "wrong", "10.0.0.1") == Refusal(0)
+            await door.attempt("mallory", PASSWORD, "10.0.0.1")
+        assert await door.attempt("anna", PASSWORD, "10.0.0.1") == Refusal(900)
+
+    asyncio.run(visit())
+
+
+def test_a_network_of_ipv6_is_one_address():
+    door, _ = log_in(Clock(), ANNA)
+
+    async def visit():
+        answers = [await door.attempt(str(i), "wrong", f"fd00:1:2:3::{i:x}") for i in range(11)]
+        assert answers[-1] == Refusal(900)
+        assert await door.attempt("x", "wrong", "fd00:1:2:4::1") == Refusal(0)
+
+    asyncio.run(visit())
+
+
+def test_many_at_once_get_no_further_than_one_by_one():
+    door, _ = log_in(Clock(), ANNA)
+
+    async def visit():
+        tries = (door.attempt("anna", "wrong", "10.0.0.1") for _ in range(50))
+        answers = await asyncio.gather(*tries)
+        assert answers.count(Refusal(0)) <= 10
+        assert all(isinstance(each, Refusal) for each in answers)
+
+    asyncio.run(visit())
+
+
+def test_a_session_ends():
+    clock = Clock()
+    sessions = Sessions([ANNA], 60.0, clock)
+    token, other = sessions.begin(ANNA), sessions.begin(ANNA)
+    assert token != other
+    assert len(token) >= 43  # 256 bits
+    assert sessions.account_of(token) is ANNA
+    for strange in (None, "", "x", token[:-1], token.lower() + "x"):
+        assert sessions.account_of(strange) is None
+    sessions.end(token)
+    assert sessions.account_of(token) is None
+    assert sessions.account_of(other) is ANNA
+    clock.now += 60.0
+    assert sessions.account_of(other) is None
+
+
+def test_sessions_are_bounded():
+    clock = Clock()
+    sessions = Sessions([ANNA], 60.0, clock)
+    tokens = [sessions.begin(ANNA) for _ in range(1001)]
+    assert sessions.account_of(tokens[0]) is None
+    assert sessions.account_of(tokens[1]) is ANNA
+    assert sessions.account_of(tokens[-1]) is ANNA
+
+
+def test_sessions_survive_a_restart_unless_the_account_has_changed(tmp_path):
+    file, clock = tmp_path / "sessions.json", Clock()
+    bo = quick_account("bo", Role.OPERATE)
+    first = Sessions([ANNA, bo], 60.0, clock, file)
+    of_anna, of_bo, ended = first.begin(ANNA), first.begin(bo), first.begin(ANNA)
+    first.end(ended)
+    assert file.stat().st_mode & 0o777 == 0o600
+    assert of_anna not in file.read_text()
+    degraded = Account("bo", Role.VIEW, bo.password)
+    second = Sessions([ANNA, degraded], 60.0, clock, file)
+    assert second.account_of(of_anna) is ANNA
+    assert second.account_of(of_bo) is None
+    assert second.account_of(ended) is None
+    renewed = Account("anna", Role.OPERATE, quick_hash())
+    assert Sessions([renewed], 60.0, clock, file).account_of(of_anna) is None
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"a": 1}', '{"a": ["b"]}'])
+def test_a_damaged_file_of_sessions_is_begun_anew(tmp_path, text):
+    file = tmp_path / "sessions.json"
+    file.write_text(text)
+    file.chmod(0o600)
+    token = Sessions([ANNA], 60.0, Clock(), file).begin(ANNA)
+    assert Sessions([ANNA], 60.0, Clock(), file).account_of(token) is ANNA
+    assert len(json.loads(file.read_text())) == 1
+
+
+def test_a_file_of_sessions_that_others_can_read_is_refused(tmp_path):
+    file = tmp_path / "sessions.json"
+    file.write_text("{}")
+    file.chmod(0o644)
+    with pytest.raises(ValueError, match="open to others"):
+        Sessions([ANNA], 60.0, Clock(), file)
+
+
+def test_an_unknown_name_takes_as_long_as_a_known_one(monkeypatch):
+    """Both have one hash of the same cost made."""
+    costs = []
+    made = HashedPassword._hashed
+
+    def noted(hashed, password):
+        costs.append((hashed.cost, hashed.block, hashed.parallel))
+        return made(hashed, password)
+
+    monkeypatch.setattr(HashedPassword, "_hashed", noted)
+    door, _ = log_in(Clock(), ANNA)
+    for name in ("anna", "nobody"):
+        asyncio.run(door.attempt(name, "wrong", "10.0.0.1"))
+    assert costs[0] == costs[1]
+    assert len(costs) == 2
