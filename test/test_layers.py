@@ -36,7 +36,8 @@ MAY_IMPORT = {
     "reports": {*_PICTURES, "figures"},
     "fleet": {*_PICTURES, "figures", "reports"},
     "reproduction": {*_PICTURES, "figures", "reports"},
-    "nodes": {*_FILES, *_PAGES, "reports", "alerts"},
+    "dashboard": _PAGES,
+    "nodes": {*_FILES, *_PAGES, "reports", "alerts", "dashboard"},
 }
 # What each inner room may import of its siblings. The files beside inner rooms hold their shared
 # words and what joins them, so both may import each other; no two files do, directly or around.
@@ -51,7 +52,10 @@ INNER = {
     "records.tables": set(),
     "reproduction.checks": set(),
     "reproduction.figures": {"checks"},
+    "dashboard.access": set(),
+    "dashboard.pages": {"access"},
     "nodes.plumbing": set(),
+    "nodes.dashboard": {"plumbing"},
     "nodes.identifier": {"plumbing"},
     "commands.arguments": set(),
     "commands.output": {"arguments"},
@@ -76,6 +80,7 @@ CORE = [
     "history",
     "alerts",
     "fleet",
+    "dashboard",
 ]
 
 
@@ -198,6 +203,8 @@ def modules():
 
 @pytest.mark.parametrize("name", list(modules()))
 def test_public_names_exist_and_are_described(name):
+    if name.startswith(f"{PACKAGE}.dashboard."):
+        pytest.importorskip("nicegui", reason="run `make venv-dashboard`")
     module = importlib.import_module(name)
     assert inspect.getdoc(module)
     public = getattr(module, "__all__", [])

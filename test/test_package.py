@@ -21,7 +21,14 @@ import rclpy
 
 PROJECT = Path(__file__).resolve().parents[1]
 NAME = "valve_friction_ros"
-EXECUTABLES = {"identifier", "identifiers", "pressure_source", "simulator", "valve_friction"}
+EXECUTABLES = {
+    "dashboard",
+    "identifier",
+    "identifiers",
+    "pressure_source",
+    "simulator",
+    "valve_friction",
+}
 LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
 DOMAIN = 91
 PATIENCE = 30.0  # s, for one thing to happen on a loaded machine
@@ -72,7 +79,7 @@ LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
     "yaml": ("python3-yaml", "PyYAML"),
 }
 BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
-DASHBOARD_LIBRARIES = {"nicegui", "starlette"}  # the second is what the first is built on
+DASHBOARD_LIBRARIES = {"fastapi", "nicegui", "starlette"}  # NiceGUI is built on the others
 
 
 def exec_depends():

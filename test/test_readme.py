@@ -35,7 +35,13 @@ def test_the_notebook_section_runs(tmp_path, monkeypatch, capsys):
     assert (bracket.ignored, bracket.answered) == pytest.approx((4, 5), rel=1e-9)
 
 
-NEED_NODES = ("history", "call", "identify fv_101_2026", "reproduce-paper")  # or minutes: the last
+NEED_NODES = (
+    "history",
+    "call",
+    "dashboard",
+    "identify fv_101_2026",
+    "reproduce-paper",
+)  # or minutes: the last
 
 
 def offline_commands():

@@ -73,8 +73,6 @@ def test_a_name_from_outside_is_printable(files, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"host": "0.0.0.0"}, "no log-in"),
-        ({"host": "plant.example"}, "no log-in"),
         ({"port": 0}, "port 0"),
         ({"silence": 0.0}, "silence"),
         ({"time_zone": "Mars/Olympus"}, "time_zone"),

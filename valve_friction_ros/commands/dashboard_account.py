@@ -20,7 +20,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         "`valve_friction dashboard-account anna --role operate >> accounts; chmod 600 accounts` "
-        "adds it to a file, which the dashboard reads when it starts."
+        "adds it to a file, which the dashboard reads when it starts. Exit code 2: the name or the "
+        "password was refused."
     )
     parser.add_argument("name", metavar="NAME", help="letters, digits and _.@+-")
     parser.add_argument(

@@ -3,7 +3,7 @@
 The files here hold what is shown, and import no library of pages; ``pages/`` draws it by NiceGUI.
 """
 
-from valve_friction_ros.dashboard.graph import Answer, Operator, Signals
+from valve_friction_ros.dashboard.graph import Answer, Operator, Signals, Visitors
 from valve_friction_ros.dashboard.options import DashboardOptions
 from valve_friction_ros.dashboard.plant import Plant
 from valve_friction_ros.dashboard.selection import Selection, selected
@@ -18,6 +18,7 @@ __all__ = [
     "Signals",
     "Status",
     "ValveView",
+    "Visitors",
     "selected",
     "view_of",
 ]

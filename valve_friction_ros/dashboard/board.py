@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from valve_friction_ros.dashboard.graph import Operator, Signals
+from valve_friction_ros.dashboard.graph import Operator, Signals, Visitors
 from valve_friction_ros.dashboard.kept import KeptHistory
 from valve_friction_ros.dashboard.options import DashboardOptions
 from valve_friction_ros.dashboard.plant import Plant
@@ -26,6 +26,8 @@ class Board:
         Calls their services.
     signals : Signals
         Hears their signals.
+    visitors : Visitors
+        Knows who looks, and who may operate.
     """
 
     options: DashboardOptions
@@ -33,3 +35,4 @@ class Board:
     kept: KeptHistory
     operator: Operator
     signals: Signals
+    visitors: Visitors

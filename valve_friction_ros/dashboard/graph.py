@@ -4,7 +4,7 @@ from typing import NamedTuple, Protocol
 
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 
-__all__ = ["Answer", "Operator", "Signals"]
+__all__ = ["Answer", "Operator", "Signals", "Visitors"]
 
 
 class Answer(NamedTuple):
@@ -34,4 +34,20 @@ class Signals(Protocol):
 
     def unwatch(self, node: str) -> None:
         """Say that one looks no more; the last one ends the subscriptions."""
+        ...
+
+
+class Visitors(Protocol):
+    """Knows who looks at the page whose code asks."""
+
+    def name(self) -> str:
+        """Return the name of their account; empty where none is needed."""
+        ...
+
+    def may_operate(self) -> bool:
+        """Tell whether they may call services now."""
+        ...
+
+    def log_out(self) -> None:
+        """End their session."""
         ...

@@ -1,12 +1,12 @@
 """How the dashboard is started."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
-__all__ = ["DashboardOptions", "zone_of"]
+from valve_friction_ros.dashboard.access import Access
 
-_LOCAL = ("127.0.0.1", "::1", "localhost")
+__all__ = ["DashboardOptions", "zone_of"]
 
 
 def zone_of(name: str) -> ZoneInfo:
@@ -25,8 +25,10 @@ class DashboardOptions:
 
     Attributes
     ----------
-    host, port : str, int
-        Where it listens.
+    access : Access
+        Address that it listens at, and whom it lets in.
+    port : int
+        Port that it listens at.
     history_file : Path or None
         The history of the valves; None: there is none.
     folders : mapping of str to Path
@@ -39,10 +41,10 @@ class DashboardOptions:
     Raises
     ------
     ValueError
-        If the host is not this machine, the port or the silence is impossible, or the zone unknown.
+        If the port or the silence is impossible, or the zone unknown.
     """
 
-    host: str = "127.0.0.1"
+    access: Access = field(default_factory=Access)
     port: int = 8080
     history_file: Path | None = None
     reports: Path | None = None
@@ -53,13 +55,15 @@ class DashboardOptions:
 
     def __post_init__(self) -> None:
         """Refuse impossible options."""
-        if self.host not in _LOCAL:
-            raise ValueError(
-                f"host {self.host!r} is not this machine, and there is no log-in: use 127.0.0.1, "
-                "and reach it by `ssh -L`"
-            )
         if not 0 < self.port < 65536:
             raise ValueError(f"port {self.port} is impossible: give one from 1 to 65535")
         if not self.silence > 0:
             raise ValueError(f"silence must be above 0 s, got {self.silence:g}")
         zone_of(self.time_zone)
+
+    @property
+    def address(self) -> str:
+        """The address to open in a browser of this machine."""
+        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.access.host, self.access.host)  # noqa: S104
+        scheme = "https" if self.access.is_encrypted else "http"
+        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self.port}/"

@@ -61,13 +61,13 @@ class Access:
         if not self.accounts and (not _is_loopback(self.host) or self.host_names):
             raise ValueError(
                 f"host {self.host!r} lets others in, and there are no accounts: make one by "
-                "`valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and give "
-                f"accounts_file:=FILE (or its lines in {VARIABLE}), or use 127.0.0.1"
+                "`valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and give the "
+                f"parameter accounts_file (or its lines in {VARIABLE}), or use 127.0.0.1"
             )
         if not 0 < self.session_hours <= 10_000:
             raise ValueError(f"session_hours is {self.session_hours:g}: give 0 to 10000")
         if (self.certificate is None) != (self.key is None):
-            raise ValueError("certificate and key belong together: give both or none")
+            raise ValueError("certificate_file and key_file belong together: give both or none")
         if self.certificate is not None and self.key is not None:
             require_private(self.key)
             _require_pair(self.certificate, self.key)
@@ -83,7 +83,7 @@ class Access:
         if self.accounts and not self.is_encrypted and not _is_loopback(self.host):
             return (
                 "no certificate: passwords and sessions can be read on the way; give "
-                "certificate and key"
+                "certificate_file and key_file"
             )
         return ""
 

@@ -50,6 +50,11 @@ class Guard:
         except RuntimeError:  # NiceGUI's, where there is no page
             return None
 
+    def name(self) -> str:
+        """Return the name of the account whose page this is; empty where there is none."""
+        visitor = self.visitor()
+        return "" if visitor is None else visitor.name
+
     def may_operate(self) -> bool:
         """Tell whether services of identifiers may be called for this page now."""
         if not self._access.accounts:

@@ -7,6 +7,8 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from nicegui import app, run, ui
 
+from valve_friction_ros.dashboard.access import Access
+from valve_friction_ros.dashboard.access.guard import Guard, guard, server_options
 from valve_friction_ros.dashboard.board import Board
 from valve_friction_ros.dashboard.pages.compare_page import compare_page
 from valve_friction_ros.dashboard.pages.plant_page import plant_page
@@ -14,7 +16,7 @@ from valve_friction_ros.dashboard.pages.theme import load_style
 from valve_friction_ros.dashboard.pages.valve_page import valve_page
 from valve_friction_ros.dashboard.valve_files import ValveFiles
 
-__all__ = ["require_free", "serve"]
+__all__ = ["guarded", "require_free", "serve"]
 
 _Draw = Callable[[Board, dict[str, str]], Awaitable[None] | None]
 
@@ -35,6 +37,11 @@ def require_free(host: str, port: int) -> None:
             ) from None
 
 
+def guarded(access: Access, log: Callable[[str], None]) -> Guard:
+    """Put the gate before the pages; `log` takes a line for each log-in."""
+    return guard(app, access, log)
+
+
 def serve(board: Board, started: Callable[[], None]) -> None:
     """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened."""
     load_style()
@@ -50,7 +57,7 @@ def serve(board: Board, started: Callable[[], None]) -> None:
 
     app.on_startup(begin)
     ui.run(
-        host=board.options.host,
+        **server_options(board.options.access),
         port=board.options.port,
         title="Valve friction",
         dark=None,

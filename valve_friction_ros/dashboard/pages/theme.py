@@ -86,6 +86,7 @@ def frame(
             clock.props["aria-label"] = "time of day"
             _choice("Time zone", _zones(board, zone), zone.key, "tz", common, here)
             _choice("Theme", tuple(_THEMES), theme, "theme", common, here)
+            _account(board)
     with element("main", "vf-main", id="content"):
         yield Frame(zone, common, address, clock)
 
@@ -96,6 +97,15 @@ def _zones(board: Board, zone: ZoneInfo) -> tuple[str, ...]:
 
 _OFTEN = ("Europe/London", "Europe/Berlin", "America/New_York", "America/Chicago",
           "Asia/Kolkata", "Asia/Shanghai", "Asia/Tokyo", "Australia/Sydney")  # fmt: skip
+
+
+def _account(board: Board) -> None:
+    """Show who has logged in, and a button to log out."""
+    name = board.visitors.name()
+    if name:
+        ui.label(name).classes("vf-account").props["aria-label"] = "logged in"
+        out = ui.button("Log out", on_click=board.visitors.log_out, color=None)
+        out.props("flat no-caps dense")
 
 
 def _link(text: str, href: str) -> ui.element:

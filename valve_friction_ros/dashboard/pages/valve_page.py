@@ -80,7 +80,10 @@ class _ValvePage:
                 self._actions = ValveActions(
                     self._board.operator, self._node, self._view, self._replaced, self._answered
                 )
-                self._actions.draw()
+                if self._board.visitors.may_operate():
+                    self._actions.draw()
+                else:
+                    text("p", "Your account may view, not operate.", "vf-none")
             with element("div", "vf-cards"):
                 self._draw_cards()
         self._look()

@@ -105,6 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
     try:
         from valve_friction_ros.dashboard.board import Board  # noqa: PLC0415
+        from valve_friction_ros.dashboard.guarded_operator import GuardedOperator  # noqa: PLC0415
         from valve_friction_ros.dashboard.kept import KeptHistory  # noqa: PLC0415
         from valve_friction_ros.dashboard.pages import server  # noqa: PLC0415
     except ModuleNotFoundError as error:
@@ -113,23 +114,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_MISSING, file=sys.stderr)  # noqa: T201
         return 2
     _spare_memory()
+
+    def log(line: str) -> None:
+        node.get_logger().info(line)
+
     with StopRequest() as stop:
         try:
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             node = Dashboard()
             options = node.options
-            server.require_free(options.host, options.port)
-        except WRONG_REQUESTS as error:
+            server.require_free(options.access.host, options.port)
+            visitors = server.guarded(options.access, log)
+        except (*WRONG_REQUESTS, OSError) as error:
             stop.is_followed = True
             rclpy.try_shutdown()
             return cannot_start(error)
         board = Board(
-            options, node.plant, KeptHistory(options.history_file), node.calls, node.signals
+            options,
+            node.plant,
+            KeptHistory(options.history_file),
+            GuardedOperator(node.calls, visitors, log),
+            node.signals,
+            visitors,
         )
-        address = f"http://{options.host}:{options.port}/"
 
         def tell() -> None:
-            node.get_logger().info(f"ready: open {address}")
+            if options.access.warning:
+                node.get_logger().warning(options.access.warning)
+            log(f"ready: open {options.address}")
 
         try:
             with _Turning(node):

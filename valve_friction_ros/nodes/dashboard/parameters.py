@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from valve_friction_ros.dashboard import DashboardOptions
+from valve_friction_ros.dashboard.access import Access, accounts_from
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
 from valve_friction_ros.records.data_folder import data_folder, history_file
 
@@ -13,7 +14,41 @@ __all__ = ["PARAMETERS", "options_from"]
 _USUAL = DashboardOptions()
 
 PARAMETERS = (
-    ParameterSpec("host", _USUAL.host, "Address that it listens at [-]", read_only=True),
+    ParameterSpec(
+        "host",
+        _USUAL.access.host,
+        "Address that it listens at [-]; any but this machine's own needs accounts",
+        read_only=True,
+    ),
+    ParameterSpec(
+        "host_names",
+        "",
+        "Names that browsers call it by, beside its address, separated by commas [-]",
+        read_only=True,
+    ),
+    ParameterSpec(
+        "accounts_file",
+        "",
+        "File of accounts, by `valve_friction dashboard-account` [-]; empty: the environment's",
+        read_only=True,
+    ),
+    ParameterSpec(
+        "certificate_file", "", "Certificate for TLS, in PEM [-]; empty: no TLS", read_only=True
+    ),
+    ParameterSpec("key_file", "", "Key of the certificate, in PEM [-]", read_only=True),
+    ParameterSpec(
+        "session_hours",
+        _USUAL.access.session_hours,
+        "Time after which a log-in ends [h]",
+        (0.1, 10000.0),
+        True,
+    ),
+    ParameterSpec(
+        "session_file",
+        "",
+        "File in which log-ins survive a restart [-]; empty: they do not",
+        read_only=True,
+    ),
     ParameterSpec("port", _USUAL.port, "Port that it listens at [-]", (1, 65535), True),
     ParameterSpec(
         "history_file",
@@ -56,16 +91,26 @@ PARAMETERS = (
 
 
 def options_from(values: Mapping[str, Any]) -> DashboardOptions:
-    """Return the options that parameters give; raises ValueError for impossible ones."""
+    """Return the options that parameters give; raises ValueError or OSError for wrong ones."""
 
     def folder(name: str, usual: str) -> Path:
         return Path(values[name]) if values[name] else data_folder() / usual
 
-    kept = values["history_file"]
+    def file(name: str) -> Path | None:
+        return Path(values[name]).expanduser() if values[name] else None
+
     return DashboardOptions(
-        host=values["host"],
+        access=Access(
+            host=values["host"],
+            host_names=tuple(filter(None, map(str.strip, values["host_names"].split(",")))),
+            accounts=accounts_from(file("accounts_file")),
+            certificate=file("certificate_file"),
+            key=file("key_file"),
+            session_hours=values["session_hours"],
+            session_file=file("session_file"),
+        ),
         port=values["port"],
-        history_file=Path(kept).expanduser() if kept else None,
+        history_file=file("history_file"),
         reports=folder("report_folder", "reports").expanduser(),
         bags=folder("save_folder", "saved").expanduser(),
         alarms=folder("alarm_folder", "alarms").expanduser(),

@@ -1,0 +1,51 @@
+"""Services are called for those alone who may operate at that moment."""
+
+import asyncio
+
+from valve_friction_ros.dashboard import Answer
+from valve_friction_ros.dashboard.guarded_operator import GuardedOperator
+
+
+class Visit:
+    """A visitor, and what was called and logged."""
+
+    def __init__(self, name, may):
+        self.who, self.may, self.called, self.logged = name, may, [], []
+        self.operator = GuardedOperator(self, self, self.logged.append)
+
+    def name(self):
+        return self.who
+
+    def may_operate(self):
+        return self.may
+
+    async def call(self, node, service):
+        self.called.append((node, service))
+        return Answer(True, "done")
+
+    def press(self):
+        return asyncio.run(self.operator.call("/fv\x1b_101/identifier", "identify"))
+
+
+def test_who_may_not_operate_calls_nothing():
+    visit = Visit("bo", False)
+    assert visit.press() == (False, "your account may not operate: log in with one that may")
+    assert visit.called == visit.logged == []
+    visit.may = True
+    assert visit.press().success
+    visit.may = False
+    assert not visit.press().success
+    assert len(visit.called) == 1
+
+
+def test_who_operates_is_logged():
+    visit = Visit("anna", True)
+    assert visit.press() == (True, "done")
+    assert visit.called == [("/fv\x1b_101/identifier", "identify")]
+    assert visit.logged == ["anna calls /fv\\x1b_101/identifier/identify"]
+
+
+def test_without_accounts_nobody_is_logged():
+    visit = Visit("", True)
+    assert visit.press().success
+    assert visit.logged == []
