@@ -88,6 +88,7 @@ class NodeProcess:
         path = os.pathsep.join(filter(None, [str(PROJECT), os.environ.get("PYTHONPATH")]))
         environment = os.environ | {"ROS_DOMAIN_ID": str(domain.number), "PYTHONPATH": path}
         environment["ROS_HOME"] = str(folder)
+        environment.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI behaves otherwise within a test
         with self._output.open("w") as output, self._errors.open("w") as errors:
             self._process = subprocess.Popen(
                 command, cwd=folder, env=environment, stdout=output, stderr=errors

@@ -1,8 +1,9 @@
 """Diagnostics of many made-up valves, as identifiers publish them; also a process of its own."""
 
 import math
+import os
 import random
-import sys
+import signal
 import time
 from datetime import datetime, timezone
 
@@ -112,14 +113,18 @@ def status_of(index, beat=0, tag=None):
     )
 
 
-def publish_for_ever(count):
+def publish_until_stopped(count):
     """Publish the diagnostics of `count` valves, each at 1 Hz, an array each, spread evenly."""
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.qos import QoSProfile
     from rclpy.serialization import serialize_message
+    from rclpy.signals import SignalHandlerOptions
 
-    rclpy.init()
+    stopped = []
+    for request in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(request, lambda *_: stopped.append(True))
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("simulated_plant", enable_rosout=False)
     publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=1000))
     messages = [
@@ -127,14 +132,16 @@ def publish_for_ever(count):
         for index in range(count)
     ]
     begin, beat = time.monotonic(), 0
-    while True:
+    while not stopped:
         for index in range(count):
             due = begin + beat + index / count
             if (wait := due - time.monotonic()) > 0.005:
                 time.sleep(wait)
             publisher.publish(messages[index][beat % 2])
         beat += 1
+    node.destroy_node()
+    rclpy.try_shutdown()
 
 
 if __name__ == "__main__":
-    publish_for_ever(int(sys.argv[1]))
+    publish_until_stopped(int(os.environ.get("VALVES", "9")))

@@ -1,0 +1,331 @@
+"""The pages of the dashboard in a real browser, against live nodes."""
+
+import contextlib
+import urllib.request
+from pathlib import Path
+from urllib.parse import parse_qs, quote, urlsplit
+
+import pytest
+from browser import Tab, chromium, free_port
+from live_nodes import NAMESPACE, SECOND, START
+from records import quick_record
+
+from valve_friction_ros.model import HIGH_FRICTION
+
+pytest.importorskip("nicegui", reason="NiceGUI is not installed")
+
+TAG = "<img src=x onerror=alert(1)>"
+NODE = f"{NAMESPACE}/identifier"
+VALVE = f"/valve?node={quote(NODE)}"
+SILENCE = 8.0
+"""Long enough for a slow machine."""
+PLANT = Path(__file__).parents[1] / "support" / "simulated_plant.py"
+
+
+@pytest.fixture(scope="module")
+def plant(shared):
+    """An identifier whose tag is markup, nine made-up valves, and their dashboard's address."""
+    port = free_port()
+    shared.start_identifier({"valve_tag": TAG})
+    shared.start("simulated_plant", script=PLANT, namespace=None)
+    shared.dashboard = shared.start("dashboard", {"port": port, "silence": SILENCE}, namespace=None)
+    shared.client.wait_until(
+        lambda: "ready: open" in shared.dashboard.errors + shared.dashboard.output, "the server"
+    )
+    shared.address = f"http://127.0.0.1:{port}"
+    return shared
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as one:
+        yield one
+
+
+@pytest.fixture
+def tab(plant, browser):
+    """A tab, which must see no error and no other machine."""
+    with contextlib.closing(Tab(browser, plant.address)) as one:
+        yield one
+
+
+def query_of(page):
+    return {key: one for key, (one,) in parse_qs(urlsplit(page.url).query).items()}
+
+
+def rows(page):
+    return page.locator(".vf-row")
+
+
+def wait_for_rows(page, count):
+    page.wait_for_function(f"document.querySelectorAll('.vf-row').length === {count}")
+
+
+# Plant
+
+
+def test_the_plant_is_there_with_the_worst_first(tab):
+    page = tab.open("/")
+    wait_for_rows(page, 10)
+    states = page.locator(".vf-row .vf-chip").all_inner_texts()
+    letters = [text.split()[0] for text in states]
+    assert sorted(letters[:2]) == ["F", "S"]  # a letter of NE 107 and a word beside the colour
+    assert all(len(text.split()) > 1 for text in states if text.split()[0] in "FSCM")
+    row = rows(page).filter(has_text="FV-105").inner_text()
+    assert "± " in row
+    assert "limit 2027-02-11" in row
+    assert page.get_by_role("status").first.inner_text().startswith("10 valves: 2 error")
+
+
+def test_search_filter_and_order_are_in_the_address(tab):
+    page = tab.open("/")
+    wait_for_rows(page, 10)
+    page.keyboard.press("/")
+    page.keyboard.type("fv-10 baseline")
+    page.wait_for_function("document.querySelectorAll('.vf-row').length < 10")
+    page.get_by_role("button", name="warn").click()
+    page.wait_for_function("document.querySelectorAll('.vf-row').length === 1")
+    page.get_by_role("button", name="Sort by Valve").click()
+    page.get_by_role("button", name="Tiles").click()
+    page.wait_for_selector(".vf-tile")
+    assert query_of(page) == {"q": "fv-10 baseline", "show": "warn", "sort": "tag", "view": "tiles"}
+    page.reload()
+    page.wait_for_selector(".vf-tile")
+    assert page.locator(".vf-tile").count() == 1
+    assert page.get_by_label("Search").input_value() == "fv-10 baseline"
+    assert page.get_by_role("button", name="warn").get_attribute("aria-pressed") == "true"
+
+
+def test_a_letter_of_ne_107_filters_and_an_empty_table_says_so(tab):
+    page = tab.open("/?q=fv-1")
+    wait_for_rows(page, 9)
+    page.get_by_role("button", name="NE 107 S").click()
+    wait_for_rows(page, 1)
+    page.get_by_label("Search").fill("nothing is called so")
+    page.get_by_text("No valve meets the filters.").wait_for()
+
+
+def test_only_what_changes_is_sent(tab):
+    """A table is not built anew each second: the frames of three seconds are small."""
+    page = tab.page
+    frames = []
+    page.on("websocket", lambda one: one.on("framereceived", lambda data: frames.append(data)))
+    tab.open("/")
+    wait_for_rows(page, 10)
+    page.wait_for_timeout(1500)
+    frames.clear()
+    page.wait_for_timeout(3000)
+    assert frames
+    assert sum(map(len, frames)) < 3000  # ten rows take more than 5,000
+
+
+def test_a_zone_and_a_theme_are_in_the_address(tab):
+    page = tab.open("/?tz=Asia/Kolkata&theme=dark")
+    wait_for_rows(page, 10)
+    page.wait_for_function("document.querySelector('.vf-clock').innerText.endsWith(' IST')")
+    assert page.evaluate("document.body.classList.contains('body--dark')")
+    page.locator(".vf-row a").first.click()
+    page.wait_for_url("**/valve?*")
+    assert {"tz": "Asia/Kolkata", "theme": "dark"}.items() <= query_of(page).items()
+    page.wait_for_function("document.querySelector('.vf-clock').innerText.endsWith(' IST')")
+
+
+def test_keys_alone_lead_to_a_valve(tab):
+    page = tab.open("/?q=fv-10")
+    wait_for_rows(page, 9)
+    page.get_by_role("button", name="Sort by Identified").focus()
+    page.keyboard.press("Tab")
+    page.keyboard.press("ArrowDown")
+    second = rows(page).nth(1).locator("a")
+    assert second.evaluate("one => one === document.activeElement")
+    assert second.evaluate("one => getComputedStyle(one).outlineStyle") == "solid"
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".vf-valve")
+
+
+@pytest.mark.parametrize("path", ["/", "/?view=tiles", VALVE, "/compare"])
+def test_a_page_is_as_wide_as_its_window(tab, path):
+    page = tab.open(path)
+    page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare")
+    for width in (2560, 1400, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
+
+
+# Text from outside
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/?view=tiles", VALVE, f"/compare?a={quote(NODE)}&b={quote(NODE)}"]
+)
+def test_text_from_outside_is_never_markup(tab, path):
+    page = tab.open(path)
+    page.get_by_text(TAG).first.wait_for()
+    assert page.locator("img[src=x]").count() == 0
+
+
+def test_an_address_is_text_from_outside_too(tab):
+    page = tab.open(f"/valve?node={quote('/<img src=x onerror=alert(2)>')}&tz=<b>&theme=<i>")
+    page.get_by_text("No message of this valve has been heard.").wait_for()
+    assert page.locator("img[src=x]").count() == 0
+    page = tab.open("/?q=%22%3E%3Cscript%3Ealert(3)%3C/script%3E&sort=%3Cb%3E")
+    page.get_by_text("No valve meets the filters.").wait_for()
+
+
+# Valve: one after the other, as a person works with it
+
+
+@pytest.fixture(scope="module")
+def identified(plant):
+    """Samples in the identifier's buffer."""
+    plant.client.send_record(quick_record())
+    plant.client.wait_for_buffered(1000)
+    return plant
+
+
+def press(page, name, answer):
+    page.get_by_role("button", name=name).click()
+    said = page.locator(".vf-answer")
+    page.get_by_text(answer).first.wait_for()
+    return said
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_valve_is_identified_by_a_button(tab):
+    page = tab.open(VALVE)
+    page.locator("h1").get_by_text(TAG).wait_for()
+    press(page, "Identify", "Identify: ")
+    row = page.locator(".vf-parameters tr").filter(has_text="coulomb friction")
+    row.wait_for()
+    assert "± " in row.inner_text()
+    assert "identified" in row.inner_text()
+    page.locator(".vf-sentence").get_by_text("no baseline").wait_for()
+    page.locator(".vf-chart-trend canvas").wait_for()
+    page.locator(".vf-long .vf-list tbody tr").first.wait_for()
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_baseline_is_set_only_when_it_is_agreed(tab):
+    page = tab.open(VALVE)
+    page.locator(".vf-parameters").wait_for()
+    page.get_by_role("button", name="Set baseline …").click()
+    asked = page.locator(".vf-dialog")
+    asked.get_by_text("in force now").wait_for()
+    words = asked.inner_text()
+    assert "none" in words
+    assert "coulomb friction 152" in words
+    page.get_by_role("button", name="Cancel").click()
+    asked.wait_for(state="detached")
+    assert page.locator(".vf-sub").count() == 0
+    page.get_by_role("button", name="Set baseline …").click()
+    page.locator(".vf-dialog").get_by_role("button", name="Set baseline").click()
+    page.get_by_text("Set baseline: baseline:").wait_for()
+    page.locator(".vf-sub").first.wait_for()
+    page.locator(".vf-fact-value").get_by_text("× 1.00").wait_for()
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_baseline_is_restored(tab):
+    page = tab.open(VALVE)
+    page.locator(".vf-sub").first.wait_for()
+    page.get_by_role("button", name="Restore baseline …").click()
+    dialog = page.locator(".vf-dialog")
+    page.wait_for_function("document.querySelectorAll('.vf-stack .vf-list tbody tr').length > 0")
+    assert "none" in dialog.inner_text()
+    dialog.get_by_role("button", name="Restore baseline").click()
+    page.get_by_text("Restore baseline: baseline: none").wait_for()
+    page.locator(".vf-sub").first.wait_for(state="detached")
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_refusal_is_told(tab):
+    page = tab.open(VALVE)
+    page.get_by_role("button", name="Restore baseline …").click()
+    page.locator(".vf-dialog").get_by_role("button", name="Restore baseline").click()
+    page.get_by_text("there is no ~/set_baseline to undo").wait_for()
+    assert "vf-answer-error" in page.locator(".vf-answer").get_attribute("class")
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_report_is_written_and_opened_as_a_page_without_scripts(tab):
+    page = tab.open(VALVE)
+    press(page, "Write report", "Write report: ")
+    link = page.locator(".vf-stack a").filter(has_text=".html").first
+    link.wait_for()
+    with page.expect_popup() as opened:
+        link.click()
+    report = opened.value
+    report.wait_for_load_state()
+    assert "friction" in report.locator("body").inner_text()
+    with urllib.request.urlopen(report.url) as answer:
+        assert "sandbox" in answer.headers["Content-Security-Policy"]
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    report.close()
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_recording_is_saved(tab):
+    pytest.importorskip("rosbags", reason="bags need rosbags")
+    page = tab.open(VALVE)
+    press(page, "Save recording", "Save recording: ")
+    page.locator(".vf-stack a").filter(has_text=".mcap").first.wait_for()
+
+
+def test_signals_are_heard_while_the_page_is_open(identified, tab):
+    client, topic = identified.client, f"{NAMESPACE}/actuator_pressure"
+    client.wait_until(lambda: client.node.count_subscribers(topic) == 1, "no other listener")
+    page = tab.open(VALVE)
+    client.wait_until(lambda: client.node.count_subscribers(topic) == 2, "the dashboard's ear")
+    page.get_by_text("No sample has come yet.").wait_for()
+    client.send_record(quick_record(HIGH_FRICTION), START + 60 * SECOND)
+    page.get_by_text("No sample has come yet.").wait_for(state="hidden")
+    page.goto("about:blank")
+    client.wait_until(lambda: client.node.count_subscribers(topic) == 1, "the end of it")
+
+
+def test_two_identifications_are_compared(identified, tab):
+    identified.client.identified(quick_record(HIGH_FRICTION), START + 600 * SECOND)
+    page = tab.open(VALVE)
+    page.locator(".vf-long tbody tr").nth(1).wait_for()
+    page.locator(".vf-long a").last.click()
+    page.locator(".vf-compared").wait_for()
+    row = page.locator(".vf-compared tr").filter(has_text="coulomb friction").inner_text()
+    assert "differs" in row  # of the record before, and of that with the high friction
+    page.get_by_role("combobox", name="Valve of side B").click()
+    page.get_by_role("option").filter(has_text="FV-103").click()
+    page.wait_for_url("**/compare?*fv_103*")
+    page.locator(".vf-compared").get_by_text("FV-103").first.wait_for()
+
+
+def test_what_cannot_be_called_says_so(tab):
+    page = tab.open(f"/valve?node={quote('/area_1/fv_103/identifier')}")
+    press(page, "Identify", "is not there: start the identifier of this valve")
+    page = tab.open(f"/valve?node={quote('/no such name!')}")
+    press(page, "Identify", "cannot be called")
+
+
+# Restarts, the last of this file
+
+
+def test_an_identifier_that_ends_falls_silent_and_comes_back(plant, tab):
+    page = tab.open(VALVE)
+    page.locator(".vf-chip").first.wait_for()
+    plant.kill(next(one for one in plant.nodes if one.name.endswith("/identifier")))
+    page.locator(".vf-valve-name .vf-chip").get_by_text("silent").wait_for()
+    plant.start("identifier", {"valve_tag": TAG, "input_timeout": 600.0})
+    page.locator(".vf-valve-name .vf-chip").get_by_text("silent").wait_for(state="detached")
+
+
+def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
+    page = tab.open("/?show=error&sort=tag")
+    wait_for_rows(page, 2)
+    parameters = {"port": urlsplit(plant.address).port, "silence": SILENCE}
+    plant.client.watched.clear()
+    plant.dashboard.interrupt()
+    plant.dashboard.require_good_end()  # exit code 0, and no traceback
+    plant.nodes.remove(plant.dashboard)
+    page.get_by_role("alert").get_by_text("No connection").wait_for()
+    plant.dashboard = plant.start("dashboard", parameters, namespace=None)
+    page.get_by_role("alert").get_by_text("No connection").wait_for(state="detached")
+    wait_for_rows(page, 2)
+    assert query_of(page) == {"show": "error", "sort": "tag"}
