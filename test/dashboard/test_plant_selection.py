@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from simulated_plant import hear
 
 from valve_friction_ros.dashboard import Selection, Status, selected
 from valve_friction_ros.dashboard.selection import SORTS, STATES, levels_in, state_of
@@ -29,7 +30,7 @@ def test_a_silent_valve_comes_after_errors_and_before_warnings(plant):
         valve = plant.valves(NOW)[number].view
         name = f"{valve.node}: friction"
         values = {"NE 107": valve.signal.value, "friction_ratio": "1.5"}
-        plant.hear(Status(name, int(valve.level), valve.tag, valve.sentence, values), 110.0)
+        hear(plant, Status(name, int(valve.level), valve.tag, valve.sentence, values), 110.0)
     order = tags(plant, now=111.0)
     assert set(order[:2]) == {"FV-106", "FV-107"}
     assert order[-1] == "FV-105"

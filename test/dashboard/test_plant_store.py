@@ -2,7 +2,7 @@
 
 import threading
 
-from simulated_plant import values_of_valve
+from simulated_plant import hear, values_of_valve
 
 from valve_friction_ros.dashboard import Plant, Status
 from valve_friction_ros.dashboard.plant import MOST_VALVES
@@ -15,7 +15,7 @@ DAY = 86_400_000_000_000
 def test_a_valve_is_silent_after_a_while(plant):
     assert not any(one.is_silent for one in plant.valves(104.9))
     assert all(one.is_silent for one in plant.valves(105.1))
-    plant.hear(Status(*values_of_valve(3)), 105.0)
+    hear(plant, Status(*values_of_valve(3)), 105.0)
     silent = [one.view.tag for one in plant.valves(106.0) if not one.is_silent]
     assert silent == ["FV-104"]
 
@@ -23,7 +23,7 @@ def test_a_valve_is_silent_after_a_while(plant):
 def test_what_the_history_knows_is_missed():
     plant = Plant(5.0)
     plant.expect([("/area_1/fv_101/identifier", "FV-101"), ("/x/identifier", "X")])
-    plant.hear(Status(*values_of_valve(0)), 100.0)
+    hear(plant, Status(*values_of_valve(0)), 100.0)
     first, second = plant.valves(101.0)
     assert (first.silent_for, first.is_silent) == (1.0, False)
     assert (second.view.tag, second.silent_for, second.is_silent) == ("X", None, True)
@@ -33,9 +33,9 @@ def test_what_the_history_knows_is_missed():
 def test_names_from_outside_do_not_fill_the_memory():
     plant = Plant(5.0)
     for index in range(MOST_VALVES + 10):
-        plant.hear(Status(f"/v{index}/identifier: friction", 0, "", "", {}), 0.0)
+        hear(plant, Status(f"/v{index}/identifier: friction", 0, "", "", {}), 0.0)
     assert len(plant.valves(0.0)) == MOST_VALVES
-    plant.hear(Status("/v3/identifier: friction", 2, "", "late", {}), 1.0)
+    hear(plant, Status("/v3/identifier: friction", 2, "", "late", {}), 1.0)
     assert plant.valve("/v3/identifier", 1.0).view.sentence == "late"
 
 
@@ -46,7 +46,7 @@ def test_it_is_filled_while_it_is_drained():
     def fill():
         index = 0
         while not stop.is_set():
-            plant.hear(Status(f"/v{index % 3000}/identifier: friction", 0, "", "", {}), 0.0)
+            hear(plant, Status(f"/v{index % 3000}/identifier: friction", 0, "", "", {}), 0.0)
             index += 1
 
     def drain():
@@ -78,7 +78,7 @@ def test_a_browser_is_sent_what_has_changed(plant):
     assert [row["i"] for row in first["rows"]] == first["order"] == list(range(9))
     # The next beat changes counters that the table does not show: only the clock is sent.
     for index in range(9):
-        plant.hear(Status(*values_of_valve(index, beat=1)), 102.0)
+        hear(plant, Status(*values_of_valve(index, beat=1)), 102.0)
     again = news(plant, feed, 102.1, 1001.0)
     made = {row["i"] for row in again.pop("rows", [])}
     assert again == {"now": 1001.0}
@@ -91,8 +91,10 @@ def test_a_browser_is_sent_what_has_changed(plant):
 
 def test_a_row_has_fixed_keys_only(plant):
     """The browser library evaluates keys that begin with a colon: none is from outside."""
-    plant.hear(
-        Status("/x/identifier: friction", 1, ":evil", ":evil", {":evil": "alert(1)", "a": ":b"}), 1
+    hear(
+        plant,
+        Status("/x/identifier: friction", 1, ":evil", ":evil", {":evil": "alert(1)", "a": ":b"}),
+        1,
     )
     keys = [tuple(row_of(one, None, 0.0, "")) for one in plant.valves(100.0)]
     assert len(set(keys)) == 1

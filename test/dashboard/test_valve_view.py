@@ -47,8 +47,7 @@ def test_all_that_an_identifier_says_is_read():
     (baseline,) = shown.baseline
     assert baseline.name == "coulomb_friction"
     # What has no place of its own is in exactly one list.
-    lists = (shown.fit, shown.evidence, shown.usage, shown.command, shown.counters)
-    names = [one.name for some in lists for one in some]
+    names = [one.name for some in shown.groups().values() for one in some]
     assert len(names) == len(set(names))
     assert {"rms", "evidence moves", "reversals", "buffered samples"} <= set(names)
 
@@ -111,5 +110,5 @@ def test_nothing_that_is_heard_is_an_error(level, words, values):
     shown = view_of(NODE, Status(words, level, words, words, values))
     assert shown.sentence.isprintable()
     assert shown.tag.isprintable()
-    for some in (shown.fit, shown.evidence, shown.usage, shown.command, shown.counters):
+    for some in shown.groups().values():
         assert all(one.text.isprintable() and one.name.isprintable() for one in some)

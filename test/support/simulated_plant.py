@@ -113,6 +113,11 @@ def status_of(index, beat=0, tag=None):
     )
 
 
+def hear(plant, status, at):
+    """Have the store of a plant hear a status."""
+    plant.hear(status.name, lambda: status, at)
+
+
 def publish_until_stopped(count):
     """Publish the diagnostics of `count` valves, each at 1 Hz, an array each, spread evenly."""
     import rclpy

@@ -63,7 +63,7 @@ class Difference:
 
 def side_of_view(view: ValveView) -> Side:
     """Return what is known of a valve now."""
-    method = next((one.text for one in view.fit if one.name == "method"), "–")
+    method = printable(view.values.get("method", "–"), 80)
     return Side(view.tag, view.identified, method, view.sentence, view.parameters)
 
 

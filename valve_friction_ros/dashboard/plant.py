@@ -1,10 +1,17 @@
 """The valves of a plant as they were heard last: filled by callbacks, drained by pages."""
 
 import threading
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
-from valve_friction_ros.dashboard.valve_view import Status, ValveView, identifier_in, view_of
+from valve_friction_ros.dashboard.valve_view import (
+    Essence,
+    Status,
+    ValveView,
+    essence_of,
+    identifier_in,
+    view_of,
+)
 
 __all__ = ["MOST_VALVES", "Heard", "Plant"]
 
@@ -26,12 +33,15 @@ class Heard:
         Time since its last message, s; None where it has never been heard.
     is_silent : bool
         Whether that is too long.
+    revision : int
+        Grows with each change of what a table shows of the valve.
     """
 
     number: int
     view: ValveView
     silent_for: float | None
     is_silent: bool
+    revision: int = 0
 
 
 class _Valve:
@@ -40,8 +50,26 @@ class _Valve:
     def __init__(self, number: int, view: ValveView) -> None:
         self.number = number
         self.at: float | None = None
-        self.unread: Status | None = None
+        self.unread: Callable[[], Status] | None = None
+        self.essence: Essence = ()
+        self.revision = 0
         self.view = view
+
+    def look(self, node: str) -> None:
+        """Read what came last, if it is still unread; what is no status changes nothing."""
+        if self.unread is None:
+            return
+        read, self.unread = self.unread, None
+        try:
+            status = read()
+        except ValueError:
+            return
+        essence = essence_of(status)
+        if essence == self.essence:
+            self.view = replace(self.view, values=status.values)
+        else:
+            self.view, self.essence = view_of(node, status), essence
+            self.revision += 1
 
 
 class Plant:
@@ -60,14 +88,18 @@ class Plant:
         self._lock = threading.Lock()
         self._valves: dict[str, _Valve] = {}
 
-    def hear(self, status: Status, at: float) -> None:
-        """Take a status that came at a time, s of the monotonic clock; ignore another node's."""
-        node = identifier_in(status.name)
+    def hear(self, name: str, read: Callable[[], Status], at: float) -> None:
+        """Take the status of this name that came at a time, s of the monotonic clock.
+
+        It is read when somebody looks; `read` raises ValueError if it is none. That of another node
+        is ignored.
+        """
+        node = identifier_in(name)
         if node is None:
             return
         with self._lock:
             if (valve := self._entry(node, "")) is not None:
-                valve.at, valve.unread = at, status
+                valve.at, valve.unread = at, read
 
     def expect(self, valves: Iterable[tuple[str, str]]) -> None:
         """Show valves, (identifier, tag) each, that were never heard: silent until they are."""
@@ -94,7 +126,7 @@ class Plant:
             return None if valve is None else self._heard(node, valve, now)
 
     def _heard(self, node: str, valve: _Valve, now: float) -> Heard:
-        if valve.unread is not None:
-            valve.view, valve.unread = view_of(node, valve.unread), None
+        valve.look(node)
         age = None if valve.at is None else max(0.0, now - valve.at)
-        return Heard(valve.number, valve.view, age, age is None or age > self._silence)
+        silent = age is None or age > self._silence
+        return Heard(valve.number, valve.view, age, silent, valve.revision)

@@ -125,7 +125,7 @@ class RowFeed:
 
     def __init__(self, href: Callable[[str], str]) -> None:
         self._href = href
-        self._sent: dict[int, Row] = {}
+        self._sent: dict[int, tuple[object, ...]] = {}
         self._order: list[int] = []
 
     def news(
@@ -135,13 +135,12 @@ class RowFeed:
         rows, order = [], []
         for valve in shown:
             order.append(valve.number)
-            row = row_of(valve, sparks(valve.view.node), wall, self._href(valve.view.node))
-            before = self._sent.get(valve.number)
-            if before is not None and row["last"] and before["last"]:
-                row["last"] = before["last"]  # the same moment, but for the rounding
-            if row != before:
-                self._sent[valve.number] = row
-                rows.append(row)
+            spark = sparks(valve.view.node)
+            cause = (valve.revision, valve.is_silent, spark)
+            if self._sent.get(valve.number) == cause:
+                continue
+            self._sent[valve.number] = cause
+            rows.append(row_of(valve, spark, wall, self._href(valve.view.node)))
         news: Row = {"now": round(wall, 1)}
         if rows:
             news["rows"] = rows

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import NamedTuple
 
@@ -18,11 +18,13 @@ from valve_friction_ros.outside_text import printable
 
 __all__ = [
     "Drift",
+    "Essence",
     "Expected",
     "Interval",
     "Sources",
     "Status",
     "ValveView",
+    "essence_of",
     "identifier_in",
     "view_of",
 ]
@@ -134,8 +136,8 @@ class ValveView:
         A significant drift.
     sources : Sources
         Topics of its samples.
-    fit, evidence, usage, command, counters : tuple of Entry
-        Further values, by what they are about.
+    values : mapping of str to str
+        All values, as they were heard.
     """
 
     node: str
@@ -152,16 +154,19 @@ class ValveView:
     baseline: tuple[Quantity, ...] = ()
     drift: Drift | None = None
     sources: Sources = _NO_SOURCES
-    fit: tuple[Entry, ...] = ()
-    evidence: tuple[Entry, ...] = ()
-    usage: tuple[Entry, ...] = ()
-    command: tuple[Entry, ...] = ()
-    counters: tuple[Entry, ...] = ()
+    values: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def namespace(self) -> str:
         """The namespace of the valve."""
         return self.node.rpartition("/")[0] or "/"
+
+    def groups(self) -> dict[str, tuple[Entry, ...]]:
+        """Return the values that have no place of their own, by what they are about.
+
+        The groups are ``fit``, ``evidence``, ``usage``, ``command`` and ``counters``.
+        """
+        return _groups(self.values, {one.name for one in self.parameters})
 
     def parameter(self, name: str) -> Quantity:
         """Return a parameter, without a value where it is not there."""
@@ -173,6 +178,41 @@ def identifier_in(name: str) -> str | None:
     """Return the identifier that a status of this name is of; None for another one's status."""
     node = name.removesuffix(_SUFFIX)
     return node if node != name and node.startswith("/") and len(node) < 256 else None
+
+
+_ESSENTIAL = (
+    "NE 107",
+    "estimate_valid",
+    "estimate_time",
+    "reason",
+    "friction_ratio",
+    "friction_ratio low",
+    "friction_ratio high",
+    "dead_band [%]",
+    "friction_drift [N/month]",
+    "friction_drift half width [N/month]",
+    "limit_expected",
+    "limit_expected [date]",
+    "limit_expected earliest [date]",
+    "limit_expected latest [date]",
+    "baseline_coulomb_friction [N]",
+    "baseline half width [N]",
+    "baseline_sliding_friction [N]",
+    *_SOURCES,
+)
+
+Essence = tuple[object, ...]
+"""What tells two views of a valve apart, without their counters and ages."""
+
+
+def essence_of(status: Status) -> Essence:
+    """Return what a view is made from: the parameters are those of the estimate's time."""
+    return (
+        status.level,
+        status.hardware_id,
+        status.message,
+        *map(status.values.get, _ESSENTIAL),
+    )
 
 
 def view_of(node: str, status: Status) -> ValveView:
@@ -194,7 +234,7 @@ def view_of(node: str, status: Status) -> ValveView:
         baseline=_baseline(values),
         drift=_drift(values),
         sources=Sources(*(values.get(key, "") for key in _SOURCES)),
-        **_groups(values, {one.name for one in parameters}),
+        values=values,
     )
 
 

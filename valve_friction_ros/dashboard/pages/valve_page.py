@@ -158,8 +158,9 @@ class _ValvePage:
             or before.baseline != view.baseline
         ):
             self._show_parameters(view)
+        groups = view.groups()
         for key, entries in self._lists.items():
-            entries.show(getattr(view, key))
+            entries.show(groups[key])
 
     def _show_facts(self, view: ValveView, heard: Heard | None) -> None:
         silent = None if heard is None else heard.silent_for

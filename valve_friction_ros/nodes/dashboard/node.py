@@ -8,12 +8,13 @@ import time
 from collections.abc import Sequence
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.signals import SignalHandlerOptions
 
-from valve_friction_ros.dashboard import Plant, Status
+from valve_friction_ros.dashboard import Plant
 from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_from
+from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
 from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls
 from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
@@ -45,7 +46,9 @@ class Dashboard(PolledNode):
         self.plant = Plant(self.options.silence)
         self.calls = ServiceCalls()
         self.signals = WatchedSignals(self._sources_of)
-        self._diagnostics = PolledSubscription(self, DiagnosticArray, "/diagnostics", stream())
+        self._diagnostics = PolledSubscription(
+            self, DiagnosticArray, "/diagnostics", stream(), raw=True
+        )
 
     def _sources_of(self, identifier: str) -> Sources:
         heard = self.plant.valve(identifier, time.monotonic())
@@ -55,20 +58,11 @@ class Dashboard(PolledNode):
         """Take what has been heard, and go on with what is asked."""
         now = time.monotonic()
         for taken in self._diagnostics.take():
-            for status in taken.message.status:
-                self.plant.hear(_status(status), now)
+            with contextlib.suppress(ValueError):  # anybody can publish other bytes
+                for name, read in statuses_in(taken.message):
+                    self.plant.hear(name, read, now)
         self.signals.step(self)
         self.calls.step(self)
-
-
-def _status(message: DiagnosticStatus) -> Status:
-    return Status(
-        message.name,
-        message.level[0],
-        message.hardware_id,
-        message.message,
-        {one.key: one.value for one in message.values},
-    )
 
 
 class _Turning:
