@@ -8,6 +8,7 @@ import time
 from datetime import datetime, timezone
 
 KINDS = ("good", "good", "good", "good", "grown", "excessive", "leaking", "new", "check")
+_BEGIN = time.time()
 _LEVELS = {"good": 0, "grown": 1, "excessive": 2, "leaking": 2, "new": 0, "check": 1}
 _SIGNALS = {"good": "", "grown": "M", "excessive": "F", "leaking": "S", "new": "", "check": "C"}
 _RATIOS = {"good": 1.02, "grown": 1.44, "excessive": 2.31, "leaking": 0.41, "check": 1.05}
@@ -32,7 +33,7 @@ def values_of_valve(index, beat=0, tag=None):
     now, half = friction * factor, friction * chance.uniform(0.01, 0.06)
     stiffness = chance.uniform(1.5e5, 2.6e5)
     dead = 100 * 2 * now / stiffness / 0.028575
-    made = time.time() - chance.uniform(60, 86400 * 9)
+    made = _BEGIN - chance.uniform(60, 86400 * 9)
     stamp = datetime.fromtimestamp(made, timezone.utc)
     values = {
         "estimate_valid": "true",

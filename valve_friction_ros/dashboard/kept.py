@@ -94,21 +94,17 @@ class KeptHistory:
             self.problem, self._mark = None, mark
             for one in found:
                 self._ratios[one.valve].append(one)
-                self._sparks.pop(one.valve, None)
                 self._row = max(self._row, one.row)
+            for valve in {one.valve for one in found}:
+                ratios = list(self._ratios[valve])
+                self._sparks[valve] = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
             self._histories.clear()
             self.revision += 1
             return True
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the picture of a valve's ratios, if there are some."""
-        try:
-            return self._sparks[node]
-        except KeyError:
-            ratios = list(self._ratios.get(node, ()))
-            drawn = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
-            self._sparks[node] = drawn
-            return drawn
+        return self._sparks.get(node)
 
     def valve(self, node: str) -> ValveHistory | None:
         """Read the history of a valve; None if nothing is kept of it.

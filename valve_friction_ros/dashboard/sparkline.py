@@ -1,10 +1,10 @@
 """The trend of a ratio as a small picture: the path of an SVG of 100 × 24 units."""
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
+from statistics import fmean, median
 from typing import NamedTuple
-
-import numpy as np
 
 __all__ = ["Sparkline", "sparkline"]
 
@@ -27,16 +27,16 @@ def sparkline(times: Sequence[int], ratios: Sequence[float]) -> Sparkline | None
     The height is logarithmic and spans a factor of 1.6 at least, so that noise looks small. Many
     points are combined to `_POINTS` by the median.
     """
-    time, ratio = np.asarray(times, dtype=np.float64), np.asarray(ratios, dtype=np.float64)
-    good = np.isfinite(ratio) & (ratio > 0)
-    time, height = time[good], np.log(ratio[good])
-    if time.size < 2:
+    found = sorted((t, math.log(r)) for t, r in zip(times, ratios, strict=True) if 0 < r < math.inf)
+    if len(found) < 2:
         return None
-    span = time.max() - time.min() or 1.0
-    place = np.minimum((time - time.min()) / span * _POINTS, _POINTS - 1).astype(np.int64)
+    begin = found[0][0]
+    span = found[-1][0] - begin or 1
+    places: defaultdict[int, list[tuple[int, float]]] = defaultdict(list)
+    for time, height in found:
+        places[min((time - begin) * _POINTS // span, _POINTS - 1)].append((time, height))
     points = [
-        (float(time[place == one].mean()), float(np.median(height[place == one])))
-        for one in np.unique(place)
+        (fmean(t for t, _ in some) - begin, median(y for _, y in some)) for some in places.values()
     ]
     low = min(0.0, *(y for _, y in points))
     high = max(0.0, *(y for _, y in points))
@@ -46,5 +46,5 @@ def sparkline(times: Sequence[int], ratios: Sequence[float]) -> Sparkline | None
     def at(y: float) -> float:
         return round(_BOTTOM - (y - low) / (high - low) * (_BOTTOM - _TOP), 1)
 
-    steps = [f"{100 * (t - time.min()) / span:.1f} {at(y)}" for t, y in points]
+    steps = [f"{100 * t / span:.1f} {at(y)}" for t, y in points]
     return Sparkline(f"M{'L'.join(steps)}", f"M0 {at(0.0)}L100 {at(0.0)}", round(span / _DAY))

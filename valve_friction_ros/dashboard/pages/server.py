@@ -4,8 +4,10 @@ import socket
 from collections.abc import Awaitable, Callable
 
 from fastapi import Request, Response
+from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse
 from nicegui import app, run, ui
+from starlette.types import ASGIApp
 
 from valve_friction_ros.dashboard.access import Access
 from valve_friction_ros.dashboard.access.guard import Guard, guard, server_options
@@ -68,8 +70,14 @@ def serve(board: Board, started: Callable[[], None]) -> None:
         tailwind=False,
         binding_refresh_interval=None,
         reconnect_timeout=5.0,
+        gzip_middleware_factory=_lightly_packed,
         timeout_graceful_shutdown=_GRACE,
     )
+
+
+def _lightly_packed(application: ASGIApp) -> GZipMiddleware:
+    """Compress what is sent, but little: at the usual level 9 a first visit takes a second."""
+    return GZipMiddleware(application, minimum_size=1000, compresslevel=1)
 
 
 def _add_page(board: Board, path: str, draw: _Draw) -> None:

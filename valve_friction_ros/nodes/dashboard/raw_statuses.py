@@ -5,6 +5,7 @@ valves a second. Here the name is read as the message comes, and the rest once a
 """
 
 import struct
+import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 
@@ -88,5 +89,5 @@ def _read(message: bytes, at: int) -> tuple[Status, int]:
     values = {}
     for _ in range(count):
         key, at = _text(message, at)
-        values[key], at = _text(message, at)
+        values[sys.intern(key)], at = _text(message, at)
     return Status(name, level, hardware_id, words, values), at
