@@ -3,22 +3,26 @@
 import argparse
 import math
 import os
+import secrets
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from rich.console import Console
 
+from benchmark.service.course import Task
+from benchmark.service.drawn import PREFIX
 from benchmark.service.plants import PLANTS
 from benchmark.service.report import bounds_met, tables
-from benchmark.service.trial import Task, Told, tried
+from benchmark.service.trial import Told, tried
 
 __all__ = ["main"]
 
 _BRIEF = ("low", "high", "graphite", "stick-slip")
 _WIDTH_OF_A_FILE = 150
-_HELD_OUT = 1000
-_STEP_HOURS, _SLOW_HOURS = 12, 40
+_STEP_HOURS, _SLOW_HOURS, _WEEKS_HOURS = 12, 40, 8 * 7 * 24
+_QUIET = "stick-slip"
+"""Valve whose friction grows over eight weeks."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -29,7 +33,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seeds", type=int, default=2, help="services of each valve")
     parser.add_argument("--brief", action="store_true", help="four valves, not all")
     parser.add_argument("--plants", nargs="+", choices=[*PLANTS], help="only these valves")
-    parser.add_argument("--held-out", action="store_true", help="seeds not developed with")
+    parser.add_argument(
+        "--drawn", type=int, default=10, help="valves drawn from the seed, besides (%(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="first seed (%(default)s)")
+    parser.add_argument(
+        "--held-out", action="store_true", help="a first seed that was never used before"
+    )
     parser.add_argument("--no-slow", action="store_true", help="leave out friction that creeps up")
     parser.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, help="processes (%(default)s)"
@@ -38,18 +48,19 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _tasks(options: argparse.Namespace) -> list[Task]:
-    names = options.plants or (_BRIEF if options.brief else tuple(PLANTS))
-    seeds = [one + (_HELD_OUT if options.held_out else 0) for one in range(options.seeds)]
-    steady = math.ceil(options.hours / (len(names) * len(seeds)))
+    names = list(options.plants or (_BRIEF if options.brief else PLANTS))
+    first = secrets.randbelow(2**30) if options.held_out else options.seed
+    seeds = range(first, first + options.seeds)
+    valves = [(name, seed) for seed in seeds for name in names]
+    valves += [(f"{PREFIX} {first + number}", first) for number in range(options.drawn)]
+    steady = math.ceil(options.hours / len(valves))
     courses = [("step", _STEP_HOURS), ("steady", steady)]
     if not options.no_slow:
         courses.append(("slow", _SLOW_HOURS))
-    return [
-        Task(name, hours, seed, course)
-        for course, hours in courses
-        for seed in seeds
-        for name in names
-    ]
+    tasks = [Task(name, hours, seed, one) for one, hours in courses for name, seed in valves]
+    if _QUIET in names and not options.no_slow:
+        tasks.insert(0, Task(_QUIET, _WEEKS_HOURS, first, "weeks"))
+    return tasks
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,6 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
     tasks = _tasks(options)
+    console.print(f"first seed {min(task.seed for task in tasks)}", highlight=False)
     told: list[Told] = []
     with ProcessPoolExecutor(options.jobs) as pool:
         pending = [pool.submit(tried, task) for task in tasks]

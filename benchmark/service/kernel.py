@@ -1,5 +1,6 @@
 """The motion of a valve in a control loop over hours, sampled as its sensors see it."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -19,10 +20,6 @@ SUMS = 2
 """Sums over the motion: ∫|dx| and ∫|F·dx|."""
 
 _COMMAND, _INTEGRAL, _PRESSURE, _MEASURED = range(4)
-_AT_REST = 5e-4
-"""Longest step while the stem rests well inside its static friction, s."""
-
-_INSIDE = 0.97
 _LOWEST, _HIGHEST = -0.15, 1.15
 
 
@@ -61,6 +58,42 @@ def new_state(loop: Loop, opening: float, travel: float) -> NDArray[np.float64]:
     return state
 
 
+@numba.njit(inline="always")
+def _rests(c: Constants, pull: float, scale: float) -> bool:
+    """Return whether a stem at rest stays so."""
+    way = 1.0 if pull > 0.0 else -1.0
+    return abs(pull) < scale * (1.0 + way * c.asymmetry) * c.static
+
+
+@numba.njit
+def _rest(
+    c: Constants, loop: Loop, now: tuple[float, float, float, float], most: float, step: float
+) -> tuple[float, float]:
+    """Return a time, s, over which a stem surely rests, and the pressure after it, Pa.
+
+    The state `now` is position, pressure, its target, and the scale of the friction. The pressure
+    runs one way until the next event, so what holds at the end holds before. No longer than `step`:
+    the stem may leave its rest.
+    """
+    position, pressure, target, scale = now
+    while most > step:
+        later = target + math.exp(-most / loop.converter_lag) * (pressure - target)
+        if _rests(c, stem_pull(c, position, later), scale):
+            return most, later
+        most *= 0.5
+    return most, pressure
+
+
+@numba.njit
+def _act(loop: Loop, whole: NDArray[np.float64], error: float) -> None:
+    """Let the controller act on an error."""
+    rate = loop.gain * error / loop.integral_time
+    integral = whole[_INTEGRAL] + rate * loop.action_period
+    whole[_INTEGRAL] = min(max(integral, _LOWEST), _HIGHEST)
+    command = loop.gain * error + whole[_INTEGRAL]
+    whole[_COMMAND] = min(max(command, _LOWEST), _HIGHEST)
+
+
 def _runner(advance: Callable[..., float], skips: bool) -> Callable[..., Any]:
     @numba.njit(nogil=True)
     def run(
@@ -82,27 +115,34 @@ def _runner(advance: Callable[..., float], skips: bool) -> Callable[..., Any]:
         stem = whole[4:]
         pressure = whole[_PRESSURE]
         time, next_action, action = 0.0, 0.0, 0
-        limit = _INSIDE * scale * (1.0 - abs(c.asymmetry)) * c.static * (1.0 - 0.5 * c.along_change)
         for sample in range(outputs.shape[1]):
             end = (sample + 1) * sample_period
             while time < end - 1e-9:
                 if time >= next_action - 1e-9:
-                    error = set_points[action] - whole[_MEASURED] - noise[action]
+                    _act(loop, whole, set_points[action] - whole[_MEASURED] - noise[action])
                     action += 1
                     next_action = action * loop.action_period
-                    rate = loop.gain * error / loop.integral_time
-                    integral = whole[_INTEGRAL] + rate * loop.action_period
-                    whole[_INTEGRAL] = min(max(integral, _LOWEST), _HIGHEST)
-                    command = loop.gain * error + whole[_INTEGRAL]
-                    whole[_COMMAND] = min(max(command, _LOWEST), _HIGHEST)
-                pull = stem_pull(c, stem[X], pressure)
-                now = step
-                if skips and stem[V] == 0.0 and abs(pull) < limit:
-                    now = max(min(_AT_REST, end - time, next_action - time), step)
                 target = loop.bottom + loop.span * whole[_COMMAND]
-                pressure += now / loop.converter_lag * (target - pressure)
+                pull = stem_pull(c, stem[X], pressure)
                 place = stem[X] / c.travel - 0.5
-                friction = advance(c, stem, pull, scale * (1.0 + place * c.along_change), now)
+                here = scale * (1.0 + place * c.along_change)
+                if skips and stem[V] == 0.0 and _rests(c, pull, here):
+                    now, later = _rest(
+                        c,
+                        loop,
+                        (stem[X], pressure, target, here),
+                        min(end, next_action) - time,
+                        step,
+                    )
+                    if now > step:
+                        lasting = math.exp(-now / loop.process_lag)
+                        opening = stem[X] / c.travel
+                        whole[_MEASURED] = opening + lasting * (whole[_MEASURED] - opening)
+                        pressure, time = later, time + now
+                        continue
+                now = step
+                pressure += now / loop.converter_lag * (target - pressure)
+                friction = advance(c, stem, pull, here, now)
                 after = stem[X] + now * stem[V]
                 if after < c.lowest or after > c.highest:
                     after = min(max(after, c.lowest), c.highest)

@@ -92,28 +92,28 @@ _HELD = Senses(50.0, 10e-6, 100.0, 30e-6, hold=4)
 
 PLANTS: Mapping[str, ServiceValve] = MappingProxyType(
     {
-        "low": ServiceValve(PACKINGS["low"], 5e-5, _loop(1.0, 2.0), Duty(), Senses()),
-        "high": ServiceValve(PACKINGS["high"], 1e-4, _loop(1.5, 2.0), Duty(), Senses()),
+        "low": ServiceValve(PACKINGS["low"], 2e-4, _loop(1.0, 2.0), Duty(), Senses()),
+        "high": ServiceValve(PACKINGS["high"], 2e-4, _loop(1.5, 2.0), Duty(), Senses()),
         "graphite": ServiceValve(
-            replace(_GRAPHITE, friction=_FALLING), 2e-5, _loop(2.0, 3.0), Duty(), Senses()
+            replace(_GRAPHITE, friction=_FALLING), 8e-5, _loop(2.0, 3.0), Duty(), Senses()
         ),
         "stick-slip": ServiceValve(_STICKY, 8e-6, _loop(2.0, 3.0), Duty(), Senses()),
-        "low, coarse": ServiceValve(PACKINGS["low"], 5e-5, _loop(1.0, 2.0), Duty(), _COARSE),
-        "high, late": ServiceValve(PACKINGS["high"], 1e-4, _loop(1.5, 2.0), Duty(), _LATE),
+        "low, coarse": ServiceValve(PACKINGS["low"], 2e-4, _loop(1.0, 2.0), Duty(), _COARSE),
+        "high, late": ServiceValve(PACKINGS["high"], 2e-4, _loop(1.5, 2.0), Duty(), _LATE),
         "stick-slip, coarse": ServiceValve(_STICKY, 8e-6, _loop(2.0, 3.0), Duty(), _COARSE),
         "bristles": ServiceValve(
-            replace(_GRAPHITE, friction=_BRISTLES), 4e-5, _loop(2.0, 3.0), Duty(), Senses()
+            replace(_GRAPHITE, friction=_BRISTLES), 8e-5, _loop(2.0, 3.0), Duty(), Senses()
         ),
         "uneven, held": ServiceValve(
             replace(_GRAPHITE, friction=replace(_UNEVEN, along_travel=Trend(0.2))),
-            2e-5,
+            8e-5,
             _loop(2.0, 3.0),
             Duty(low=0.25, high=0.75),
             _HELD,
         ),
         "alternating": ServiceValve(
             replace(_GRAPHITE, friction=_FALLING),
-            2e-5,
+            8e-5,
             _loop(3.0, 3.0),
             Duty(low=0.485, high=0.515),
             Senses(),

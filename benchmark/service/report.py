@@ -75,7 +75,7 @@ def _grown(told: Sequence[Told]) -> Table:
         "last error",
     ):
         table.add_column(column)
-    for course in ("step", "slow"):
+    for course in ("step", "slow", "weeks"):
         for plant, group in _by_plant([one for one in told if one.task.course == course]):
             last = [n for one in group for n in one.late if n.name == "sliding_friction"]
             table.add_row(
@@ -126,7 +126,7 @@ def bounds_met(told: Sequence[Told], console: Console) -> bool:
     ]
     steady = [one for one in told if one.task.course == "steady"]
     steps = [one for one in told if one.task.course == "step"]
-    slow = [one for one in told if one.task.course == "slow"]
+    slow = [one for one in told if one.task.course in ("slow", "weeks")]
     hours = sum(one.task.hours for one in steady)
     found = (
         ("sliding friction within 10 %, in every hour", _within(sliding)),

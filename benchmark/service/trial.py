@@ -3,14 +3,15 @@
 import contextlib
 import math
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 
-import numpy as np
-
-from benchmark.service.plants import PLANTS, Duty, ServiceValve
-from benchmark.service.service import STRETCH, Stretch, stretches
-from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, MoveStream, evidence_of
+from benchmark.reality.plants.constants import constants
+from benchmark.reality.plants.kernel import stem_pull
+from benchmark.service.course import BEFORE, PER_HOUR, Course, Served, Task, known_valve, served
+from benchmark.service.drawn import valve_of
+from benchmark.service.plants import ServiceValve
+from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, evidence_of
 from valve_friction_ros.health import (
     Baseline,
     FrictionLimits,
@@ -22,26 +23,12 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import Arrivals
 
-__all__ = ["Number", "Task", "Told", "tried"]
+__all__ = ["Number", "Told", "judged", "tried"]
 
-_PER_HOUR = round(3600.0 / STRETCH)
-_BEFORE = 3
-_DAY = 24.0
 _BEGIN = 1_700_000_000
 _SAME = 3600e9
 """Time of the first sample, s; and between two dates of one change, ns."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """What is tried: a plant, hours, a seed, and what its friction does: steady, step or slow."""
-
-    plant: str
-    hours: int
-    seed: int
-    course: str
 
 
 @dataclass(frozen=True)
@@ -88,69 +75,10 @@ class Told:
     late: list[Number] = field(default_factory=list)
 
 
-def _arrivals(stretch: Stretch) -> Arrivals:
-    stamps = np.concatenate(stretch.stamps)
-    kinds = np.repeat(np.array([0, 1], np.uint8), [one.size for one in stretch.stamps])
-    order = np.argsort(stamps, kind="stable")
-    values = np.concatenate((stretch.pressure, stretch.position))
-    return Arrivals(kinds[order], stamps[order], values[order])
-
-
-class _Course:
-    """What friction, preload and set points do; all but friction is no change."""
-
-    def __init__(self, task: Task, valve: ServiceValve) -> None:
-        self._task = task
-        self._duty = valve.duty
-        self._random = np.random.default_rng([task.seed, 3])
-        self._phase = self._random.uniform(0, _DAY)
-        self._phases: dict[int, Duty] = {}
-        self.at = float(_BEFORE + self._random.integers(1, 6)) + 0.5
-        self._drift = 0.15 * valve.plant.friction.coulomb
-
-    def friction(self, hour: float) -> float:
-        if self._task.course == "step":
-            return 1.5 if hour >= self.at else 1.0
-        if self._task.course == "slow":
-            return min(1.0 + 0.5 * max(hour - _BEFORE, 0.0) / (self._task.hours - 5), 1.5)
-        return 1.0
-
-    def offset(self, hour: float) -> float:
-        """Return how far a warm day moves the zero of the pressure, N."""
-        return self._drift * math.sin(2 * math.pi * (hour - self._phase) / _DAY)
-
-    def duty(self, hour: float) -> Duty:
-        """Return other steps, periods and ranges in each part of some days, from the second on."""
-        part = int(hour // 8)
-        if part == 0 or self._duty.high - self._duty.low < 0.1:
-            return self._duty
-        if part not in self._phases:
-            middle = self._random.uniform(0.35, 0.65)
-            self._phases[part] = replace(
-                self._duty,
-                step=float(self._random.choice([0.03, 0.04, 0.06])),
-                period=float(self._random.choice([12.0, 20.0, 30.0])),
-                low=middle - 0.15,
-                high=middle + 0.15,
-            )
-        return self._phases[part]
-
-    def has_changed(self, hour: float) -> bool:
-        """Return whether friction has begun to change before an hour."""
-        if self._task.course == "step":
-            return hour > self.at
-        return self._task.course == "slow" and hour > _BEFORE
-
-    @property
-    def reached(self) -> float:
-        """Hour at which friction has reached 1.5."""
-        return self.at if self._task.course == "step" else float(self._task.hours - 2)
-
-
 def _truths(
     evidence: Evidence, valve: ServiceValve, friction: float, sliding: float
 ) -> Iterator[Number]:
-    static, spring = valve.plant.friction.static * friction, valve.plant.body.spring
+    static, spring = valve.plant.friction.static * friction, _stiffness(valve)
     for name, truth in (
         ("sliding_friction", sliding),
         ("static_friction", static),
@@ -160,12 +88,19 @@ def _truths(
         yield Number(name, truth, one.value, one.half_width)
 
 
+def _stiffness(valve: ServiceValve) -> float:
+    """Return by how much the pull falls over the range of the set points, N/m."""
+    numbers, travel = constants(valve.plant), valve.plant.body.travel
+    low, high = valve.duty.low * travel, valve.duty.high * travel
+    return float(stem_pull(numbers, low, 0.0) - stem_pull(numbers, high, 0.0)) / (high - low)
+
+
 class _Watched:
     """The evidence of a valve, as an identifier gathers it, and what it declares."""
 
-    def __init__(self, task: Task, valve: Valve, course: _Course) -> None:
+    def __init__(self, task: Task, valve: Valve, course: Course) -> None:
         self._valve, self._course = valve, course
-        self._stream, self._limits = MoveStream(valve), FrictionLimits()
+        self._limits = FrictionLimits()
         self._ledger: deque[Move] = deque(maxlen=MOST_MOVES)
         self._baseline: Baseline | None = None
         self._reference: Reference | None = None
@@ -174,18 +109,16 @@ class _Watched:
         self.told = Told(task)
         self.evidence = evidence_of([], valve)
 
-    def take(self, hour: float, stretch: Stretch) -> tuple[Move, ...]:
-        """Take ten minutes that end at an hour; return their moves."""
-        moves = self._stream.take(_arrivals(stretch))
+    def take(self, hour: float, moves: Iterable[Move]) -> None:
+        """Take the moves of ten minutes that end at an hour."""
         self._ledger.extend(moves)
         self.evidence = evidence_of(list(self._ledger), self._valve)
         self._reference = self._reference or reference_by_evidence(self.evidence)
-        if hour == _BEFORE:
+        if hour == BEFORE:
             with contextlib.suppress(RefusalError):
                 self._baseline = baseline_by_evidence(self.evidence)
         self._declare(hour)
         self._alarm(hour)
-        return moves
 
     def _declare(self, hour: float) -> None:
         told, change = self.told, self.evidence.change
@@ -217,19 +150,24 @@ class _Watched:
 
 def tried(task: Task) -> Told:
     """Simulate the service of a task, and take its evidence every ten minutes."""
-    plant = PLANTS[task.plant]
-    body, course = plant.plant.body, _Course(task, plant)
-    valve = Valve(body.area, body.pressure_reference, body.travel)
+    return judged(task, served(task))
+
+
+def judged(task: Task, service: Iterable[Served]) -> Told:
+    """Take the evidence of a service every ten minutes."""
+    plant = valve_of(task.plant)
+    course, valve = Course(task, plant), known_valve(plant)
     watched = _Watched(task, valve, course)
-    told, moves = watched.told, []
+    told = watched.told
+    moves: list[Move] = []
     work = distance = 0.0
-    service = stretches(plant, task.hours, task.seed, course.friction, course.offset, course.duty)
-    for count, stretch in enumerate(service, start=1):
-        moves += watched.take(count / _PER_HOUR, stretch)
-        work, distance = work + stretch.work, distance + stretch.distance
-        if count % _PER_HOUR:
+    for count, part in enumerate(service, start=1):
+        moves += part.moves
+        watched.take(count / PER_HOUR, part.moves)
+        work, distance = work + part.work, distance + part.distance
+        if count % PER_HOUR:
             continue
-        hour = count // _PER_HOUR
+        hour = count // PER_HOUR
         scale = course.friction(hour - 1e-6)
         if distance > 0:  # a stem that stood still has no sliding friction
             truth = work / distance

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from service import PRELOAD, SPRING, START, VALVE, made_moves
 
 from valve_friction_ros.evidence import MOST_MOVES, Moves, evidence_of
-from valve_friction_ros.evidence.balance import balance_of, series_of
+from valve_friction_ros.evidence.balance import balance_of
+from valve_friction_ros.evidence.series import series_of
 from valve_friction_ros.identification import IdentificationSettings, Verdict
 
 HOUR = 3600e9
@@ -90,6 +91,15 @@ class TestEstimate:
         assert one.value == pytest.approx(600.0 / SPRING, rel=0.03)
         assert one.half_width < 0.1 * one.value
 
+    def test_without_a_spring_there_is_no_dead_band(self):
+        """Places within 2 % of the travel: friction that bends with the speed hides it."""
+        moves = made_moves(1.0, constant(900.0), step=0.01 * VALVE.travel, low=0.49, high=0.51)
+        settings = IdentificationSettings(fixed={"spring_constant": SPRING})
+        free, known = (by_the_hour(moves, one).parameters["dead_band"] for one in (None, settings))
+        assert free.verdict is Verdict.NOT_IDENTIFIABLE
+        assert "fixed.spring_constant" in free.reason
+        assert known.value == pytest.approx(1800.0 / SPRING, rel=0.03)
+
     def test_outliers_hardly_count(self):
         moves = made_moves(1.0, constant(300.0))
         for place in range(5, 300, 40):
@@ -132,6 +142,33 @@ class TestChange:
         one = found.parameters["sliding_friction"]
         assert one.value == pytest.approx(450.0, rel=0.03)
         assert found.since >= START + 2.8 * HOUR
+
+    def test_it_is_found_as_soon_after_a_week_as_after_a_day(self):
+        """A move every 150 s: 24 moves, and a date that is as narrow as the blocks."""
+
+        def friction(hour):
+            return 450.0 if hour >= 168.0 else 300.0
+
+        moves = made_moves(169.0, friction, period=150.0, noise=12.0)
+        change = by_the_hour(moves[-MOST_MOVES:]).change
+        assert change.low <= 1.5 <= change.high
+        assert change.earliest <= START + 168.0 * HOUR <= change.latest
+        assert change.latest - change.earliest < 2 * HOUR
+
+    @pytest.mark.parametrize("minutes", range(0, 60, 7))
+    def test_its_date_and_ratio_hold_as_soon_as_it_is_declared(self, minutes):
+        """Wherever in a block it lies; a block that holds both frictions tells neither."""
+
+        def friction(hour):
+            return 450.0 if hour >= 2 + minutes / 60 else 300.0
+
+        for hours in (0.4, 0.5, 0.6):
+            change = by_the_hour(made_moves(2 + minutes / 60 + hours, friction)).change
+            if change is not None:
+                assert change.low <= 1.5 <= change.high
+                at = START + (2 + minutes / 60) * HOUR
+                assert change.earliest <= at <= change.latest
+        assert change is not None
 
     def test_a_fall_too(self):
         found = by_the_hour(made_moves(4.0, lambda hour: 120.0 if hour >= 3.0 else 300.0))

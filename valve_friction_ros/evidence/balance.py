@@ -1,47 +1,37 @@
-"""Many moves combined: the weighted regression of their force balances."""
+"""Moves combined: one estimate of friction and spring, with its covariance."""
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, special
+from scipy import special
 
+from valve_friction_ros.evidence.blocks import blocks_of
+from valve_friction_ros.evidence.design import (
+    SLIDING,
+    SPRING,
+    STATIC,
+    Design,
+    design_of,
+    priors,
+    robust,
+    scales_of,
+    solution,
+    with_onsets,
+)
 from valve_friction_ros.evidence.moves import Moves
 
-__all__ = ["BLOCK", "FEWEST_BLOCKS", "FEWEST_MOVES", "Balance", "Series", "balance_of", "series_of"]
+__all__ = ["FEWEST_BLOCKS", "FEWEST_MOVES", "MOST_BLOCKS", "Balance", "balance_of"]
 
-BLOCK = 600.0
-"""Least time, s, of moves whose errors are taken as correlated."""
+MOST_BLOCKS = 60
+"""Blocks of an estimate at most: the intervals of more are no narrower."""
 
-_BLOCK_MOVES = 4
-"""And least number of such moves in each direction."""
-
-_MOST_BLOCKS = 60
 FEWEST_BLOCKS = 4
 """Blocks below which nothing is estimated: their scatter gives the interval."""
 
 FEWEST_MOVES = 12
 """Moves in each direction below which nothing is estimated."""
-
-_EPOCH = 3600.0
-"""Time, s, over which the preload stays the same: temperature and sensors drift over longer."""
-
-_MOST_EPOCHS = 60
-"""Their number is bounded: months of a quiet valve cost no more than hours of a busy one."""
-
-_SPEED, _ALONG, _DRIFT = 1.0, 0.5, 0.2
-"""Standard deviations of what friction may change by with the speed, at the mean speed, and along
-the travel; and of the preload from hour to hour; as shares of the sliding friction."""
-
-_FASTEST = 3.0
-"""Speed of a move, over the mean, beyond which its friction is taken to change no further."""
-
-_HUBER = 2.0
-_ROUNDS = 4
-_QUIETEST = 1e-3
-"""Least scatter of a move, as a share of the friction."""
 
 _SYSTEMATIC = 0.02
 """Standard deviation, as a share of the friction, of what no scatter shows: presliding, sampling,
@@ -51,11 +41,6 @@ before it slides changes the mean friction of 0.5 mm by some 4 %."""
 _BENT = 0.005
 """The same of a friction that follows speed and place by another law than a line: what it adds to
 the spring constant, over the scatter of the places."""
-
-SPRING, SPEED, ALONG, STATIC, PRELOAD = range(5)
-"""Places of the unknowns. Deviations of the preload follow, one an epoch; friction is the last."""
-
-SLIDING = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,47 +93,6 @@ class Balance:
 _TWO = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Series:
-    """Sliding friction of one block after the other, at one speed and one place.
-
-    Attributes
-    ----------
-    begin, end : ndarray of float, shape (b,)
-        Times of the first and the last move of each block, as in `Moves`, s.
-    friction : ndarray of float, shape (b,)
-        Sliding friction, N.
-    covariance : ndarray of float, shape (b, b)
-        By the scatter of moves, and by what speed and place leave open.
-    first : ndarray of int, shape (b,)
-        First move of each block.
-    """
-
-    begin: NDArray[np.float64]
-    end: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    first: NDArray[np.intp]
-
-
-def blocks_of(moves: Moves) -> NDArray[np.intp]:
-    """Return the block of each move: ten minutes at least, and some moves in each direction."""
-    if not len(moves):
-        return np.array([], dtype=np.intp)
-    span = max(BLOCK, float(moves.time[-1] - moves.time[0]) / _MOST_BLOCKS)
-    block, begin, up, down = 0, float(moves.time[0]), 0, 0
-    found = []
-    for time, way in zip(moves.time.tolist(), moves.direction.tolist(), strict=True):
-        if time - begin >= span and min(up, down) >= _BLOCK_MOVES:
-            block, begin, up, down = block + 1, time, 0, 0
-        found.append(block)
-        up, down = up + (way > 0), down + (way < 0)
-    blocks = np.array(found, dtype=np.intp)
-    if block and (min(up, down) < _BLOCK_MOVES or time - begin < 0.5 * span):
-        blocks[blocks == block] = block - 1
-    return blocks
-
-
 def balance_of(
     moves: Moves, timing: float, travel: float, spring_constant: float | None = None
 ) -> Balance | None:
@@ -179,22 +123,24 @@ def balance_of(
     is not estimated, since a friction that changes with speed looks like one: its uncertainty is
     carried into all numbers.
     """
-    blocks = blocks_of(moves)
+    blocks = blocks_of(moves, MOST_BLOCKS)
     count = int(blocks[-1]) + 1 if len(moves) else 0
     ways = [int(np.sum(moves.direction == way)) for way in (-1, 1)]
     if min(ways) < FEWEST_MOVES or count < FEWEST_BLOCKS:
         return None
-    scale, place, speed = _scales(moves)
-    one = np.zeros(len(moves), dtype=np.intp)
-    design = _with_onsets(_design(moves, one, speed, place), moves, blocks, place)
-    precision = _priors(design.rows.shape[1], scale, speed, moves, travel)
+    scales = scales_of(moves)
+    scale, place, speed = scales
+    design = design_of(moves, np.zeros(len(moves), dtype=np.intp), scales)
+    precision = priors(design, scales, moves, travel)
     precision[SLIDING] = 0.0
+    design = with_onsets(design, moves, place)
     shift = 0.0
     if spring_constant is not None:
         shift, precision[SPRING] = spring_constant, _KNOWN
-    target = design.force - shift * design.rows[:, SPRING]
-    values, weight = _robust(design, target, precision, scale)
-    scatter, lag = _covariance(design, target, weight, count, precision)
+    target = design.force - shift * design.dense[:, SPRING]
+    values, weight = robust(design, target, precision, scale)
+    blocks = np.concatenate((blocks, blocks[np.isfinite(moves.onset_force)]))
+    scatter, lag = _covariance(design, target, weight, blocks, precision)
     values[SPRING] += shift
     systematic = np.outer(timing * lag, timing * lag).astype(np.float64)
     for friction in (SLIDING, STATIC):
@@ -207,155 +153,30 @@ def balance_of(
     return Balance(values, scatter, systematic, quantile, speed, place, onsets, timing, lag)
 
 
-def series_of(moves: Moves, travel: float) -> Series | None:
-    """Return the friction block by block; None where there are fewer than two.
-
-    Spring, speed and place have one coefficient each, found within the blocks, so neither a new
-    range of set points nor other speeds look like another friction.
-    """
-    blocks = blocks_of(moves)
-    count = int(blocks[-1]) + 1 if len(moves) else 0
-    if count < 2:
-        return None
-    scale, place, speed = _scales(moves)
-    design = _design(moves, blocks, speed, place)
-    precision = _priors(design.rows.shape[1], scale, speed, moves, travel)
-    precision[-count:] = (1e-3 / scale) ** 2
-    values, weight = _robust(design, design.force, precision, scale)
-    normal = (design.rows * weight[:, None]).T @ design.rows + np.diag(precision)
-    covariance = _solution(normal, np.eye(values.size))[-count:, -count:]
-    first = np.flatnonzero(np.diff(blocks, prepend=-1))
-    last = np.append(first[1:], len(moves)) - 1
-    return Series(moves.time[first], moves.time[last], values[-count:], covariance, first)
-
-
 _KNOWN = 1e30
 
 
-class _Design(NamedTuple):
-    """Regressors, forces, weights (mean 1), rates of the forces, and blocks of some rows."""
-
-    rows: NDArray[np.float64]
-    force: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    blocks: NDArray[np.intp]
-
-
-def _scales(moves: Moves) -> tuple[float, float, float]:
-    """Return a rough friction (N), the mean place (m) and the mean speed (m/s)."""
-    place, speed = (
-        float(np.average(one, weights=moves.distance)) for one in (moves.place, moves.speed)
-    )
-    rows = np.column_stack((moves.direction, moves.place - place, np.ones(len(moves))))
-    root = np.sqrt(moves.distance)
-    found = linalg.lstsq(rows * root[:, None], moves.force * root)[0]
-    least = 1e-9 * (1.0 + float(np.max(np.abs(moves.force))))
-    return max(abs(float(found[0])), least), place, speed
-
-
-def _design(moves: Moves, frictions: NDArray[np.intp], speed: float, place: float) -> _Design:
-    """Return the rows of moves, with one friction for each number in `frictions`."""
-    passed = moves.time - moves.time[0]
-    epoch = max(_EPOCH, float(passed[-1]) / (_MOST_EPOCHS - 1))
-    epochs = (passed / epoch).astype(np.intp)
-    kinds, epochs = np.unique(epochs, return_inverse=True)
-    several = kinds.size if kinds.size > 1 else 0
-    way, away = moves.direction, moves.place - place
-    every = np.arange(len(moves))
-    groups = int(frictions.max()) + 1
-    rows = np.zeros((len(moves), PRELOAD + 1 + several + groups))
-    rows[:, SPRING], rows[:, PRELOAD] = away, 1.0
-    rows[:, SPEED] = way * (np.minimum(moves.speed, _FASTEST * speed) - speed)
-    rows[:, ALONG] = way * away
-    if several:
-        rows[every, PRELOAD + 1 + epochs] = 1.0
-    rows[every, PRELOAD + 1 + several + frictions] = way
-    weight = moves.distance / float(np.mean(moves.distance))
-    return _Design(rows, moves.force, weight, moves.force_rate, frictions)
-
-
-def _with_onsets(design: _Design, moves: Moves, blocks: NDArray[np.intp], place: float) -> _Design:
-    """Add a row for each breakaway, and put all rows into their blocks."""
-    begun = np.isfinite(moves.onset_force)
-    way, away = moves.direction[begun], moves.onset_position[begun] - place
-    rows = design.rows[begun]
-    rows[:, [SLIDING, SPEED]] = 0.0
-    rows[:, STATIC], rows[:, SPRING], rows[:, ALONG] = way, away, way * away
-    return _Design(
-        np.vstack((design.rows, rows)),
-        np.concatenate((design.force, moves.onset_force[begun])),
-        np.concatenate((design.weight, np.full(way.size, _ONSET))),
-        np.concatenate((design.rate, moves.onset_rate[begun])),
-        np.concatenate((blocks, blocks[begun])),
-    )
-
-
-_ONSET = 0.25
-"""Weight of a breakaway. It alone decides the static friction; of the rest it knows less than a
-move."""
-
-
-def _priors(
-    size: int, scale: float, speed: float, moves: Moves, travel: float
-) -> NDArray[np.float64]:
-    """Return the precision of each prior, all about zero."""
-    precision = np.full(size, (1.0 / (_DRIFT * scale)) ** 2)
-    precision[[SPRING, PRELOAD]] = 0.0
-    precision[STATIC] = (1e-3 / scale) ** 2
-    precision[SPEED] = (speed / (_SPEED * scale)) ** 2
-    length = travel if math.isfinite(travel) else max(float(np.ptp(moves.place)), 1e-9)
-    precision[ALONG] = (length / (_ALONG * scale)) ** 2
-    return precision
-
-
-def _robust(
-    design: _Design, target: NDArray[np.float64], precision: NDArray[np.float64], scale: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the values by Huber's weights, and the weights of the rows, 1/N²."""
-    deviation = scale
-    factor: NDArray[np.float64] = np.ones(target.size, dtype=np.float64)
-    values: NDArray[np.float64] = np.zeros(design.rows.shape[1], dtype=np.float64)
-    for _ in range(_ROUNDS):
-        weight = design.weight * factor / deviation**2
-        normal = (design.rows * weight[:, None]).T @ design.rows + np.diag(precision)
-        values = _solution(normal, design.rows.T @ (weight * target))
-        left = np.abs(target - design.rows @ values) * np.sqrt(design.weight)
-        deviation = max(1.4826 * float(np.median(left)), _QUIETEST * scale)
-        factor = np.minimum(1.0, _HUBER * deviation / np.maximum(left, 1e-300))
-    return values, design.weight * factor / deviation**2
-
-
-def _solution(normal: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve with unknowns of one size; one that nothing determines stays zero."""
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    scaled = normal / np.outer(size, size) + 1e-12 * np.eye(size.size)
-    found: NDArray[np.float64] = linalg.solve(scaled, (right.T / size).T, assume_a="pos")
-    solution: NDArray[np.float64] = (found.T / size).T
-    return solution
-
-
 def _covariance(
-    design: _Design,
+    design: Design,
     target: NDArray[np.float64],
     weight: NDArray[np.float64],
-    count: int,
+    blocks: NDArray[np.intp],
     precision: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the covariance by scatter and priors, and the change of the values by 1 s of lag."""
-    rows, size = design.rows, design.rows.shape[1]
+    order = np.argsort(blocks, kind="stable")
+    rows, weight = design.rows()[order], weight[order]
     weighted = rows * weight[:, None]
-    normals, rights = np.zeros((count, size, size)), np.zeros((count, size))
-    for one in range(count):
-        inside = design.blocks == one
-        normals[one] = weighted[inside].T @ rows[inside]
-        rights[one] = weighted[inside].T @ target[inside]
+    parts = np.split(np.arange(order.size), np.flatnonzero(np.diff(blocks[order])) + 1)
+    normals = np.array([weighted[part].T @ rows[part] for part in parts])
+    rights = np.array([target[order[part]] @ weighted[part] for part in parts])
     normal, right = normals.sum(axis=0) + np.diag(precision), rights.sum(axis=0)
-    without = np.array([_solution(normal - normals[i], right - rights[i]) for i in range(count)])
+    without = solution(normal - normals, right - rights)
+    count = len(parts)
     spread = without - without.mean(axis=0)
-    inverse = _solution(normal, np.eye(size))
+    inverse = solution(normal, np.eye(design.size))
     by_blocks = (count - 1) / count * spread.T @ spread + inverse @ np.diag(precision) @ inverse
     # The larger of both, one by one: the scatter of few blocks may be small by chance.
     larger = np.diag(inverse) / np.maximum(np.diag(by_blocks), 1e-300)
     grown = np.sqrt(np.maximum(larger, 1.0))
-    return by_blocks * np.outer(grown, grown), _solution(normal, weighted.T @ design.rate)
+    return by_blocks * np.outer(grown, grown), solution(normal, design.rate[order] @ weighted)

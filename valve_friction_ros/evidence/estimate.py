@@ -8,21 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.balance import (
-    ALONG,
     FEWEST_BLOCKS,
     FEWEST_MOVES,
-    PRELOAD,
-    SLIDING,
-    SPEED,
-    SPRING,
-    STATIC,
+    MOST_BLOCKS,
     Balance,
     balance_of,
-    blocks_of,
-    series_of,
 )
+from valve_friction_ros.evidence.blocks import blocks_of
 from valve_friction_ros.evidence.changes import Split, last_splits
+from valve_friction_ros.evidence.design import ALONG, PRELOAD, SLIDING, SPEED, SPRING, STATIC
 from valve_friction_ros.evidence.moves import Move, Moves
+from valve_friction_ros.evidence.series import series_of
 from valve_friction_ros.identification import (
     TIMING_UNCERTAINTY,
     IdentificationSettings,
@@ -54,6 +50,12 @@ _NAMES = (
     "sliding_friction",
     "dead_band",
 )
+_VAGUEST_SPRING = 0.25
+"""Half width of the spring constant, as a share of it, beyond which there is no dead band.
+
+Chosen: moves over some tenths of the travel know it to ±4 %, moves that hardly leave their place to
+±50 %; friction that bends with the speed then moves the dead band by 10 %."""
+
 _MEAN_SLOPE = "the change of friction with speed among moves, by whatever law"
 _COULOMB = "moves in service do not split friction into F_c and F_v"
 
@@ -175,7 +177,7 @@ def _change(split: Split, origin: int) -> Change:
 
 def _too_few(moves: Moves, change: Change | None) -> str:
     up, down = (int(np.sum(moves.direction == way)) for way in (1, -1))
-    blocks = len(set(blocks_of(moves).tolist()))
+    blocks = len(set(blocks_of(moves, MOST_BLOCKS).tolist()))
     since = " since friction changed" if change is not None else ""
     return (
         f"{up} moves up and {down} down in {blocks} blocks of time{since}: {FEWEST_MOVES} of each "
@@ -226,9 +228,21 @@ def _parameters(balance: Balance, spring: float | None) -> dict[str, Parameter]:
         reason = f"{balance.onsets} breakaways from a rest: {FEWEST_MOVES} are needed"
         for name in ("static_friction", "dead_band"):
             found[name] = not_identifiable(name, reason)
-    found.setdefault("dead_band", not_identifiable("dead_band", "the valve shows no spring"))
+    spread = balance.number(along(spring=1.0))[1] / k if k > 0 else math.inf
+    if spring is None and spread > _VAGUEST_SPRING:
+        found["dead_band"] = not_identifiable("dead_band", _vague_spring(k, spread))
     found["coulomb_friction"] = not_identifiable("coulomb_friction", _COULOMB)
     return found
+
+
+def _vague_spring(spring: float, share: float) -> str:
+    if not spring > 0:
+        return "the valve shows no spring"
+    return (
+        f"it is friction over spring, and moves that hardly leave their place know the spring to "
+        f"±{percentage(share)} only: let the set point go to other places, or state "
+        "fixed.spring_constant if it is known"
+    )
 
 
 def _doubt(balance: Balance, value: float, slope: NDArray[np.float64]) -> str:
