@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
@@ -148,4 +149,4 @@ def compare(
     ('ERROR', 2.7)
     """
     healthy = Baseline.of(baseline) if isinstance(baseline, Result) else baseline
-    return diagnose(result, result.valve, healthy, limits)
+    return diagnose_valve(result, healthy, limits).friction

@@ -193,7 +193,7 @@ class TestUnknownFriction:
     @pytest.mark.parametrize(("bound", "collapsed"), [(1.5, True), (57.0, True), (57.1, False)])
     def test_too_small_to_be_identified_has_collapsed(self, with_values, unknown, bound, collapsed):
         """Half of the least that the baseline can be, 128 − 14 N, is 57 N."""
-        vanished = dataclasses.replace(unknown(), magnitude_bound=bound)
+        vanished = dataclasses.replace(unknown(), withheld=(0.0, bound))
         result = with_values(coulomb_friction=vanished)
         found = diagnose(result, BENCH_VALVE, Baseline(128.0, 14.0))
         assert found.ratio is None
@@ -292,14 +292,14 @@ class TestSlidingFriction:
             (49.0, 4e-3, Level.ERROR),
             (49.1, 4e-3, Level.OK),
         ):
-            none = dataclasses.replace(unknown("sliding_friction"), magnitude_bound=bound)
+            none = dataclasses.replace(unknown("sliding_friction"), withheld=(0.0, bound))
             result = slid(1.0, speed=speed, sliding_friction=none, coulomb_friction=unknown())
             found = diagnose(result, BENCH_VALVE, baseline)
             assert found.level == level
             assert ("sliding friction is too small" in found.message) is (level == Level.ERROR)
 
     def test_a_coulomb_friction_lost_to_viscous_friction_is_no_collapse(self, slid, unknown):
-        vanished = dataclasses.replace(unknown(), magnitude_bound=10.0)
+        vanished = dataclasses.replace(unknown(), withheld=(0.0, 10.0))
         baseline = Baseline(128.0, 0.0, self.SLIDING)
         assert diagnose(slid(200.0, coulomb_friction=vanished), BENCH_VALVE, baseline).level == 0
         less = diagnose(slid(150.0, coulomb_friction=vanished), BENCH_VALVE, baseline)

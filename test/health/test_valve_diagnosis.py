@@ -16,9 +16,10 @@ from valve_friction_ros.health import (
     ValveLimits,
     diagnose_numbers,
     diagnose_parameters,
+    valve_changes,
     valve_numbers,
 )
-from valve_friction_ros.identification import RefusalError, identify
+from valve_friction_ros.identification import RefusalError, Verdict, identify
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, SensorNoise, Valve
 
 TRAVEL, SPRING = 0.03, 2e5
@@ -204,10 +205,34 @@ class TestCausesThatLookTheSame:
             upper_stop=(TRAVEL + shift, 1e-5),
         )
         assert (
-            "zero of the position sensor (-2 mm in its reading), as the travel stops have"
+            "check the zero of the position sensor (-2 mm in its reading), as both travel stops"
             in balance.message
         )
         assert "both travel stops have moved alike, by -2.00 mm" in stops.message
+
+    @pytest.mark.parametrize("other", [None, HEALTHY["upper_stop"]])
+    def test_one_stop_that_moves_with_the_balance_convicts_nothing(self, other):
+        """With the other stop unseen all causes remain; one that stays excludes the sensor's zero.
+
+        A seat that has worn, and a bench set that has moved, look the same as the zero.
+        """
+        shift = -2e-3
+        changes = {
+            "spring_preload": (500.0 - SPRING * shift, 20.0),
+            "lower_stop": (shift, 1e-5),
+            "upper_stop": other,
+        }
+        balance, stop = found(**changes)
+        assert "the bench set or the zero of the pressure sensor (+10 kPa" in balance.message
+        agrees = (
+            "or the zero of the position sensor (-2 mm in its reading), with which the move of "
+            "the one stop that was met agrees"
+        )
+        assert (agrees in balance.message) == (other is None)
+        assert ("position sensor" in balance.message) == (other is None)
+        assert "alike" not in balance.message
+        sensor = "the zero or span of the position sensor" if other is None else "the span of"
+        assert sensor in stop.message
 
 
 LOW = replace(LIMITS, preload_change=0.01)
@@ -231,7 +256,7 @@ def test_a_stop_that_stays_leaves_the_span_of_the_position_sensor():
         "the span of the position sensor" in only(found(upper_stop=(0.95 * TRAVEL, 1e-5))).message
     )
     alone = only(found(upper_stop=(0.95 * TRAVEL, 1e-5), lower_stop=None)).message
-    assert "the zero of the position sensor" in alone
+    assert "the zero or span of the position sensor" in alone
 
 
 def test_without_travel_shares_of_it_are_not_compared():
@@ -302,11 +327,27 @@ class TestWholeIdentifications:
         assert diagnose_parameters(healthy_result, Baseline(150.0)) == ()
 
 
-def test_a_doubted_model_leaves_only_what_the_signals_say(healthy_result):
+@pytest.mark.parametrize("zero", [-5e3, -6e3])
+def test_a_preload_near_zero_is_judged_by_its_newtons(healthy_result, zero):
+    """A sensor that reads 5 kPa too low takes the preload of 232 N to 9 N, unknown as a ratio."""
+    true = noisy_record(LOW_FRICTION, 6)
+    result = identify(replace(true, drive=true.drive + zero), BENCH_VALVE)
+    is_known = result.parameters["spring_preload"].verdict is not Verdict.NOT_IDENTIFIABLE
+    assert is_known == (zero < -5e3)
+    shift = valve_changes(valve_numbers(result), valve_numbers(healthy_result))["spring_preload"]
+    assert shift.holds(BENCH_VALVE.diaphragm_area * zero)
+    finding = only(diagnose_parameters(result, Baseline.of(healthy_result)))
+    assert f"the zero of the pressure sensor ({1e-3 * zero:.2g}" in finding.message
+    back = diagnose_parameters(healthy_result, Baseline.of(result))
+    assert "the balance of forces has shifted" in only(back).message
+
+
+def test_a_doubted_model_leaves_only_what_the_signals_say_and_the_slip_jump(healthy_result):
     doubted = replace(healthy_result.misfit, systematic=1e-3, tolerated=1e-4)
     assert not doubted.describes
     numbers = valve_numbers(replace(healthy_result, misfit=doubted))
-    assert numbers.keys() == {"drive_noise", "stem_noise", "lowest_position", "highest_position"}
+    signals = {"drive_noise", "stem_noise", "lowest_position", "highest_position"}
+    assert numbers.keys() == signals | {"slip_force"}
 
 
 def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):

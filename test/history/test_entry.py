@@ -7,7 +7,13 @@ import pytest
 from histories import START, VALVE, parameter, refused, success
 
 from valve_friction_ros import __version__
-from valve_friction_ros.health import FrictionMonitor, MonitorSettings, identify_snapshot
+from valve_friction_ros.health import (
+    FrictionMonitor,
+    Measured,
+    MonitorSettings,
+    RefusedRecordError,
+    identify_snapshot,
+)
 from valve_friction_ros.history import FrictionPoint, entry_of
 from valve_friction_ros.history.entry import settings_text
 from valve_friction_ros.identification import IdentificationSettings, RefusalError, Verdict
@@ -55,9 +61,10 @@ def test_a_refusal(monitor):
     """It keeps why, and nothing of the estimate before it."""
     snapshot = monitor.buffer.snapshot()
     monitor.accept(identify_snapshot(snapshot, monitor.settings), START)
-    monitor.refuse(RefusalError("too little travel"))
-    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START)
+    refusal = RefusedRecordError("too little travel", {"stem_noise": Measured(1e-5, 1e-7)})
+    entry = entry_of(monitor, VALVE, snapshot, monitor.settings, START, refusal)
     assert entry.refusal == "too little travel"
+    assert entry.numbers == refusal.numbers
     assert not entry.parameters
     assert entry.friction is None
     assert entry.point() is None
@@ -66,8 +73,8 @@ def test_a_refusal(monitor):
 
 def test_a_refusal_of_nothing(monitor):
     monitor.buffer.clear("on request")
-    monitor.refuse(RefusalError("no samples"))
-    assert entry_of(monitor, VALVE, monitor.buffer.snapshot(), monitor.settings, START).span is None
+    empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
+    assert entry_of(monitor, VALVE, empty, monitor.settings, START, refusal).span is None
 
 
 @pytest.mark.parametrize(("bias", "method"), [(None, "robust"), (1.13e-3, "refined")])
@@ -75,8 +82,8 @@ def test_a_refusal_has_the_method_that_would_have_identified(bias, method):
     """A choice of a method would join in one trend what two methods found."""
     identification = IdentificationSettings(position_bias=bias)
     monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, identification))
-    monitor.refuse(RefusalError("no samples"))
-    entry = entry_of(monitor, VALVE, monitor.buffer.snapshot(), monitor.settings, START)
+    empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
+    entry = entry_of(monitor, VALVE, empty, monitor.settings, START, refusal)
     assert entry.method == method
 
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, values_of
-from records import quick_record, simulated
+from live_nodes import NAMESPACE, SECOND, START, values_of
+from records import quick_record, simulated, stroked_record
 
-from valve_friction_ros.model import LOW_FRICTION, SensorNoise
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -74,6 +74,55 @@ def test_an_alarm_outlives_a_record_that_does_not_show_its_number_and_a_kill(liv
     after = client.next_status(lambda one: CHANGE in values_of(one), "the change after a restart")
     assert after.level == ERROR
     assert "no record since shows it)" in after.message
+
+
+@pytest.mark.parametrize("is_scheduled", [False, True])
+def test_lost_travel_is_said_though_its_record_is_refused(live, history, is_scheduled):
+    """A sixth of the travel is lost: no model follows the record, but the stem's end is seen."""
+    node = live.start_identifier()
+    client = live.client
+    client.identified(stroked_record())
+    assert client.trigger("set_baseline").success
+    assert client.next_status().level == OK
+    if is_scheduled:
+        client.set_parameters(NODE, {"period": 0.5})
+    assert client.trigger("clear").success
+    lost = stroked_record(0.16 * BENCH_VALVE.travel)
+    client.send_record(lost, START + 60 * SECOND)
+    client.wait_for_buffered(2 * len(lost))
+    words = "travel is lost at its lower end: the stem stops +4.57 mm"
+    if not is_scheduled:
+        answer = client.trigger("identify")
+        assert not answer.success
+        assert "no friction model reproduces the record" in answer.message
+        assert words in answer.message
+    status = client.next_status(lambda one: words in one.message, "the lost travel")
+    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
+    assert ("was refused" in status.message) == (not is_scheduled)
+    assert float(values_of(status)["lower_stop change [m]"]) == pytest.approx(4.572e-3, abs=5e-5)
+    client.wait_until(lambda: history.entries()[-1].refusal, "the refusal in the history")
+    live.kill(node)
+    live.start_identifier()
+    after = client.next_status(lambda one: words in one.message, "the same after a restart")
+    assert after.level == WARN
+
+
+def test_a_refused_record_between_the_stops_shows_nothing(live):
+    live.start_identifier()
+    client = live.client
+    client.identified(stroked_record())
+    assert client.trigger("set_baseline").success
+    still = quick_record()
+    still = replace(still, position=0.4 * BENCH_VALVE.travel + 0.0 * still.position)
+    assert client.trigger("clear").success
+    client.send_record(still, START + 60 * SECOND)
+    client.wait_for_buffered(2 * len(still))
+    answer = client.trigger("identify")
+    assert not answer.success
+    assert "the stem did not move" in answer.message
+    status = client.next_status(lambda one: "was refused" in one.message, "the refusal")
+    assert status.level == OK
+    assert "travel is lost" not in status.message
 
 
 def test_a_restored_baseline_brings_all_its_numbers_back(live):

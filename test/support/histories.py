@@ -29,7 +29,7 @@ _SETTINGS = settings_text(MonitorSettings(BENCH_VALVE))
 
 def as_kept(one):
     """The parameter as the history gives it back: without its bound."""
-    return replace(one, magnitude_bound=math.nan)
+    return replace(one, withheld=(math.nan, math.nan))
 
 
 def parameter(name, value, half_width=1.0, verdict=Verdict.IDENTIFIED, reason=""):

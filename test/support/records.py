@@ -1,5 +1,7 @@
 """Simulated records of the bench valve."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from valve_friction_ros.model import (
@@ -39,6 +41,21 @@ def square_record(parameters=HIGH_FRICTION):
     time = np.arange(3200) / 100
     pressure = converter_response(SquareWave(period=8.0).sample(time), 0.01, 0.6)
     return SensorNoise(10e-6, 50.0, seed=1).applied_to(simulated(pressure, 0.01, parameters))
+
+
+def stroked_record(seat=0.0, low=-0.15, high=1.15):
+    """Two slow strokes between two shares of the pressures of the travel, on a seat so far up (m).
+
+    By default the stem is pressed onto both stops.
+    """
+    time = np.arange(1000) / 100
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    pressure = 41_740.0 + 165_100.0 * (middle + half * np.sin(2 * np.pi * time / 5))
+    inner = replace(BENCH_VALVE, travel=BENCH_VALVE.travel - seat)
+    preload = LOW_FRICTION.spring_preload + LOW_FRICTION.spring_constant * seat
+    packing = replace(LOW_FRICTION, spring_preload=preload)
+    position = seat + simulate(inner, packing, pressure, 0.01).position
+    return SensorNoise(5e-6, 50.0, seed=1).applied_to(Recording(0.01, pressure, position))
 
 
 def sine_record(parameters, duration=16.0):

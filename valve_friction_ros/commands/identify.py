@@ -25,7 +25,7 @@ from valve_friction_ros.commands.output.identification_files import (
     identification_files,
 )
 from valve_friction_ros.commands.output.result_output import as_json, print_table
-from valve_friction_ros.health import Diagnosis, Finding, Level, diagnose, diagnose_parameters
+from valve_friction_ros.health import Diagnosis, Finding, Level, diagnose_valve
 from valve_friction_ros.identification import (
     METHODS,
     IdentificationSettings,
@@ -153,8 +153,7 @@ def run(options: argparse.Namespace) -> int:
         diagnosis: Diagnosis | None = None
         findings: tuple[Finding, ...] = ()
         if isinstance(outcome, Result) and (baseline is not None or options.fail_on is not None):
-            diagnosis = diagnose(outcome, valve, baseline)
-            findings = diagnose_parameters(outcome, baseline)
+            diagnosis, findings = diagnose_valve(outcome, baseline)
         results.append(_Answer(each, outcome, diagnosis, findings))
     try:
         code = _print(results, options.command, options.json)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.row import Cell, error_cells, result_cells
-from valve_friction_ros.health import Baseline, diagnose, diagnose_parameters
+from valve_friction_ros.health import Baseline, diagnose_valve
 from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
@@ -109,8 +109,7 @@ def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
     except RefusalError as refusal:
         return error_cells(recorded.name, str(refusal), job.path)
     baseline = options.baselines.get(recorded.name)
-    diagnosis = diagnose(result, options.valve, baseline)
-    found = diagnose_parameters(result, baseline)
+    diagnosis, found = diagnose_valve(result, baseline)
     cells = result_cells(recorded.name, result, diagnosis, recorded.notes, found)
     return {**cells, **_report(job, recorded, result, baseline)}
 

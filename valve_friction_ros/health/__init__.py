@@ -8,6 +8,7 @@ from valve_friction_ros.health.by_evidence import (
     reference_by_evidence,
     why_not_compared,
 )
+from valve_friction_ros.health.common_factor import explains, qualified
 from valve_friction_ros.health.comparison import (
     Comparison,
     Ratio,
@@ -33,8 +34,14 @@ from valve_friction_ros.health.friction_monitor import (
 from valve_friction_ros.health.known_numbers import DatedNumber, KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.refused_record import RefusedRecordError
 from valve_friction_ros.health.valve_changes import Change, valve_changes
-from valve_friction_ros.health.valve_diagnosis import diagnose_numbers, diagnose_parameters
+from valve_friction_ros.health.valve_diagnosis import (
+    ValveDiagnosis,
+    diagnose_numbers,
+    diagnose_parameters,
+    diagnose_valve,
+)
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 
@@ -55,8 +62,10 @@ __all__ = [
     "MonitorSettings",
     "Ratio",
     "Reference",
+    "RefusedRecordError",
     "SlidingFriction",
     "StatusSignal",
+    "ValveDiagnosis",
     "ValveLimits",
     "baseline_by_evidence",
     "by_severity",
@@ -67,10 +76,13 @@ __all__ = [
     "diagnose_again",
     "diagnose_numbers",
     "diagnose_parameters",
+    "diagnose_valve",
     "diagnosis_by_evidence",
+    "explains",
     "friction_words",
     "identify_snapshot",
     "percentage",
+    "qualified",
     "reference_by_evidence",
     "valve_changes",
     "valve_numbers",

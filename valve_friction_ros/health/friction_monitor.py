@@ -1,9 +1,11 @@
 """The monitor of one valve, without ROS: buffer, last result, baseline, diagnosis."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.common_factor import qualified
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
@@ -13,6 +15,8 @@ from valve_friction_ros.health.diagnosis import (
 )
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
@@ -79,20 +83,21 @@ class IdentificationInput(NamedTuple):
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
     """Identify a snapshot of the buffer. It does not use the monitor, so any thread may run it.
 
-    Raises RefusalError with the cause, and with the cause of a recent clearing of the buffer.
+    Raises RefusedRecordError with the cause, and with the cause of a recent clearing of the buffer.
     """
+    valve, how = settings.valve, settings.identification
+    numbers: Mapping[str, Measured] = {}
     try:
-        return method_named(settings.method)(
-            snapshot.recording(),
-            settings.valve,
-            settings.identification,
-        )
-    except RefusalError as refusal:
-        if snapshot.cleared_because is None:
+        recording = snapshot.recording()
+        try:
+            return method_named(settings.method)(recording, valve, how)
+        except RefusalError:
+            numbers = numbers_of_refused(recording, valve, how)
             raise
-        raise RefusalError(
-            f"{refusal} (the buffer was cleared: {snapshot.cleared_because})"
-        ) from refusal
+    except RefusalError as refusal:
+        cleared = snapshot.cleared_because
+        why = "" if cleared is None else f" (the buffer was cleared: {cleared})"
+        raise RefusedRecordError(f"{refusal}{why}", numbers) from refusal
 
 
 def _ago(age: int) -> str:
@@ -118,7 +123,7 @@ class FrictionMonitor:
     buffer : RecordBuffer
         The last seconds of both signals.
     baseline : Baseline or None
-        The healthy valve. Setting it drops the numbers of the valve from before the latest record.
+        The healthy valve. Setting it drops the numbers of the valve from before the latest result.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
@@ -139,7 +144,7 @@ class FrictionMonitor:
 
     @baseline.setter
     def baseline(self, baseline: Baseline | None) -> None:
-        self._baseline, self._known = baseline, self._known.only_latest()
+        self._baseline, self._known = baseline, self._known.since(self._stamp)
 
     @property
     def settings(self) -> MonitorSettings:
@@ -187,6 +192,11 @@ class FrictionMonitor:
         return self._known.findings(self.baseline, settings.valve, settings.valve_limits)
 
     @property
+    def common_factor(self) -> Change | None:
+        """Factor by which spring and friction have changed alike, if they have."""
+        return self._known.common_factor(self.baseline, self._settings.valve_limits)
+
+    @property
     def refusal(self) -> str | None:
         """Why the latest identification was refused; None if it was not."""
         return self._refusal
@@ -218,14 +228,18 @@ class FrictionMonitor:
         What was `known` of the valve beside its friction by earlier records goes on, too.
         """
         self._earlier, self._stamp = earlier, earlier.time
-        numbers = (known or KnownNumbers()).dated
-        self._known = KnownNumbers(numbers).followed_by(earlier.numbers, earlier.time)
+        self._known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
 
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
         self._result, self._earlier, self._stamp = result, None, stamp
         self._known = self._known.followed_by(valve_numbers(result), stamp)
         self._refusal = self._internal_error = None
+
+    def learn(self, numbers: Mapping[str, Measured], stamp: int) -> None:
+        """Remember what a refused record shows of the valve, if anything, found at `stamp` (ns)."""
+        if numbers:
+            self._known = self._known.followed_by(numbers, stamp)
 
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""
@@ -270,6 +284,7 @@ class FrictionMonitor:
         else:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
+        diagnosis = qualified(diagnosis, self.common_factor, valve)
         if self._refusal is None:
             return diagnosis
         message = f"the latest identification was refused: {self._refusal}; before: "

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.common_factor import common_factor
 from valve_friction_ros.health.levels import Finding
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.model.valve import Valve
@@ -65,6 +67,11 @@ class KnownNumbers:
             {name: one for name, one in self.dated.items() if one.time == self.latest}, self.latest
         )
 
+    def since(self, time: int | None) -> "KnownNumbers":
+        """Return what was measured at a time (ns) or later; all for None."""
+        kept = {name: one for name, one in self.dated.items() if time is None or one.time >= time}
+        return KnownNumbers(kept, self.latest)
+
     def followed_by(self, numbers: Mapping[str, Measured], time: int) -> "KnownNumbers":
         """Return what is known after a further record.
 
@@ -82,6 +89,24 @@ class KnownNumbers:
                 del fresh[end]
         dated |= {name: DatedNumber(one, time) for name, one in fresh.items()}
         return KnownNumbers(dated, time)
+
+    def common_factor(
+        self, baseline: Baseline | None, limits: ValveLimits | None = None
+    ) -> Change | None:
+        """Return the factor by which spring and friction have changed alike (`common_factor`)."""
+        if baseline is None:
+            return None
+        return common_factor(valve_changes(self.numbers, baseline.numbers), limits or ValveLimits())
+
+    def with_record(self, numbers: Mapping[str, Measured], time: int) -> "KnownNumbers":
+        """Return what is known with a record that may be older than others."""
+        known = KnownNumbers({n: one for n, one in self.dated.items() if one.time < time})
+        known = known.followed_by(numbers, time)
+        for later in sorted({one.time for one in self.dated.values() if one.time > time}):
+            known = known.followed_by(
+                {n: one.number for n, one in self.dated.items() if one.time == later}, later
+            )
+        return known
 
     def findings(
         self, baseline: Baseline | None, valve: Valve, limits: ValveLimits | None = None

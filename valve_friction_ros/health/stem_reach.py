@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
@@ -25,11 +25,15 @@ _NOISE = 6.0
 _SURELY = 2.0
 """Growth of the force over F_s − F_c: a stem that has jumped too far waits for twice as much."""
 
-_SMALLEST, _LARGEST = 0.05, 0.25
-"""Growth asked for at least, and where F_s − F_c is unknown, as shares of the force's range.
+_SMALLEST = 0.05
+"""Growth asked for at least, as a share of the force's range.
 
-Chosen: within the near part of the way the force grows by the spring, too. In records of a
-benchmark whose F_s is twice F_c, a stem waited for 0.15 to 0.2."""
+Chosen: within the near part of the way the force grows by the spring, too."""
+_MOVING = 0.05
+"""Speed over the top speed from which the stem counts as moving."""
+
+_RECENT = 0.5
+"""Time, s, before an arrival from which the speed is taken: a lag of the stem is no longer."""
 
 
 def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[str, Measured]:
@@ -37,7 +41,8 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
 
     A stem that has come to rest moves on as soon as the force has grown by F_s − F_c in the same
     direction. Where it rests at an end of its motion and the force grows by far more, a stop holds
-    it.
+    it. Where F_s − F_c is unknown, the rests between the ends show it; without one it is taken to
+    be no larger than F_c.
 
     Parameters
     ----------
@@ -58,9 +63,10 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
     force = valve.actuator_force(uniform_filter1d(recording.drive, mean, mode="nearest"))
     noise = float(np.std(recording.position - position)) / math.sqrt(mean)
     near = max(_NEAR * float(np.ptp(position)), _NOISE * noise)
-    least = _LARGEST * float(np.ptp(force))
-    if not math.isnan(slip_force):
-        least = max(_SURELY * slip_force, _SMALLEST * float(np.ptp(force)))
+    least = np.full(position.size, _SURELY * slip_force)
+    if math.isnan(slip_force):
+        least = _unknown_growth(position, force, recording.sample_period, near)
+    least = np.maximum(least, _SMALLEST * float(np.ptp(force)))
     found = {}
     for side, end, stop in (
         (-1.0, "lowest_position", "lower_stop"),
@@ -75,13 +81,69 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
     return found
 
 
-def _held(at_end: NDArray[np.bool_], force: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
+def _unknown_growth(
+    position: NDArray[np.float64], force: NDArray[np.float64], period: float, near: float
+) -> NDArray[np.float64]:
+    """Return the growth of the force, N, that proves a stop where nothing is known of F_s − F_c.
+
+    It is F_c, or twice the largest F_s − F_c that a rest between the ends shows, and what the
+    viscous friction of an arrival, or a lag of the stem, add to it.
+    """
+    speed = np.gradient(position, period)
+    moving = np.abs(speed) > _MOVING * np.abs(speed).max()
+    coulomb, viscous = _friction(position[moving], speed[moving], force[moving])
+    growth = max(coulomb, _SURELY * _slip_of_rests(position, force, moving, near, coulomb))
+    recent = max(round(_RECENT / period), 1)
+    arriving = maximum_filter1d(np.abs(speed), recent, origin=(recent - 1) // 2)
+    return growth + viscous * arriving
+
+
+def _friction(
+    position: NDArray[np.float64], speed: NDArray[np.float64], force: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return Coulomb (N) and viscous friction (N·s/m) of the moving stem, by least squares.
+
+    A lag of the stem adds to the viscous part. Where either comes out below zero, all is Coulomb's.
+    """
+    columns = [position - position.mean(), np.ones(position.size), np.sign(speed), speed]
+    (*_, coulomb, viscous), *_ = np.linalg.lstsq(np.column_stack(columns), force, rcond=None)
+    if min(coulomb, viscous) >= 0:
+        return float(coulomb), float(viscous)
+    (*_, loop), *_ = np.linalg.lstsq(np.column_stack(columns[:-1]), force, rcond=None)
+    return abs(float(loop)), 0.0
+
+
+def _slip_of_rests(
+    position: NDArray[np.float64],
+    force: NDArray[np.float64],
+    moving: NDArray[np.bool_],
+    near: float,
+    coulomb: float,
+) -> float:
+    """Return the largest F_s − F_c, N, that a rest between the ends shows; 0 without one.
+
+    The force changes by that before the stem moves on, and by F_s + F_c before it turns.
+    """
+    low, high = float(np.min(position)) + near, float(np.max(position)) - near
+    largest = 0.0
+    for begin, end in runs_of(~moving):
+        if begin > 0 and end < moving.size and low < position[begin] < high:
+            before = position[begin] - position[begin - 1]
+            after = position[end] - position[end - 1]
+            change = abs(force[end] - force[begin])
+            largest = max(largest, change - (2 * coulomb if before * after < 0 else 0.0))
+    return largest
+
+
+def _held(
+    at_end: NDArray[np.bool_], force: NDArray[np.float64], least: NDArray[np.float64]
+) -> NDArray[np.bool_]:
     """Return the visits of an end in which the force grows by more than `least` after arrival.
 
     Nothing is known of the arrival of a visit with which the record begins.
     """
     held = np.zeros(at_end.size, dtype=np.bool_)
     for begin, end in runs_of(at_end):
-        if begin > 0 and np.max(force[begin:end]) - force[begin] > least:
+        if begin > 0 and np.max(force[begin:end]) - force[begin] > least[begin]:
             held[begin:end] = True
     return held

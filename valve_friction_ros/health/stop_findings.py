@@ -23,7 +23,7 @@ def stop_findings(
     A stop that only the present record met is compared with how far the stem went in that of the
     baseline: where it went further, travel has been lost. Where the stem has gone beyond a stop of
     the baseline, that has moved outward. A stop that has stayed excludes the zero of the position
-    sensor for the other, and leaves its span.
+    sensor for the other, and leaves its span; where only one was met, it may be either.
     """
     bound = share * valve.travel
     moved = _moved(now, healthy, bound)
@@ -35,8 +35,9 @@ def stop_findings(
             *moved,
         )
         return
-    both = {name for name in _SIDES if name in now and name in healthy}
-    sensor = "zero" if both <= moved.keys() else "span"
+    sensor = "zero and span" if len(moved) == len(_SIDES) else "zero or span"
+    if any(name in now and name in healthy for name in _SIDES.keys() - moved.keys()):
+        sensor = "span"
     for name, change in moved.items():
         end, side, words = _SIDES[name]
         if side * change.value < 0:

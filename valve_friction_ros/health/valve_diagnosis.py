@@ -3,8 +3,16 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.common_factor import (
+    common_factor,
+    drive_scale,
+    qualified,
+    spring_change,
+)
+from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagnose
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.stop_findings import stop_findings
@@ -13,13 +21,34 @@ from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
 from valve_friction_ros.identification.trust.rounding import percentage
-from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["diagnose_numbers", "diagnose_parameters"]
+__all__ = ["ValveDiagnosis", "diagnose_numbers", "diagnose_parameters", "diagnose_valve"]
 
-_COMMON_SHARE = 0.3
-"""Share by which the upper end of a ratio may lie above the lower, to speak for a common factor."""
+
+class ValveDiagnosis(NamedTuple):
+    """Diagnosis of a valve: of its friction, and what else is found."""
+
+    friction: Diagnosis
+    findings: tuple[Finding, ...]
+
+
+def diagnose_valve(
+    result: Result, baseline: Baseline | None, limits: FrictionLimits | None = None
+) -> ValveDiagnosis:
+    """Compare a result with the baseline: its friction (`diagnose`), and its other numbers.
+
+    Where one factor explains friction and spring together, the diagnosis of the friction says so.
+    """
+    friction = diagnose(result, result.valve, baseline, limits)
+    if baseline is None or not baseline.numbers:
+        return ValveDiagnosis(friction, ())
+    numbers = valve_numbers(result)
+    factor = common_factor(valve_changes(numbers, baseline.numbers), ValveLimits())
+    return ValveDiagnosis(
+        qualified(friction, factor, result.valve),
+        diagnose_numbers(numbers, baseline, result.valve),
+    )
 
 
 def diagnose_parameters(
@@ -94,6 +123,10 @@ def diagnose_numbers(
     )
 
 
+_BOTH = 2
+"""Stops of a valve."""
+
+
 @dataclass(frozen=True)
 class _Case:
     """Numbers now and of the baseline, with their changes."""
@@ -118,9 +151,9 @@ class _Case:
         return self.valve.driven_by.words
 
     @property
-    def area(self) -> str:
-        """The area, for a list of causes, where there is one."""
-        return " and the diaphragm area" if self.valve.driven_by is Drive.PRESSURE else ""
+    def spring_change(self) -> Change | None:
+        """Ratio of the spring constants where it is surely beyond its bound."""
+        return spring_change(self.changes, self.limits)
 
 
 def _maintenance(message: str, *numbers: str) -> Finding:
@@ -140,44 +173,27 @@ def _by(change: Change, unit: str) -> str:
     return f"{change.value:+.3g} {unit} ({change.low:+.3g} to {change.high:+.3g})"
 
 
-def _spring_change(case: _Case) -> Change | None:
-    """Return the ratio of the spring constants where it is surely beyond its bound."""
-    change, share = case.changes.get("spring_constant"), case.limits.spring_change
-    return change if change is not None and change.beyond(1 - share, 1 + share) else None
-
-
 def _common_scale(case: _Case) -> Iterator[Finding]:
     """Find that all forces have changed by one factor, as by another scale of the drive."""
-    spring = _spring_change(case)
-    coulomb = case.changes.get("coulomb_friction")
-    if spring is None or coulomb is None or coulomb.holds(1.0) or not _is_narrow(coulomb):
-        return
-    others = [case.changes.get(name) for name in ("static_friction", "viscous_friction")]
-    known = [one for one in others if one is not None and _is_narrow(one)]
-    if all(one.agrees_with(spring) for one in (coulomb, *known)):
+    if (factor := common_factor(case.changes, case.limits)) is not None:
         yield _check(
-            f"spring constant and friction have changed alike, to {_times(spring)} the baseline: "
-            f"one common factor points to the scale of the {case.drive} sensor{case.area} rather "
-            "than to spring and packing at once: check them",
+            f"spring constant and friction have changed alike, to {_times(factor)} the baseline: "
+            f"one common factor points to {drive_scale(case.valve)} rather than to spring and "
+            "packing at once: check them",
             "spring_constant",
             "coulomb_friction",
         )
 
 
-def _is_narrow(ratio: Change) -> bool:
-    """Return whether a ratio is known well enough to speak for a common factor."""
-    return ratio.low > 0 and ratio.high / ratio.low < 1 + _COMMON_SHARE
-
-
 def _spring(case: _Case) -> Iterator[Finding]:
-    change = _spring_change(case)
+    change = case.spring_change
     if change is None:
         return
     share, value = case.limits.spring_failure, case.now["spring_constant"].value
     coulomb, preload = case.changes.get("coulomb_friction"), _preload_ratio(case)
     causes = [] if _is_scale_excluded(case, change) else ["the position sensor's scale"]
     if coulomb is None or coulomb.agrees_with(change):
-        causes.append(f"the scale of the {case.drive} sensor{case.area}")
+        causes.append(drive_scale(case.valve))
     also = ", and its preload with it" if preload and preload.agrees_with(change) else ""
     alike = f", and {' and '.join(causes)}, which would look the same" if causes else ""
     message = (
@@ -223,7 +239,7 @@ def _preload(case: _Case) -> Iterator[Finding]:
     bound *= case.limits.preload_change
     if shift is None or not shift.beyond(-bound, bound):
         return
-    spring, ratio = _spring_change(case), _preload_ratio(case)
+    spring, ratio = case.spring_change, _preload_ratio(case)
     if spring is not None and ratio is not None and ratio.agrees_with(spring):
         return  # the same spring, as far compressed as before
     share = percentage(abs(shift.value) / case.spring_force)
@@ -245,12 +261,16 @@ def _preload_causes(case: _Case, shift: Change) -> list[str]:
     stops = [case.changes[name] for name in ("lower_stop", "upper_stop") if name in case.changes]
     bound = case.limits.stop_change * case.valve.travel
     zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm in its reading)"
-    if stops and all(one.agrees_with(moved) and one.beyond(-bound, bound) for one in stops):
-        return [f"{zero}, as the travel stops have moved alike"]
+    with_balance = [one.agrees_with(moved) for one in stops]
+    have_moved = all(with_balance) and all(one.beyond(-bound, bound) for one in stops)
+    if have_moved and len(stops) == _BOTH:
+        return [f"{zero}, as both travel stops have moved alike"]
     zero_of_drive = case.valve.actuator_drive(shift.value) - case.valve.actuator_drive(0.0)
     drive = f"{zero_of_drive / case.valve.driven_by.size:+.3g} {case.valve.driven_by.unit}"
     causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive} in its reading)"]
-    if not stops or any(one.agrees_with(moved) for one in stops):
+    if have_moved and stops:
+        causes.append(f"{zero}, with which the move of the one stop that was met agrees")
+    elif all(with_balance):
         causes.append(zero)
     friction = case.now.get("coulomb_friction")
     if friction is None or min(abs(shift.low), abs(shift.high)) < friction.value:

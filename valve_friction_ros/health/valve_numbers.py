@@ -7,6 +7,7 @@ from typing import Any
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.sensor_noise import sensor_noises
 from valve_friction_ros.health.stem_reach import stem_reach
+from valve_friction_ros.health.valve_changes import DIFFERENCES
 from valve_friction_ros.identification import (
     CLOCK_OFFSET,
     IMPERFECTIONS_FOUND,
@@ -27,6 +28,13 @@ COMPARED = (
 )
 """Parameters of a result that are compared with those of a baseline."""
 
+_COULOMB = "coulomb_friction"
+_DOUBTED = "slip_force"
+_SLIP_SHARE = 0.5
+"""Share of a slip force by which it may be too large, whatever the law of the friction.
+
+Chosen: on simulated valves whose friction falls with the speed, 0.4 to 1 of F_s − F_c was found."""
+
 _SURE_SPRING = 0.1
 """Half width of the spring constant, as a share, up to which the numbers of a fit count.
 
@@ -37,23 +45,21 @@ friction, and all numbers of the fit depend on that."""
 def valve_numbers(result: Result) -> dict[str, Measured]:
     """Return all that a result has measured of the valve, by name, SI units.
 
-    Parameters are there where they are identified or weak, without the uncertainties of area and
-    sensor scales, which two records of the same sensors share; not where the model does not
-    describe the valve, or the spring constant is known to no better than 10 %. The others are:
+    Parameters are there where they are identified or weak, the preload with any interval, without
+    the uncertainties of area and sensor scales, which two records of the same sensors share; not
+    where the model does not describe the valve, but for the slip jump, which may be why, or where
+    the spring constant is known to no better than 10 %. The others are:
 
     - ``slip_force``, F_s − F_c, N; ``viscous_asymmetry``; ``lag`` of the stem, s;
     - ``lowest_position``, ``highest_position``, and the stops that were met (`stem_reach`);
     - ``drive_noise`` and ``stem_noise`` (`sensor_noises`).
     """
-    known = {
-        one.name: Measured(one.value, one.half_width)
-        for one in (each.without_calibration for each in result.parameters.values())
-        if _is_known(one)
-    }
-    is_described = result.misfit is None or result.misfit.describes
-    fit = fit_numbers(known) if is_described else {}
+    known = {name: one for name, each in result.parameters.items() if (one := _measured(each))}
+    fit = fit_numbers(known)
     if fit:
         fit |= _imperfections(result.evidence, known)
+    if result.misfit is not None and not result.misfit.describes:
+        fit = {name: one for name, one in fit.items() if name == _DOUBTED}
     slip = fit.get("slip_force")
     largest = math.nan if slip is None else max(slip.value, 0.0) + slip.half_width
     numbers = sensor_noises(result.recording)
@@ -78,8 +84,18 @@ def fit_numbers(known: Mapping[str, Measured]) -> dict[str, Measured]:
     return numbers
 
 
-def _is_known(one: Parameter) -> bool:
-    return one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.half_width >= 0
+def _measured(one: Parameter) -> Measured | None:
+    """Return a parameter without its calibration, where it is identified or weak.
+
+    Of one that is compared by its difference, zero is a value as good as any: its interval counts
+    though it is wider than the value.
+    """
+    one = one.without_calibration
+    if one.verdict is Verdict.NOT_IDENTIFIABLE and one.name in DIFFERENCES:
+        return None if math.isnan(one.magnitude_bound) else Measured(*one.withheld)
+    if one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.half_width >= 0:
+        return Measured(one.value, one.half_width)
+    return None
 
 
 def _imperfections(
@@ -87,7 +103,7 @@ def _imperfections(
 ) -> dict[str, Measured]:
     """Return slip force, asymmetry and lag, as the method found them.
 
-    A slip force is known no better than F_c, from which it is counted. Sliding, the stem stands
+    A slip force is known no better than F_c, from which it is counted, or `_SLIP_SHARE`. Sliding, the stem stands
     (F_v/k)·ẋ behind where it would be without viscous friction, and a lag τ shows it τ·ẋ behind: so
     the lag is known no better than F_v/k, and not at all without F_v.
     """
@@ -97,12 +113,11 @@ def _imperfections(
     }
     if CLOCK_OFFSET in known:
         found["lag"] = known[CLOCK_OFFSET]
-    spring = known["spring_constant"].value
-    for name, beside, per in (
-        ("slip_force", "coulomb_friction", 1.0),
-        ("lag", "viscous_friction", spring),
-    ):
-        if (one := found.pop(name, None)) is not None and beside in known:
-            width = math.hypot(one.half_width, known[beside].half_width / per)
-            found[name] = Measured(one.value, width)
+    if (slip := found.get("slip_force")) is not None:
+        share = _SLIP_SHARE * slip.value
+        doubt = min(known[_COULOMB].half_width, share) if _COULOMB in known else share
+        found["slip_force"] = Measured(slip.value, math.hypot(slip.half_width, doubt))
+    if (lag := found.pop("lag", None)) is not None and "viscous_friction" in known:
+        doubt = known["viscous_friction"].half_width / known["spring_constant"].value
+        found["lag"] = Measured(lag.value, math.hypot(lag.half_width, doubt))
     return found

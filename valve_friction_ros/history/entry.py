@@ -14,9 +14,11 @@ from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.refused_record import RefusedRecordError
 from valve_friction_ros.identification import (
     SLIDING,
     Parameter,
+    RefusalError,
     Verdict,
     parameter_mapping,
     plain,
@@ -320,8 +322,9 @@ def entry_of(
     snapshot: Snapshot,
     settings: MonitorSettings,
     time: int,
+    refusal: RefusalError | None = None,
 ) -> HistoryEntry:
-    """Describe the identification that a monitor has just accepted or refused.
+    """Describe the identification that a monitor has just accepted, or that was refused.
 
     Parameters
     ----------
@@ -335,10 +338,15 @@ def entry_of(
         Settings of this identification; those in force may differ by now.
     time : int
         Now, ns.
+    refusal : RefusalError, optional
+        Why the record was refused; without one the monitor holds its result.
     """
-    result = monitor.result
-    outcome: dict[str, Any] = {"refusal": monitor.refusal}
-    if monitor.refusal is None and result is not None:
+    result, outcome = monitor.result, dict[str, Any]()
+    if refusal is not None:
+        outcome = {"refusal": str(refusal)}
+        if isinstance(refusal, RefusedRecordError):
+            outcome["numbers"] = refusal.numbers
+    elif result is not None:
         outcome = {
             "parameters": result.parameters,
             "fit": Fit(

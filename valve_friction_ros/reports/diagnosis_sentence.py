@@ -80,6 +80,12 @@ def _friction(record: IdentifiedRecord) -> Parameter:
     return [*below, *known, *frictions][0]
 
 
+_SCALED = (
+    "before any work on the packing, check the scale of the {drive} sensor, which would change the "
+    "spring constant by the same factor, as it has changed"
+)
+
+
 def _found(record: IdentifiedRecord) -> _Finding:
     friction, diagnosis = _friction(record), record.diagnosis
     if diagnosis.ratio is None:
@@ -97,6 +103,9 @@ def _found(record: IdentifiedRecord) -> _Finding:
         f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % interval: "
         f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
     )
+    if record.is_scaled:
+        advice = _SCALED.format(drive=record.recording.driven_by.words)
+        return _Finding(f"the friction seems to have changed, {ratio}", advice)
     if diagnosis.status_signal in _ALARMS:
         alarm = _ALARMS[diagnosis.status_signal]
         return _Finding(alarm.what.format(ratio=ratio), alarm.advice)

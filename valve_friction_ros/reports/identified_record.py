@@ -5,6 +5,7 @@ from functools import cached_property
 
 from valve_friction_ros.health import (
     Baseline,
+    Change,
     Diagnosis,
     Finding,
     FrictionLimits,
@@ -13,6 +14,8 @@ from valve_friction_ros.health import (
     ValveLimits,
     by_severity,
     diagnose,
+    explains,
+    qualified,
     valve_numbers,
 )
 from valve_friction_ros.history import ValveHistory
@@ -83,9 +86,22 @@ class IdentifiedRecord:
         return self.result.valve
 
     @property
+    def _friction(self) -> Diagnosis:
+        return diagnose(self.result, self.valve, self.baseline, self.limits)
+
+    @property
+    def _factor(self) -> Change | None:
+        return self._known.common_factor(self.baseline, self.valve_limits)
+
+    @property
     def diagnosis(self) -> Diagnosis:
         """The diagnosis of the valve."""
-        return diagnose(self.result, self.valve, self.baseline, self.limits)
+        return qualified(self._friction, self._factor, self.valve)
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether one factor explains what is found on friction and spring together."""
+        return explains(self._factor, self._friction)
 
     @cached_property
     def _known(self) -> KnownNumbers:

@@ -3,7 +3,7 @@
 import math
 from datetime import datetime, timezone
 
-from valve_friction_ros.health import Level, StatusSignal
+from valve_friction_ros.health import FrictionLimits, Level, StatusSignal
 from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.model import Recording
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
@@ -30,18 +30,25 @@ _ALARMS = {
 
 def valve_status(record: IdentifiedRecord) -> Status:
     """Return the status; green only where a comparison with a baseline found nothing."""
-    diagnosis, limits = record.diagnosis, record.limits
+    diagnosis = record.diagnosis
     worst = next(iter(record.findings), None)
     if worst is not None and worst.level > diagnosis.level:
         colour = Colour.RED if worst.level is Level.ERROR else Colour.AMBER
         return Status(colour, "The valve has changed", f"NE 107: {worst.status_signal.value}")
+    if record.is_scaled:
+        return Status(Colour.AMBER, "Check the sensors' scales", "check function (NE 107: C)")
     if diagnosis.status_signal in _ALARMS:
         return _ALARMS[diagnosis.status_signal]
     if diagnosis.ratio is None:
         return Status(Colour.GREY, "Unknown", _why_unknown(record))
-    if diagnosis.ratio.value >= limits.warn_ratio:
+    return _status_of_ratio(diagnosis.ratio.value, record.limits)
+
+
+def _status_of_ratio(ratio: float, limits: FrictionLimits) -> Status:
+    """Return the status of a friction that is not surely beyond a limit."""
+    if ratio >= limits.warn_ratio:
         return Status(Colour.GREY, "Uncertain", "the friction has perhaps grown")
-    if diagnosis.ratio.value <= limits.low_ratio:
+    if ratio <= limits.low_ratio:
         return Status(Colour.GREY, "Uncertain", "the friction has perhaps collapsed")
     return Status(Colour.GREEN, "Friction normal", "compared with the healthy valve")
 

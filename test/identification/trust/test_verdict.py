@@ -41,7 +41,8 @@ def test_a_zero_is_not_identifiable():
 
 def test_a_withheld_value_leaves_the_largest_that_it_can_be():
     """−3 ± 4 N is 7 N at the most; of what the record does not hold nothing is known."""
-    assert with_verdict("coulomb_friction", -3.0, 2.0, 4.0).magnitude_bound == 7.0
+    withheld = with_verdict("coulomb_friction", -3.0, 2.0, 4.0)
+    assert (withheld.withheld, withheld.magnitude_bound) == ((-3.0, 4.0), 7.0)
     assert math.isnan(with_verdict("coulomb_friction", 3.0, 0.1, 0.2).magnitude_bound)
     assert math.isnan(not_identifiable("coulomb_friction", "why").magnitude_bound)
 

@@ -24,6 +24,7 @@ __all__ = [
     "require_travel",
     "require_two_directions",
     "require_unbroken",
+    "require_within_travel",
 ]
 
 _LEAST_WINDOWS = 10
@@ -166,8 +167,8 @@ def require_two_directions(recording: Recording, window: int) -> None:
         )
 
 
-def require_travel(recording: Recording, valve: Valve) -> None:
-    """Refuse a stem that leaves the travel, or moves over less than 1 % of it."""
+def require_within_travel(recording: Recording, valve: Valve) -> None:
+    """Refuse a stem that leaves the travel."""
     travel = valve.travel
     lowest, highest = float(recording.position.min()), float(recording.position.max())
     if not np.isfinite(travel):
@@ -179,10 +180,16 @@ def require_travel(recording: Recording, valve: Valve) -> None:
             f"{travel:.4g} m: check that the signals are not swapped, and check unit (m), zero "
             f"and travel{question and f': {question}'}"
         )
-    if highest - lowest < _LEAST_TRAVEL * travel:
+
+
+def require_travel(recording: Recording, valve: Valve) -> None:
+    """Refuse a stem that leaves the travel, or moves over less than 1 % of it."""
+    require_within_travel(recording, valve)
+    way = float(np.ptp(recording.position))
+    if np.isfinite(valve.travel) and way < _LEAST_TRAVEL * valve.travel:
         raise RefusalError(
-            f"too little travel: the stem moved {(highest - lowest) * 1e3:.3g} mm, "
-            f"{percentage((highest - lowest) / travel)} of its travel; "
+            f"too little travel: the stem moved {way * 1e3:.3g} mm, "
+            f"{percentage(way / valve.travel)} of its travel; "
             "excite the valve over several percent of it"
         )
 

@@ -42,9 +42,9 @@ class Parameter:
         Whether the value can be used.
     reason : str
         Why the value is weak or not identifiable; else empty.
-    magnitude_bound : float
-        Largest magnitude in the interval of a value that was withheld because the interval is too
-        wide, SI unit; else nan.
+    withheld : tuple of float
+        Value and half width that were withheld because the interval is wider than the value, SI
+        unit; else nan.
     published : float
         Estimate of the published method, SI unit; nan where that method refused the record.
     uncalibrated : Parameter or None
@@ -58,9 +58,15 @@ class Parameter:
     half_width: float
     verdict: Verdict
     reason: str = ""
-    magnitude_bound: float = math.nan
+    withheld: tuple[float, float] = (math.nan, math.nan)
     published: float = math.nan
     uncalibrated: "Parameter | None" = field(default=None, repr=False)
+
+    @property
+    def magnitude_bound(self) -> float:
+        """Largest magnitude in the interval of a withheld value, SI unit; else nan."""
+        value, half_width = self.withheld
+        return abs(value) + half_width
 
     @property
     def without_calibration(self) -> "Parameter":
@@ -106,7 +112,7 @@ def with_verdict(
         reason = doubt or f"its interval is ±{percentage(share)} of its value"
         return Parameter(name, value, standard_error, half_width, Verdict.WEAK, reason)
     reason = doubt or "its interval is wider than its value"
-    return replace(not_identifiable(name, reason), magnitude_bound=abs(value) + half_width)
+    return replace(not_identifiable(name, reason), withheld=(value, half_width))
 
 
 def not_identifiable(name: str, reason: str) -> Parameter:

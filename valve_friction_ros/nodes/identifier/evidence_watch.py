@@ -17,6 +17,7 @@ from valve_friction_ros.health import (
     MonitorSettings,
     baseline_by_evidence,
     diagnosis_by_evidence,
+    qualified,
     why_not_compared,
 )
 from valve_friction_ros.identification import IdentificationSettings
@@ -166,9 +167,11 @@ class EvidenceWatch:
 
     def _diagnosis(self) -> Diagnosis | None:
         settings, reference = self._monitor.settings, self._ledger.reference
-        return diagnosis_by_evidence(
-            self._evidence, settings.valve, self._monitor.baseline, settings.limits, reference
+        valve, factor = settings.valve, self._monitor.common_factor
+        found = diagnosis_by_evidence(
+            self._evidence, valve, self._monitor.baseline, settings.limits, reference
         )
+        return None if found is None else qualified(found, factor, valve)
 
     def _combine_now(self) -> None:
         self._job, self._is_due = None, False  # what is under way may be of other moves

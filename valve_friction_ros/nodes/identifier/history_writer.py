@@ -40,6 +40,7 @@ from valve_friction_ros.history import (
     read_usage,
     valve_histories,
 )
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_guard import HistoryGuard
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
@@ -190,13 +191,15 @@ class HistoryWriter:
                 self._complain(error)
             return None
 
-    async def keep(self, identified: IdentificationInput) -> None:
-        """Keep the identification that the monitor has just accepted or refused."""
+    async def keep(
+        self, identified: IdentificationInput, refusal: RefusalError | None = None
+    ) -> None:
+        """Keep the identification that the monitor has just accepted, or why it was refused."""
         monitor, now = self._monitor, self._node.get_clock().now().nanoseconds
-        found = monitor.stamp if monitor.refusal is None else None
+        found = monitor.stamp if refusal is None else None
         days = self._node.get_parameter(HISTORY_DAYS.name).value
         with self._failures_remembered():
-            entry = entry_of(monitor, self._valve, *identified, time=found or now)
+            entry = entry_of(monitor, self._valve, *identified, found or now, refusal)
             await self._written(lambda file: file.add(entry, days))
 
     def kept_now(self, baseline: Baseline, evidence_since: int | None = None) -> KeptBaseline:

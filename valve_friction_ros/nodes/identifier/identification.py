@@ -2,7 +2,12 @@
 
 from rclpy.node import Node
 
-from valve_friction_ros.health import FrictionMonitor, IdentificationInput, identify_snapshot
+from valve_friction_ros.health import (
+    FrictionMonitor,
+    IdentificationInput,
+    RefusedRecordError,
+    identify_snapshot,
+)
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.results import NumberTopics
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
@@ -44,8 +49,9 @@ class Identification:
     async def run(self, record: IdentificationInput) -> None:
         """Identify a record in the worker; take over and publish the result.
 
-        Raises RefusalError if the record cannot be identified, and InternalError if a bug is met;
-        the monitor shows the bug until an identification succeeds.
+        Raises RefusedRecordError if the record cannot be identified, InternalError if a bug is met;
+        the monitor shows the bug until an identification succeeds. What a refused record shows of
+        the valve is taken over, too.
         """
         self._is_running = True
         try:
@@ -55,6 +61,9 @@ class Identification:
                 self._results.publish(result, self._monitor)
                 message = self._monitor.diagnosis().message
                 self._node.get_logger().info(f"identified: {message}")
+        except RefusedRecordError as refused:
+            self._monitor.learn(refused.numbers, self._node.get_clock().now().nanoseconds)
+            raise
         except InternalError as error:
             self._monitor.fail(str(error))
             raise

@@ -10,7 +10,13 @@ from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import Finding, FrictionMonitor, Level, by_severity
+from valve_friction_ros.health import (
+    Finding,
+    FrictionMonitor,
+    Level,
+    RefusedRecordError,
+    by_severity,
+)
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
@@ -217,29 +223,32 @@ class Identifier(PolledNode):
         try:
             await self._identification.run(record)
         except RefusalError as refusal:
-            # What the inputs lack is the cause where there are no samples.
-            refused = RefusalError("; ".join((*self._input_problems(), str(refusal))))
+            refused = refusal
             self._monitor.refuse(refusal)
-            self.get_logger().warning(f"identification refused: {refused}")
+            self.get_logger().warning(f"identification refused: {refusal}")
         except InternalError:
             self._publish_diagnostics()
             raise
         answer = "; ".join(
             (
-                *self._input_problems(),
-                self._monitor.diagnosis().message,
+                *self._input_problems(),  # the cause where there are no samples
+                str(refused or self._monitor.diagnosis().message),
                 *(one.message for one in by_severity(self._monitor.findings)),
             )
         )
-        await self._history.keep(record)
+        await self._history.keep(record, refused)
         self._publish_diagnostics()
         if refused is not None:
-            raise refused
+            raise RefusalError(answer)
         return answer
 
     async def _identify_as_scheduled(self) -> None:
-        """Identify the buffer; a record that cannot be identified leaves everything as it is."""
+        """Identify the buffer; a record that cannot be identified leaves the estimate as it is.
+
+        A refusal is kept only where its record has changed what is found on the valve.
+        """
         self._inputs.take()
+        before, refused = self._monitor.findings, None
         if self._identification.has_nothing_new:
             self._schedule.stall()
             return
@@ -248,9 +257,12 @@ class Identifier(PolledNode):
             await self._identification.run(record)
         except (RefusalError, InternalError) as error:
             self._schedule.skip(str(error))
-            return
-        self._schedule.succeed()
-        await self._history.keep(record)
+            if not isinstance(error, RefusedRecordError) or self._monitor.findings == before:
+                return
+            refused = error
+        else:
+            self._schedule.succeed()
+        await self._history.keep(record, refused)
         self._publish_diagnostics()
 
     async def _save(self) -> str:

@@ -1,0 +1,59 @@
+"""What a record shows of a valve though its friction cannot be identified."""
+
+import contextlib
+import math
+from collections.abc import Mapping
+
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.sensor_noise import sensor_noises
+from valve_friction_ros.health.stem_reach import stem_reach
+from valve_friction_ros.identification import IdentificationSettings, RefusalError
+from valve_friction_ros.identification.trust.excitation import (
+    require_drive,
+    require_motion,
+    require_related_signals,
+    require_travel,
+    require_two_directions,
+    require_within_travel,
+)
+from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.valve import Valve
+
+__all__ = ["RefusedRecordError", "numbers_of_refused"]
+
+
+class RefusedRecordError(RefusalError):
+    """A refusal, with what its record shows all the same.
+
+    Attributes
+    ----------
+    numbers : mapping of str to Measured
+        Numbers of the valve by name, SI units (`numbers_of_refused`).
+    """
+
+    def __init__(self, message: str, numbers: Mapping[str, Measured]) -> None:
+        super().__init__(message)
+        self.numbers = numbers
+
+
+def numbers_of_refused(
+    recording: Recording, valve: Valve, settings: IdentificationSettings
+) -> dict[str, Measured]:
+    """Return what a refused record shows of its valve: noise of the sensors, ends of the stem.
+
+    Signals of an impossible size say nothing. The ends of the stem's motion are there only where
+    the stem moved both ways and with the drive.
+    """
+    numbers: dict[str, Measured] = {}
+    with contextlib.suppress(RefusalError, ValueError):
+        require_drive(recording, valve)
+        require_plausible_units(recording, valve, settings)
+        require_within_travel(recording, valve)
+        numbers |= sensor_noises(recording)
+        require_motion(recording)
+        require_two_directions(recording, settings.published_window)
+        require_travel(recording, valve)
+        require_related_signals(recording)
+        numbers |= stem_reach(recording, valve, math.nan)
+    return numbers
