@@ -21,6 +21,7 @@ from valve_friction_ros.history import (
     valve_histories,
 )
 from valve_friction_ros.identification import Verdict
+from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
 
 BASELINE = Baseline(141.0, 1.0)
 WEEKS = 20
@@ -57,6 +58,25 @@ def days(line):
     """Days since the start."""
     dates = matplotlib.dates.date2num(line.get_xdata())
     return dates - START / DAY
+
+
+def test_the_usage_of_each_day_is_below(history):
+    """Days outside the time axis are not drawn; two packings of one day are one bar."""
+    first = START // DAY
+    one = Usage(1.5, 10, 4, (1, *[0] * (BINS - 1)))
+    renewal = (first + 2) * DAY
+    days = [UsedDay(first + n, 0, one) for n in (-50, 0, 1, 2)]
+    usage = ValveUsage.of([*days, UsedDay(first + 2, renewal, one)], renewal)
+    figure = trend_figure([dataclasses.replace(history, usage=usage), history])
+    friction, used, _ = figure.axes
+    assert used.get_ylabel() == "travel [m/day]"
+    assert used.get_xlim() == friction.get_xlim()
+    assert [bar.get_height() for bar in used.patches] == [1.5, 1.5, 3.0]
+    begins = [bar.get_x() for bar in used.patches]
+    assert begins == [first, first + 1, first + 2]
+    assert used.lines[0].get_label() == "packing renewed"
+    before = dataclasses.replace(history, usage=ValveUsage.of(days[:1]))
+    assert len(trend_figure([before]).axes) == 1
 
 
 def test_units_and_dates(axes):

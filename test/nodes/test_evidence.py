@@ -1,14 +1,19 @@
 """A valve in service that nobody strokes: its moves add up, and survive a kill."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from histories import VALVE
 from live_nodes import NAMESPACE, values_of
+from records import quick_record
 from service import VALVE as BUILT
 from service import signals
 
 from valve_friction_ros.history import HistoryFile, read_moves
+from valve_friction_ros.model import LOW_FRICTION
 
+NODE = f"{NAMESPACE}/identifier"
 PERIOD = 60.0
 SECURE = {"timing_uncertainty": 0.01}
 CYCLE = np.array([0.42, 0.45, 0.48, 0.51, 0.48, 0.45]) * BUILT.travel
@@ -77,6 +82,37 @@ def test_it_adds_up_and_survives_a_kill(live, tmp_path):
     refused = client.trigger("set_baseline")
     assert not refused.success
     assert "the valve is in WARN" in refused.message
+
+
+def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, tmp_path):
+    """A record of 300 N at 22:13 is followed by moves of 300 N, and then by moves of 450 N."""
+    packing = replace(
+        LOW_FRICTION, coulomb_friction=300.0, static_friction=300.0, viscous_friction=500.0
+    )
+    history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
+    live.start_identifier(SECURE)
+    client = live.client
+    client.identified(quick_record(packing))
+    answer = client.trigger("set_baseline")
+    assert answer.message.endswith("(by the identification of 2023-11-14 22:13 UTC)")
+    serve(client, 1, 300.0)
+    client.status_values(
+        lambda status: number(values_of(status), "reference [N]") > 0, "a reference"
+    )
+    serve(client, 1 + MOVES, 450.0)
+    status = client.next_status(lambda status: "has grown" in status.message, "the growth")
+    assert status.message.startswith("friction has grown: sliding friction")
+    dated = " (identified 2023-11-14 22:13 UTC, before the latest of these moves)"
+    _, _, before = status.message.partition("; friction normal: coulomb friction is 1.00")
+    assert dated in before
+    assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
+    answer = client.trigger("set_baseline")
+    assert answer.success, answer.message
+    assert "newer than the identification of 2023-11-14 22:13 UTC)" in answer.message
+    kept = history.baseline(VALVE.name).baseline
+    assert kept.sliding.value == pytest.approx(450.0, rel=0.05)
+    assert kept.coulomb_friction is None
+    assert kept.numbers["spring_constant"].value == pytest.approx(2.05e5, rel=0.01)
 
 
 def test_another_actuator_makes_other_forces(shared):

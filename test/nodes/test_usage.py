@@ -1,5 +1,7 @@
 """The usage of a valve over DDS: counted, shown, kept through a kill, limited and reset."""
 
+from datetime import date
+
 import numpy as np
 import pytest
 from live_nodes import NAMESPACE, SECOND, START, values_of
@@ -119,6 +121,31 @@ def test_limits_of_a_packing(live):
     status = client.next_status(lambda one: "packing life" not in one.message, "no warning")
     assert status.level == OK
     assert node.is_running()
+
+
+def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
+    """While the valve rests the expected date recedes; only a renewed packing ends the warning."""
+    node = live.start_identifier({"reversal_limit": 5000.0})
+    client = live.client
+    samples = 2 * DAY // PERIOD + 256
+    after = send(client, np.tile(strokes(2, samples=512), -(-samples // 1024))[:samples])
+    status = client.next_status(lambda one: "packing life" in one.message, "a warning")
+    assert status.level == WARN
+    rest = after + 600 * SECOND * np.arange(1, 2100)
+    client.send(position=(rest, np.zeros(rest.size)))
+    client.wait_until(
+        lambda: read_usage(history, NODE).total.time_watched > 12 * DAY, "the rest in the history"
+    )
+    live.kill(node)
+
+    live.start_identifier({"reversal_limit": 5000.0})
+    status = client.next_status(lambda one: "packing life" in one.message, "the same warning")
+    assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
+    expected = values_of(status)["reversal_limit_expected [date]"]
+    assert (date.fromisoformat(expected) - date.today()).days > 31
+    assert client.trigger("reset_usage").success
+    status = client.next_status(lambda one: "packing life" not in one.message, "a new packing")
+    assert status.level == OK
 
 
 def test_a_machine_without_stops(live):

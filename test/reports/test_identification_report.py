@@ -15,7 +15,14 @@ from valve_friction_ros.reports import (
     require_report_file,
     write_report,
 )
-from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
+from valve_friction_ros.usage import (
+    BINS,
+    Usage,
+    UsageLimits,
+    UsedDay,
+    ValveUsage,
+    limit_states,
+)
 
 FRICTION = "Friction against its baseline"
 
@@ -92,6 +99,33 @@ def test_what_the_valve_has_done(identified):
     assert "1.5 m and 12 reversals in a day of watching" in blocks[-1].text
     assert blocks[0].columns[1].title == "since the packing was renewed, 1970-01-03"
     assert "Use" not in [one.title for one in identification_report(identified).sections]
+
+
+def test_the_limits_of_a_packing(identified):
+    """With the date on which each is expected; nothing of them where they are not known."""
+    day = 86_400 * 10**9
+    days = [UsedDay(n, 0, Usage(1.5, 100, 4, (day, *[0] * (BINS - 1)))) for n in range(2)]
+    usage = ValveUsage.of(days)
+
+    def blocks(limits):
+        one = dataclasses.replace(identified, usage=usage, usage_limits=limits)
+        return section(identification_report(one), "Use").blocks
+
+    limits = UsageLimits(travel=60.0, reversals=1200.0)
+    _, table, warning, _, _ = blocks(
+        limit_states(usage.since_renewal, usage.pace(), limits, 2 * day)
+    )
+    assert table.rows == (
+        ("travel_limit [m]", "3", "60", "5 %", "1970-02-10"),
+        ("reversal_limit [reversals]", "200", "1200", "17 %", "1970-01-13"),
+    )
+    assert warning.text.startswith("Packing life: 200 reversals of 1200 (reversal_limit), expected")
+    assert "renew the packing, then call ~/reset_usage" in warning.text
+    reached = limit_states(usage.since_renewal, None, UsageLimits(3.0, 1e6), 2 * day)
+    _, table, *_ = blocks(reached)
+    assert [row[-1] for row in table.rows] == ["reached", "not known before a day of watching"]
+    assert "has no limit: set the parameter travel_limit" in blocks(())[1].text
+    assert [block.kind for block in blocks(None)] == ["table", "picture", "paragraph"]
 
 
 class TestUncertaintyBudget:

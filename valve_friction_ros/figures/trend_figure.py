@@ -11,6 +11,7 @@ from valve_friction_ros.figures.trend_panel import (
     set_dates,
     span_of_time,
 )
+from valve_friction_ros.figures.usage_panel import draw_usage, used_days
 from valve_friction_ros.history import ValveHistory, drift_text
 
 __all__ = ["MOST_PANELS", "drift_text", "report_trend_figure", "trend_figure"]
@@ -19,10 +20,15 @@ MOST_PANELS = 12
 """Most valves on one page. Chosen: still readable."""
 
 
+_USAGE_HEIGHT = 1.5
+"""Height of the panel of the usage, inches."""
+
+
 def trend_figure(histories: Sequence[ValveHistory], now: int | None = None) -> Figure:
     """Draw the friction of valves over time, one panel a valve, over one time axis.
 
     It is the sliding friction at the speed of the last baseline, where that has one, else F_c.
+    Below it is the travelled distance of each day, where any was counted within that time.
 
     Parameters
     ----------
@@ -45,13 +51,22 @@ def trend_figure(histories: Sequence[ValveHistory], now: int | None = None) -> F
         raise ValueError(
             f"one to {MOST_PANELS} valves can be drawn, got {len(histories)}: choose some"
         )
-    height = 1.0 + (4.5 if len(histories) == 1 else 2.8 * len(histories))
-    figure = Figure(figsize=(11, height), layout="constrained", dpi=110)
-    panels = figure.subplots(len(histories), sharex=True, squeeze=False)[:, 0]
     span = span_of_time(histories, now)
-    for axes, history in zip(panels, histories, strict=True):
+    heights = []
+    for history in histories:
+        heights.append(4.5 if len(histories) == 1 else 2.8)
+        if used_days(history.usage, span):
+            heights.append(_USAGE_HEIGHT)
+    figure = Figure(figsize=(11, 1.0 + sum(heights)), layout="constrained", dpi=110)
+    ratios = {"height_ratios": heights}
+    panels = figure.subplots(len(heights), sharex=True, squeeze=False, gridspec_kw=ratios)[:, 0]
+    remaining = iter(panels)
+    for history in histories:
+        axes = next(remaining)
         draw_history(axes, history, span, now)
         entitle(axes, history)
+        if used_days(history.usage, span):
+            draw_usage(next(remaining), history.usage, span)
     set_dates(panels[-1], span, histories)
     legend_above(figure, labelled_in(panels), columns=4)
     return figure

@@ -162,6 +162,17 @@ class FrictionMonitor:
         return self._stamp
 
     @property
+    def seen_until(self) -> int | None:
+        """End of the record of the latest result by its stamps, or time of the earlier estimate.
+
+        Both are ns since 1970 (UTC), as the moves in service have them.
+        """
+        if self._result is None:
+            return self._stamp
+        recording = self._result.recording
+        return round((recording.start_time + recording.duration) * 1e9)
+
+    @property
     def earlier(self) -> EarlierEstimate | None:
         """The estimate from before the monitor began; None once there is a result."""
         return self._earlier

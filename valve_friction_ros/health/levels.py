@@ -40,12 +40,15 @@ class Finding:
         One sentence that says what to check.
     numbers : tuple of str
         Names of the numbers that it rests on, if any.
+    leads : bool
+        Whether it is about the friction, and newer or surer than the latest identification.
     """
 
     level: Level
     status_signal: StatusSignal
     message: str
     numbers: tuple[str, ...] = field(default=(), compare=False)
+    leads: bool = field(default=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a mapping of plain values: ``level``, ``ne_107`` and ``message``."""

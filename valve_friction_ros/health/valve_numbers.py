@@ -103,9 +103,10 @@ def _imperfections(
 ) -> dict[str, Measured]:
     """Return slip force, asymmetry and lag, as the method found them.
 
-    A slip force is known no better than F_c, from which it is counted, or `_SLIP_SHARE`. Sliding, the stem stands
-    (F_v/k)·ẋ behind where it would be without viscous friction, and a lag τ shows it τ·ẋ behind: so
-    the lag is known no better than F_v/k, and not at all without F_v.
+    A slip force is known no better than F_c, from which it is counted, or to `_SLIP_SHARE` of
+    itself. Sliding, the stem stands (F_v/k)·ẋ behind where it would be without viscous friction,
+    and a lag τ shows it τ·ẋ behind: so the lag is known no better than F_v/k, and not at all
+    without F_v.
     """
     found = {
         name: Measured(one["value"], one["half_width"])

@@ -91,7 +91,7 @@ def _sections(record: IdentifiedRecord) -> Iterator[Section]:
         yield Section(_WHOLE_VALVE, (*told, table))
     if record.history is not None:
         yield _trend(record.history)
-    if (use := usage_section(record.usage, record.valve)) is not None:
+    if (use := usage_section(record.usage, record.valve, record.usage_limits)) is not None:
         yield use
     if record.response is not None and (answers := response_section(record.response)) is not None:
         yield answers

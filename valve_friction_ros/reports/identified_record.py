@@ -22,7 +22,7 @@ from valve_friction_ros.history import ValveHistory
 from valve_friction_ros.identification import Result
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.response import ResponseSummary
-from valve_friction_ros.usage import ValveUsage
+from valve_friction_ros.usage import LimitState, ValveUsage
 
 __all__ = ["IdentifiedRecord"]
 
@@ -55,6 +55,8 @@ class IdentifiedRecord:
         What the valve has done.
     response : ResponseSummary or None
         Its answers to steps of its command.
+    usage_limits : tuple of LimitState or None
+        How far the packing is from its limits; None where they are not known.
     valve_limits : ValveLimits
         Bounds of what else may change on the valve.
     known : KnownNumbers or None
@@ -72,6 +74,7 @@ class IdentifiedRecord:
     history: ValveHistory | None = field(default=None, repr=False)
     usage: ValveUsage = field(default_factory=ValveUsage, repr=False)
     response: ResponseSummary | None = field(default=None, repr=False)
+    usage_limits: tuple[LimitState, ...] | None = None
     valve_limits: ValveLimits = field(default_factory=ValveLimits)
     known: KnownNumbers | None = field(default=None, repr=False)
 

@@ -29,9 +29,12 @@ def _value(baseline: Baseline | None) -> float | None:
     return None if baseline is None else baseline.coulomb_friction
 
 
+def _minute(time: int) -> str:
+    return f"{utc(time):%Y-%m-%d %H:%M} UTC"
+
+
 def _described_with_date(kept: KeptBaseline) -> str:
-    date = utc(kept.time)
-    return f"baseline {kept.baseline}, set {date:%Y-%m-%d %H:%M} UTC"
+    return f"baseline {kept.baseline}, set {_minute(kept.time)}"
 
 
 class BaselineInForce:
@@ -69,21 +72,28 @@ class BaselineInForce:
             log.info(f"{_described_with_date(kept)}, from the history {self._history.path}")
 
     async def set(self) -> str:
-        """Take the latest result as the baseline, and keep it; return the old and the new one.
+        """Take the newest sure friction as the baseline, and keep it; return the old and the new.
 
-        Where there is no result, where the latest identification was refused, or where the result
-        cannot be a baseline, the sliding friction of the moves in service is taken. Raises
+        It is that of the latest result, or the sliding friction of the moves in service: where
+        those since the result could be a baseline by themselves, where there is no result, where
+        the latest identification was refused, or where the result cannot be a baseline. Raises
         RefusalError in an alarm, or if neither can be a baseline.
         """
         baseline, by_evidence = self._newest()
         self._require_no_alarm()
         since = self._evidence.evidence.since if by_evidence else None
+        seen = self._monitor.seen_until
+        source = self._evidence.source
+        if seen is not None:
+            identified = f"the identification of {_minute(seen)}"
+            source = f"{source}, newer than {identified}" if by_evidence else f"by {identified}"
         answer = await self._change(self._history.kept_now(baseline, since))
-        return f"{answer} ({self._evidence.source})" if by_evidence else answer
+        return f"{answer} ({source})"
 
     def _newest(self) -> tuple[Baseline, bool]:
         """Return what is healthy now, and whether it is of the moves in service."""
-        if self._monitor.refusal is not None:
+        seen, is_refused = self._monitor.seen_until, self._monitor.refusal is not None
+        if is_refused or (seen is not None and self._evidence.outdates(seen)):
             with contextlib.suppress(RefusalError):
                 return self._evidence.as_baseline(), True
         try:

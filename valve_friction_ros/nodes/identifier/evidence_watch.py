@@ -4,6 +4,7 @@ import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 
 from rclpy.node import Node
 
@@ -18,6 +19,7 @@ from valve_friction_ros.health import (
     baseline_by_evidence,
     diagnosis_by_evidence,
     qualified,
+    reference_by_evidence,
     why_not_compared,
 )
 from valve_friction_ros.identification import IdentificationSettings
@@ -70,9 +72,17 @@ class EvidenceWatch:
         return f"by {self._evidence.moves} moves in service since {_date(self._evidence.since)}"
 
     def as_baseline(self) -> Baseline:
-        """Return the sliding friction of the moves as baseline; raises RefusalError."""
+        """Return the sliding friction of the moves as baseline; raises RefusalError.
+
+        The newest number of everything else that is known of the valve goes with it.
+        """
         self._combine_now()
-        return baseline_by_evidence(self._evidence)
+        return replace(baseline_by_evidence(self._evidence), numbers=self._monitor.known.numbers)
+
+    def outdates(self, time: int) -> bool:
+        """Return whether the moves since a time, ns, alone could be a baseline."""
+        newer = [one for one in self._ledger.moves if one.begin > time]
+        return reference_by_evidence(evidence_of(newer, *_combined_by(self._settings))) is not None
 
     def follow_parameters(self) -> None:
         """Use the valve and the settings in force; other forces need other moves."""
@@ -109,7 +119,18 @@ class EvidenceWatch:
         diagnosis = self._diagnosis()
         if diagnosis is None or diagnosis.level < Level.WARN:
             return ()
-        return (Finding(diagnosis.level, diagnosis.status_signal, diagnosis.message),)
+        message, leads = diagnosis.message, self._leads(diagnosis)
+        if not leads:
+            message += f" (until {_date(self._evidence.until)}, before that identification)"
+        return (Finding(diagnosis.level, diagnosis.status_signal, message, leads=leads),)
+
+    def _leads(self, diagnosis: Diagnosis) -> bool:
+        """Return whether the moves are newer than the latest identification, or not against it."""
+        identified, now = self._monitor.seen_until, self._monitor.diagnosis().ratio
+        if identified is None or now is None or self._evidence.until > identified:
+            return True
+        ratio = diagnosis.ratio
+        return ratio is None or (ratio.low <= now.high and now.low <= ratio.high)
 
     def values(self) -> Mapping[str, str]:
         """Return what the moves say, with intervals, or why they do not."""

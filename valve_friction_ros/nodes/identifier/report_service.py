@@ -70,6 +70,7 @@ class ReportWriter:
         healthy = None if kept is None or kept.baseline != baseline else kept.record
         notes = () if refusal is None else (f"a later record was refused: {refusal}",)
         usage, response = self._usage.usage(), self._response.summary
+        usage_limits = self._usage.limits()
 
         def write(path: Path) -> None:
             # Costs memory and time at the start, and most nodes never report.
@@ -89,6 +90,7 @@ class ReportWriter:
                 healthy=healthy,
                 history=before,
                 usage=usage,
+                usage_limits=usage_limits,
                 response=response,
             )
             reports.write_report(reports.identification_report(record), path)

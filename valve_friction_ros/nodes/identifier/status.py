@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from valve_friction_ros.health import (
     Baseline,
+    Diagnosis,
     Finding,
     FrictionMonitor,
     Level,
@@ -76,6 +77,10 @@ def _date(time: int) -> str:
     return f"{utc(time):%Y-%m-%d}"
 
 
+def _minute(time: int) -> str:
+    return f"{utc(time):%Y-%m-%d %H:%M} UTC"
+
+
 def _time(time: int) -> str:
     """Write a time, ns since 1970, by ISO 8601, as UTC."""
     return f"{utc(time):%Y-%m-%dT%H:%M:%S.%fZ}"
@@ -134,8 +139,22 @@ def estimate_status(
     values |= _baseline_values(monitor.baseline)
     values |= ratio_values(diagnosis.ratio)
     values |= trend_values(trend)
-    message = "; ".join([diagnosis.message, *(one.message for one in findings)])
+    message = "; ".join(_sentences(monitor, diagnosis, findings))
     return _status(level, name, hardware_id, message, values)
+
+
+def _sentences(
+    monitor: FrictionMonitor, diagnosis: Diagnosis, findings: Sequence[Finding]
+) -> list[str]:
+    """Return what is said of a valve, one sentence each.
+
+    The latest identification comes first, unless a finding on the friction leads: then it is dated.
+    """
+    leading = [one.message for one in findings if one.leads]
+    told = diagnosis.message
+    if leading and monitor.seen_until is not None:
+        told += f" (identified {_minute(monitor.seen_until)}, before the latest of these moves)"
+    return [*leading, told, *(one.message for one in findings if not one.leads)]
 
 
 def friction_status(
@@ -168,7 +187,7 @@ def friction_status(
     message = estimate.message
     if monitor.earlier is not None:
         known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message
-        message = aged + message.removeprefix(known)
+        message = message.replace(known, aged, 1)
     message = "; ".join([*input_problems, *upkeep_problems, message])
     return _status(level, estimate.name, estimate.hardware_id, message, values)
 

@@ -102,7 +102,7 @@ class UsageWatch:
         self._gather()
         return [
             Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, state.message)
-            for state in self._states()
+            for state in self.limits()
             if state.warns
         ]
 
@@ -138,7 +138,7 @@ class UsageWatch:
         if self._pace is not None:
             values["travelled_distance pace [m/day]"] = number_text(self._pace.distance)
             values["reversals pace [1/day]"] = number_text(self._pace.reversals)
-        for state in self._states():
+        for state in self.limits():
             if state.expected is not None:
                 values[f"{state.name}_expected [date]"] = _date(state.expected)
         return values
@@ -181,7 +181,7 @@ class UsageWatch:
     def _travel(self) -> float:
         return self._monitor.settings.valve.travel
 
-    def _states(self) -> tuple[LimitState, ...]:
+    def limits(self) -> tuple[LimitState, ...]:
         """Return how far the packing is from its limits; what has warned goes on warning."""
         now = self._node.get_clock().now().nanoseconds
         states = [
