@@ -18,6 +18,9 @@ def test_histogram_and_days():
     assert [bar.get_height() for bar in places.patches] == [12.5, 37.5, *[0] * (BINS - 3), 50]
     assert [bar.get_x() for bar in places.patches] == [5 * n for n in range(BINS)]
     assert [bar.get_height() for bar in distances.patches] == [1, 2, 3]
+    narrow = usage_figure(ValveUsage.of(days, renewal=7), is_narrow=True)
+    above, below = (axes.get_subplotspec() for axes in narrow.axes)
+    assert (above.rowspan.start, below.rowspan.start) == (0, 1)
     for axes in figure.axes:
         assert "[" in axes.get_xlabel()
         assert "[" in axes.get_ylabel()

@@ -125,20 +125,20 @@ def test_limits_of_a_packing(live):
 
 def test_a_warning_of_a_packing_outlives_a_rest_and_a_restart(live, history):
     """While the valve rests the expected date recedes; only a renewed packing ends the warning."""
-    node = live.start_identifier({"reversal_limit": 5000.0})
+    node = live.start_identifier({"reversal_limit": 500.0})
     client = live.client
     samples = 2 * DAY // PERIOD + 256
     after = send(client, np.tile(strokes(2, samples=512), -(-samples // 1024))[:samples])
     status = client.next_status(lambda one: "packing life" in one.message, "a warning")
     assert status.level == WARN
-    rest = after + 600 * SECOND * np.arange(1, 2100)
+    rest = after + 600 * SECOND * np.arange(1, 1500)
     client.send(position=(rest, np.zeros(rest.size)))
     client.wait_until(
-        lambda: read_usage(history, NODE).total.time_watched > 12 * DAY, "the rest in the history"
+        lambda: read_usage(history, NODE).total.time_watched > 9 * DAY, "the rest in the history"
     )
     live.kill(node)
 
-    live.start_identifier({"reversal_limit": 5000.0})
+    live.start_identifier({"reversal_limit": 500.0})
     status = client.next_status(lambda one: "packing life" in one.message, "the same warning")
     assert (status.level, values_of(status)["NE 107"]) == (WARN, "M")
     expected = values_of(status)["reversal_limit_expected [date]"]

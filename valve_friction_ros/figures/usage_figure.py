@@ -16,16 +16,17 @@ _FEWEST_DAYS = 7
 _COLOUR = "#0072B2"
 
 
-def usage_figure(usage: ValveUsage) -> Figure:
+def usage_figure(usage: ValveUsage, is_narrow: bool = False) -> Figure:
     """Draw the time at each 5 % of the travel, and the distance of each of the last 31 days.
 
-    Both are those of the packing in use. Raises ValueError if the valve was not watched.
+    Both are those of the packing in use; on a narrow page one is below the other. Raises
+    ValueError if the valve was not watched.
     """
     used = usage.since_renewal
     if not used.time_watched:
         raise ValueError("the valve was not watched: there is nothing to draw")
-    figure = Figure(figsize=(7.1, 2.6), layout="constrained")
-    places, days = figure.subplots(1, 2)
+    figure = Figure(figsize=(3.7, 4.8) if is_narrow else (7.1, 2.6), layout="constrained")
+    places, days = figure.subplots(2, 1) if is_narrow else figure.subplots(1, 2)
     width = 100 / BINS
     shares = 100 * np.array(used.histogram) / used.time_watched
     places.bar(width * np.arange(BINS), shares, width, align="edge", color=_COLOUR)

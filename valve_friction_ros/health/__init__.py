@@ -8,7 +8,7 @@ from valve_friction_ros.health.by_evidence import (
     reference_by_evidence,
     why_not_compared,
 )
-from valve_friction_ros.health.common_factor import explains, qualified
+from valve_friction_ros.health.common_factor import drive_scale, explains, qualified
 from valve_friction_ros.health.comparison import (
     Comparison,
     Ratio,
@@ -78,6 +78,7 @@ __all__ = [
     "diagnose_parameters",
     "diagnose_valve",
     "diagnosis_by_evidence",
+    "drive_scale",
     "explains",
     "friction_words",
     "identify_snapshot",

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from valve_friction_ros.health import StatusSignal, dead_band, percentage
+from valve_friction_ros.health import StatusSignal, dead_band, drive_scale, percentage
 from valve_friction_ros.identification import SLIDING, Parameter, Verdict, two_digits
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
@@ -80,12 +80,6 @@ def _friction(record: IdentifiedRecord) -> Parameter:
     return [*below, *known, *frictions][0]
 
 
-_SCALED = (
-    "before any work on the packing, check the scale of the {drive} sensor, which would change the "
-    "spring constant by the same factor, as it has changed"
-)
-
-
 def _found(record: IdentifiedRecord) -> _Finding:
     friction, diagnosis = _friction(record), record.diagnosis
     if diagnosis.ratio is None:
@@ -104,7 +98,10 @@ def _found(record: IdentifiedRecord) -> _Finding:
         f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
     )
     if record.is_scaled:
-        advice = _SCALED.format(drive=record.recording.driven_by.words)
+        advice = (
+            f"before any work on the packing, check {drive_scale(record.valve)}, as the spring "
+            "constant has changed by the same factor"
+        )
         return _Finding(f"the friction seems to have changed, {ratio}", advice)
     if diagnosis.status_signal in _ALARMS:
         alarm = _ALARMS[diagnosis.status_signal]

@@ -56,6 +56,7 @@ def usage_section(
         usage_figure(usage),
         "Time at each 5 % of the travel, and the travelled distance of each day.",
         "A histogram of the stem position, and the distance of each day.",
+        usage_figure(usage, is_narrow=True),
     )
     return Section("Use", (table, *life, picture, Paragraph(words)))
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -42,7 +42,7 @@ class BaselineInForce:
 
     The parameter shows F_c of the baseline in force, nan where that has only a sliding friction. A
     parameter that is set to another value stands for an exact F_c, and no sliding friction; nan
-    leaves no baseline.
+    leaves no baseline. `level` tells that of all that is found on the valve.
     """
 
     def __init__(
@@ -51,11 +51,13 @@ class BaselineInForce:
         monitor: FrictionMonitor,
         history: HistoryWriter,
         evidence: EvidenceWatch,
+        level: Callable[[], Level],
     ) -> None:
         self._node = node
         self._monitor = monitor
         self._history = history
         self._evidence = evidence
+        self._level = level
 
     def begin(self) -> None:
         """Take the baseline of the parameter, or else of the history, and log which."""
@@ -87,7 +89,7 @@ class BaselineInForce:
         if seen is not None:
             identified = f"the identification of {_minute(seen)}"
             source = f"{source}, newer than {identified}" if by_evidence else f"by {identified}"
-        answer = await self._change(self._history.kept_now(baseline, since))
+        answer = await self._change(self._history.kept_now(baseline, self._level(), since))
         return f"{answer} ({source})"
 
     def _newest(self) -> tuple[Baseline, bool]:
@@ -118,7 +120,7 @@ class BaselineInForce:
                 f"more: set {BASELINE.name}, or call ~/set_baseline"
             )
         self._require_no_alarm()
-        return await self._change(self._history.replaced_now(last, _RESTORE))
+        return await self._change(self._history.replaced_now(last, _RESTORE, self._level()))
 
     def _require_no_alarm(self) -> None:
         found: list[Diagnosis | Finding] = [

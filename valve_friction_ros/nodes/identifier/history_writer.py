@@ -63,11 +63,6 @@ class HistoryWriter:
     """Writes to the history in a thread of its own, so that no slow disk holds up the node.
 
     What could not be written waits, and is tried again with what comes next.
-
-    Attributes
-    ----------
-    found_level : Level
-        The most severe level of what the watches find on the valve; the node sets it.
     """
 
     def __init__(self, node: Node, monitor: FrictionMonitor, tag: str) -> None:
@@ -91,7 +86,6 @@ class HistoryWriter:
         self._baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
         self._under_way: list[Future[None]] = []
-        self.found_level = Level.OK
 
     @property
     def valve(self) -> KeptValve:
@@ -202,19 +196,24 @@ class HistoryWriter:
             entry = entry_of(monitor, self._valve, *identified, found or now, refusal)
             await self._written(lambda file: file.add(entry, days))
 
-    def kept_now(self, baseline: Baseline, evidence_since: int | None = None) -> KeptBaseline:
-        """Describe a baseline that is taken now: of the latest result, or of moves since a time."""
+    def kept_now(
+        self, baseline: Baseline, level: Level, evidence_since: int | None = None
+    ) -> KeptBaseline:
+        """Describe a baseline that is taken now, at a level of the valve.
+
+        It is of the latest result, or of moves since a time.
+        """
         now, monitor = self._node.get_clock().now().nanoseconds, self._monitor
         since, record = now if monitor.stamp is None else monitor.stamp, None
         if evidence_since is not None:
             since = evidence_since
         elif monitor.result is not None:
             record = KeptBaseline.thin(monitor.result.recording)
-        replaced, level = monitor.baseline, self._level()
+        replaced = monitor.baseline
         return KeptBaseline(baseline, now, since, record, replaced, level=level)
 
-    def replaced_now(self, last: KeptBaseline, by: str) -> KeptBaseline:
-        """Describe that what the last baseline has replaced comes back now, for `by`.
+    def replaced_now(self, last: KeptBaseline, by: str, level: Level) -> KeptBaseline:
+        """Describe that what the last baseline has replaced comes back now, for `by`, at a level.
 
         Where it was kept, it comes back with its record and the beginning of its trend.
         """
@@ -226,13 +225,9 @@ class HistoryWriter:
             time=self._node.get_clock().now().nanoseconds,
             replaced=last.baseline,
             by=by,
-            level=self._level(),
+            level=level,
             withdrawn=last.replaced is None,
         )
-
-    def _level(self) -> Level:
-        """Return the level of the valve, with what is found on it."""
-        return max(self._monitor.diagnosis().level, self.found_level)
 
     async def keep_baseline(self, kept: KeptBaseline) -> None:
         """Keep a baseline that is in force from now on, or none."""

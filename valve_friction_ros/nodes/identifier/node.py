@@ -114,7 +114,9 @@ class Identifier(PolledNode):
         self._history = HistoryWriter(self, self._monitor, tag)
         earlier = self._history.prepare()
         self._evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
-        self._baseline = BaselineInForce(self, self._monitor, self._history, self._evidence)
+        self._baseline = BaselineInForce(
+            self, self._monitor, self._history, self._evidence, self._level
+        )
         self._baseline.begin()
         if earlier is not None:
             self._monitor.remember(earlier, self._history.known_numbers(earlier))
@@ -134,8 +136,7 @@ class Identifier(PolledNode):
             self._usage,
             self._response,
         )
-        level = self._worst(one for watch in self._watches for one in watch.findings())
-        self._alerts = Alerts(self, workers.alerts, self._history, level)
+        self._alerts = Alerts(self, workers.alerts, self._history, self._level())
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
@@ -302,6 +303,10 @@ class Identifier(PolledNode):
             return ["no time on /clock, though use_sim_time is set: play a clock, or unset it"]
         return self._inputs.problems(self.get_parameter(INPUT_TIMEOUT.name).value)
 
+    def _level(self) -> Level:
+        """Return the level of the valve, with all that is found on it."""
+        return self._worst(one for watch in self._watches for one in watch.findings())
+
     def _worst(self, findings: Iterable[Finding]) -> Level:
         """Return the most severe level of the diagnosis of friction and of what else is found."""
         return max([self._monitor.diagnosis().level, *(one.level for one in findings)])
@@ -313,7 +318,6 @@ class Identifier(PolledNode):
         self._history.settle()
         found = {watch: watch.findings() for watch in self._watches}
         findings = [finding for some in found.values() for finding in some]
-        self._history.found_level = max((one.level for one in findings), default=Level.OK)
         estimate = estimate_status(
             self._monitor,
             self._status_name,
