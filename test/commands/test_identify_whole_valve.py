@@ -42,6 +42,32 @@ def test_json_and_exit_code(compared):
     assert first["message"].startswith("the spring constant has changed: 0.667 times")
 
 
+def test_a_scale_of_the_sensor_qualifies_the_friction(
+    call, write_csv, columns_of, benches, quick_csv, bench_yaml, tmp_path
+):
+    """In the text, in JSON and on the page, which plans no work on the packing."""
+    valve, packing = benches["low"]
+    pressure = SineWave(period=10.0).sample(np.arange(1000) / 100)
+    position = simulate(valve, packing, pressure, 0.01).position
+    reference = valve.pressure_reference
+    read = Recording(0.01, reference + 1.5 * (pressure - reference), position)
+    path = write_csv(columns_of(read), "scaled.csv")
+    page = tmp_path / "page.html"
+    options = ("--valve", bench_yaml, "--baseline-recording", quick_csv, "--method", "refined")
+    code, out, _ = call(path, *options, "--json", "--report", page)
+    assert code == 0
+    answer = json.loads(out)
+    assert (answer["diagnosis"]["level"], answer["diagnosis"]["ne_107"]) == ("WARN", "C")
+    assert answer["diagnosis"]["message"].startswith(
+        "friction and spring constant have changed by one factor, which points to the scale of "
+        "the pressure sensor and the diaphragm area: check them before any work on the packing"
+    )
+    report = PageReader(page.read_text())
+    assert (report.status[0], report.status[2]) == ("amber", "Check the sensors' scales")
+    assert "before any work on the packing, check the scale of the pressure sensor" in report.text
+    assert "plan work on the packing" not in report.text
+
+
 def test_text_and_report(compared, tmp_path):
     report = tmp_path / "report.html"
     code, out = compared("--report", report)

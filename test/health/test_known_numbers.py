@@ -61,6 +61,19 @@ def test_a_stem_that_goes_beyond_the_stop_ends_it():
     assert known.findings(HEALTHY, VALVE) == ()
 
 
+def test_a_record_that_is_older_than_others_replaces_none_of_theirs():
+    known = after(WHOLE, LOST).with_record(WEAK, 0)
+    assert known.dated == after(WEAK, LOST).dated
+    assert known.latest == DAY
+
+
+def test_what_was_measured_since_a_time():
+    known = after(WHOLE, WITHIN)
+    assert known.since(None) == known
+    assert known.since(DAY).dated.keys() == set()
+    assert known.since(0).dated == known.dated
+
+
 def test_the_reach_is_that_of_the_farthest_record_until_a_stop_is_met():
     known = after(WHOLE, WITHIN)
     assert known.numbers["highest_position"] == WHOLE["highest_position"]

@@ -1,5 +1,7 @@
 """The panel of a valve's usage: the distance of each day, and renewals of the packing."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -24,16 +26,22 @@ def draw_usage(axes: Axes, usage: ValveUsage, span: tuple[int, int]) -> None:
     numbers = sorted({one.day for one in days})
     sums = [sum(one.usage.distance for one in days if one.day == day) for day in numbers]
     width = np.timedelta64(DAY, "ns")
-    axes.bar(_dates(numbers), sums, width, align="edge", color=_COLOUR, label="travel of a day")
+    axes.bar(
+        _dates([DAY * day for day in numbers]),
+        sums,
+        width,
+        align="edge",
+        color=_COLOUR,
+        label="travel of a day",
+    )
     for renewal in sorted({one.renewal for one in days if span[0] <= one.renewal <= span[1]}):
-        axes.axvline(
-            np.datetime64(renewal, "ns"), color=_RENEWED, ls="-.", lw=1.5, label="packing renewed"
-        )
+        begin = _dates([renewal])[0]
+        axes.axvline(begin, color=_RENEWED, ls="-.", lw=1.5, label="packing renewed")
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel("travel [m/day]")
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _dates(days: list[int]) -> NDArray[np.datetime64]:
-    return (np.array(days, dtype=np.int64) * DAY).astype("datetime64[ns]")
+def _dates(times: Sequence[int]) -> NDArray[np.datetime64]:
+    return np.asarray(times, dtype=np.int64).astype("datetime64[ns]")

@@ -63,7 +63,7 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
     force = valve.actuator_force(uniform_filter1d(recording.drive, mean, mode="nearest"))
     noise = float(np.std(recording.position - position)) / math.sqrt(mean)
     near = max(_NEAR * float(np.ptp(position)), _NOISE * noise)
-    least = np.full(position.size, _SURELY * slip_force)
+    least: NDArray[np.float64] = np.full(position.size, _SURELY * slip_force)
     if math.isnan(slip_force):
         least = _unknown_growth(position, force, recording.sample_period, near)
     least = np.maximum(least, _SMALLEST * float(np.ptp(force)))
