@@ -19,7 +19,13 @@ from valve_friction_ros.health import (
     valve_changes,
     valve_numbers,
 )
-from valve_friction_ros.identification import RefusalError, Verdict, identify
+from valve_friction_ros.identification import (
+    IMPERFECTIONS_FOUND,
+    RefusalError,
+    Verdict,
+    identify,
+)
+from valve_friction_ros.identification.trust.verdict import not_identifiable
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, SensorNoise, Valve
 
 TRAVEL, SPRING = 0.03, 2e5
@@ -348,6 +354,21 @@ def test_a_doubted_model_leaves_only_what_the_signals_say_and_the_slip_jump(heal
     numbers = valve_numbers(replace(healthy_result, misfit=doubted))
     signals = {"drive_noise", "stem_noise", "lowest_position", "highest_position"}
     assert numbers.keys() == signals | {"slip_force"}
+
+
+@pytest.mark.parametrize(("coulomb", "width"), [(300.0, 80.0), (50.0, 50.0), (None, 80.0)])
+def test_a_slip_jump_is_known_to_half_of_itself_where_friction_is_not(
+    healthy_result, coulomb, width
+):
+    """160 N of a slip jump, each with 30 N of its own: it has grown, whatever F_c is."""
+    found = {"slip_force": {"value": 160.0, "half_width": 30.0}}
+    friction = replace(healthy_result.parameters["coulomb_friction"], half_width=coulomb or 0.0)
+    if coulomb is None:
+        friction = not_identifiable("coulomb_friction", "why")
+    parameters = {**healthy_result.parameters, "coulomb_friction": friction}
+    evidence = {**healthy_result.evidence, IMPERFECTIONS_FOUND: found}
+    numbers = valve_numbers(replace(healthy_result, parameters=parameters, evidence=evidence))
+    assert numbers["slip_force"] == (160.0, math.hypot(30.0, width))
 
 
 def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):

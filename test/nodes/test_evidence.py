@@ -95,6 +95,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, t
     client.identified(quick_record(packing))
     answer = client.trigger("set_baseline")
     assert answer.message.endswith("(by the identification of 2023-11-14 22:13 UTC)")
+    assert client.trigger("reset_usage").success  # the strokes of the record are no evidence
     serve(client, 1, 300.0)
     client.status_values(
         lambda status: number(values_of(status), "reference [N]") > 0, "a reference"
