@@ -7,6 +7,8 @@ In place of the list, ``valves:=plant.yaml`` names a file: a list of valves, or 
 
     fv_101: {pressure_topic: /plant/p101, stem_topic: /plant/x101}
     fv_102:
+
+``dashboard:=true`` starts the dashboard beside them.
 """
 
 import re
@@ -125,6 +127,23 @@ def identifiers(context: LaunchContext) -> list[Node]:
     ]
 
 
+def dashboard(context: LaunchContext) -> list[Node]:
+    """Make the dashboard, if it is asked for."""
+    if str(LaunchConfiguration("dashboard").perform(context)).lower() not in {"true", "1"}:
+        return []
+    return [
+        Node(
+            package=PACKAGE,
+            executable="dashboard",
+            name="dashboard",
+            output="screen",
+            parameters=[LaunchConfiguration("config")],
+            respawn=LaunchConfiguration("respawn"),
+            respawn_delay=2.0,
+        )
+    ]
+
+
 ARGUMENTS = {
     "valves": (
         "fv_101",
@@ -136,6 +155,7 @@ ARGUMENTS = {
     ),
     "stem_topic": ("stem_state", "Stem position, sensor_msgs/JointState; may contain {valve}."),
     "one_process": ("true", "false to start a process for each valve."),
+    "dashboard": ("false", "true to start the dashboard too, on http://127.0.0.1:8080/."),
     "respawn": ("true", "false to leave a process ended that has ended by itself."),
     "log_level": ("info", "debug, info, warn, error or fatal."),
     "use_sim_time": ("false", "true to take time from /clock, as when a bag is played."),
@@ -161,5 +181,6 @@ def generate_launch_description() -> LaunchDescription:
                 description="Parameter file for the identifiers.",
             ),
             OpaqueFunction(function=identifiers),
+            OpaqueFunction(function=dashboard),
         ]
     )

@@ -249,6 +249,14 @@ def test_a_file_of_valves(monitor, tmp_path):
     ]
 
 
+@pytest.mark.parametrize(("asked", "started"), [("true", ["dashboard"]), ("false", [])])
+def test_the_dashboard_is_started_on_request(monitor, asked, started):
+    names = monitor.dashboard.__globals__
+    names["LaunchConfiguration"].return_value.perform.return_value = asked
+    names["Node"].side_effect = lambda **settings: settings
+    assert [node["executable"] for node in monitor.dashboard(None)] == started
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

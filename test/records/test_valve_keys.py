@@ -12,8 +12,9 @@ parameters = pytest.importorskip("valve_friction_ros.nodes.identifier.parameters
 
 def test_every_parameter_of_a_node_is_known():
     from valve_friction_ros.nodes import identifiers, pressure_source, simulator
+    from valve_friction_ros.nodes.dashboard import parameters as dashboard
 
-    modules = (parameters, identifiers, pressure_source, simulator)
+    modules = (parameters, identifiers, pressure_source, simulator, dashboard)
     names = {spec.name for module in modules for spec in module.PARAMETERS}
     assert names <= NODE_NAMES
     assert names | {"limit_velocity"} >= NODE_NAMES

@@ -82,6 +82,16 @@ _OTHER_NODES = (
     "speed",
     "converter_lag",
     "pressure_noise",
+    "host",
+    "host_names",
+    "accounts_file",
+    "certificate_file",
+    "key_file",
+    "session_hours",
+    "session_file",
+    "port",
+    "time_zone",
+    "silence",
 )
 
 VALVE_KEYS = (*GEOMETRY, *FIXABLE, *SETTINGS, *_IDENTIFIER_ONLY)

@@ -1,5 +1,6 @@
 """The server of the pages."""
 
+import logging
 import socket
 from collections.abc import Awaitable, Callable
 
@@ -39,6 +40,14 @@ def require_free(host: str, port: int) -> None:
             ) from None
 
 
+class _Gone(logging.Filter):
+    """Leaves out that a browser went while its page was made: Starlette takes it for a failure."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        error = record.exc_info[1] if record.exc_info else None
+        return str(error) != "No response returned."
+
+
 def guarded(access: Access, log: Callable[[str], None]) -> Guard:
     """Put the gate before the pages; `log` takes a line for each log-in."""
     return guard(app, access, log)
@@ -47,6 +56,7 @@ def guarded(access: Access, log: Callable[[str], None]) -> Guard:
 def serve(board: Board, started: Callable[[], None]) -> None:
     """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened."""
     load_style()
+    logging.getLogger("uvicorn.error").addFilter(_Gone())
     pages: dict[str, _Draw] = {"/": plant_page, "/valve": valve_page, "/compare": compare_page}
     for path, draw in pages.items():
         _add_page(board, path, draw)
