@@ -22,8 +22,8 @@ BEFORE = 3
 """Hours before friction may change."""
 
 _DAY = 24.0
-_QUIET = 300.0
-"""Time between the set points of a quiet valve, s."""
+_QUIET = 4 * 3600.0
+"""Time, s, from one ten minutes of work of a quiet valve to the next."""
 
 _SLOW = ("slow", "weeks")
 
@@ -32,7 +32,8 @@ _SLOW = ("slow", "weeks")
 class Task:
     """What is tried: a plant, hours, a seed, and what its friction does.
 
-    It is steady, grows to 1.5 times in a step, or slowly; in `weeks` so of a quiet valve.
+    It is steady, or grows to 1.5 times in a step, or slowly, or over `weeks` in a valve that works
+    ten minutes in every four hours.
     """
 
     plant: str
@@ -43,8 +44,9 @@ class Task:
 
 @dataclass(frozen=True)
 class Served:
-    """Ten minutes of service: moves that ended, and ∫|F·dx| (J) and ∫|dx| (m) of the motion."""
+    """Ten minutes of service, until an hour: moves that ended, and ∫|F·dx| (J) and ∫|dx| (m)."""
 
+    hour: float
     moves: tuple[Move, ...]
     work: float
     distance: float
@@ -76,10 +78,8 @@ class Course:
 
     def duty(self, hour: float) -> Duty:
         """Return other steps, periods and ranges in each part of some days, from the second on."""
-        if self._task.course == "weeks":
-            return replace(self._duty, period=_QUIET)
         part = int(hour // 8)
-        if part == 0 or self._duty.high - self._duty.low < 0.1:
+        if self._task.course == "weeks" or part == 0 or self._duty.high - self._duty.low < 0.1:
             return self._duty
         if part not in self._phases:
             middle = self._random.uniform(0.35, 0.65)
@@ -114,8 +114,12 @@ def served(task: Task) -> Iterator[Served]:
     """Simulate the service of a task, and cut it into moves."""
     valve = valve_of(task.plant)
     course, stream = Course(task, valve), MoveStream(known_valve(valve))
-    for one in stretches(valve, task.hours, task.seed, course.friction, course.offset, course.duty):
-        yield Served(stream.take(_arrivals(one)), one.work, one.distance)
+    spacing = _QUIET if task.course == "weeks" else STRETCH
+    courses = course.friction, course.offset, course.duty
+    parts = stretches(valve, task.hours, task.seed, *courses, spacing)
+    for number, one in enumerate(parts):
+        hour = (number * spacing + STRETCH) / 3600.0
+        yield Served(hour, stream.take(_arrivals(one)), one.work, one.distance)
 
 
 def _arrivals(stretch: Stretch) -> Arrivals:

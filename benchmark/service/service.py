@@ -81,6 +81,7 @@ def stretches(
     friction: Callable[[float], float],
     offset: Callable[[float], float],
     duty: Callable[[float], Duty],
+    spacing: float = STRETCH,
 ) -> Iterator[Stretch]:
     """Serve for some hours.
 
@@ -98,6 +99,9 @@ def stretches(
         Force, N, by which the preload has moved at an hour.
     duty : callable
         Set points at an hour.
+    spacing : float
+        Time, s, from the begin of one stretch to that of the next; between them the valve is shut
+        off, as it stands.
 
     Yields
     ------
@@ -110,8 +114,9 @@ def stretches(
     level = 0.5 * (valve.duty.low + valve.duty.high) - 0.5 * valve.duty.step
     state = new_state(loop, level, plant.body.travel)
     count, actions = round(STRETCH * senses.rate), round(STRETCH / loop.action_period)
-    for stretch in range(round(hours * 3600.0 / STRETCH)):
-        hour = stretch * STRETCH / 3600.0
+    for stretch in range(round(hours * 3600.0 / spacing)):
+        begin = stretch * spacing
+        hour = begin / 3600.0
         asked = duty(hour)
         levels = _set_points(asked, level, round(STRETCH / asked.period), random)
         level = levels[-1]
@@ -132,8 +137,8 @@ def stretches(
         )
         yield Stretch(
             (
-                _stamps(stretch * STRETCH, count, senses, senses.lag, random),
-                _stamps(stretch * STRETCH, count, senses, 0.0, random),
+                _stamps(begin, count, senses, senses.lag, random),
+                _stamps(begin, count, senses, 0.0, random),
             ),
             _measured(outputs[0], senses.pressure_noise, senses.pressure_step, random, senses.hold),
             _measured(outputs[1], senses.position_noise, senses.position_step, random),

@@ -103,6 +103,7 @@ class _Watched:
         self._limits = FrictionLimits()
         self._ledger: deque[Move] = deque(maxlen=MOST_MOVES)
         self._baseline: Baseline | None = None
+        self._has_tried = False
         self._reference: Reference | None = None
         self._known: list[int] = []
         self._high: set[str] = set()
@@ -114,7 +115,8 @@ class _Watched:
         self._ledger.extend(moves)
         self.evidence = evidence_of(list(self._ledger), self._valve)
         self._reference = self._reference or reference_by_evidence(self.evidence)
-        if hour == BEFORE:
+        if hour >= BEFORE and not self._has_tried:
+            self._has_tried = True
             with contextlib.suppress(RefusalError):
                 self._baseline = baseline_by_evidence(self.evidence)
         self._declare(hour)
@@ -163,11 +165,11 @@ def judged(task: Task, service: Iterable[Served]) -> Told:
     work = distance = 0.0
     for count, part in enumerate(service, start=1):
         moves += part.moves
-        watched.take(count / PER_HOUR, part.moves)
+        watched.take(part.hour, part.moves)
         work, distance = work + part.work, distance + part.distance
         if count % PER_HOUR:
             continue
-        hour = count // PER_HOUR
+        hour = part.hour
         scale = course.friction(hour - 1e-6)
         if distance > 0:  # a stem that stood still has no sliding friction
             truth = work / distance

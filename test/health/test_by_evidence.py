@@ -98,6 +98,28 @@ class TestReference:
         assert self.found(now, baseline(450.0)).level is Level.OK
         assert why_not_compared(now, baseline()) == why_not_compared(now, None) == ""
 
+    @pytest.mark.parametrize("reference", [None, FIRST], ids=["none", "of other speeds"])
+    def test_a_change_is_an_alarm_where_nothing_can_be_compared(self, reference):
+        """A stem that sticks more moves faster."""
+        moves = made_moves(4.0, lambda hour: 450.0 if hour >= 2 else 300.0)
+        for one in moves[600:]:
+            object.__setattr__(one, "speed", 2.5 * one.speed)
+        found = self.found(evidence_of(moves, VALVE, EXACT), reference=reference)
+        assert found.level is Level.WARN
+        assert found.message.startswith("friction has grown: sliding friction at 3.")
+        assert "what it was before it changed, between 2023-11-1" in found.message
+        assert found.ratio.low <= 1.5 <= found.ratio.high
+        small = evidence(lambda hour: 350.0 if hour >= 2 else 300.0, hours=4.0)
+        assert small.change is not None
+        assert self.found(small, reference=None) is None
+
+    def test_one_that_is_first_known_after_a_change_is_that_of_before(self):
+        grown = evidence(lambda hour: 450.0 if hour >= 2 else 300.0, hours=4.0)
+        late = reference_by_evidence(grown)
+        assert abs(late.sliding.value - 300.0) < late.sliding.half_width < 30.0
+        assert late.time == grown.change.earliest
+        assert self.found(evidence(lambda _: 450.0), reference=late).level is Level.WARN
+
     def test_it_is_known_as_well_as_a_baseline(self):
         assert reference_by_evidence(evidence(lambda _: 300.0, hours=0.2)) is None
         assert self.FIRST.sliding.value == pytest.approx(300.0, rel=0.02)

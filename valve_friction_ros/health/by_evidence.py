@@ -63,10 +63,20 @@ def baseline_by_evidence(evidence: Evidence) -> Baseline:
 
 
 def reference_by_evidence(evidence: Evidence) -> Reference | None:
-    """Return what the moves say as reference; None where they could not be a baseline."""
+    """Return what the moves say as reference; None where they could not be a baseline.
+
+    Where friction has changed before it was known well enough, it is carried back over the change.
+    """
     with contextlib.suppress(RefusalError):
-        sliding = baseline_by_evidence(evidence).sliding
-        return None if sliding is None else Reference(sliding, evidence.until)
+        sliding, change = baseline_by_evidence(evidence).sliding, evidence.change
+        if sliding is None:
+            return None
+        if change is None:
+            return Reference(sliding, evidence.until)
+        value = sliding.value / change.ratio
+        share = 0.5 * math.log(change.high / change.low)
+        width = value * math.hypot(sliding.half_width / sliding.value, share)
+        return Reference(SlidingFriction(value, width, sliding.speed), change.earliest)
     return None
 
 
@@ -91,7 +101,8 @@ def diagnosis_by_evidence(
         Bounds of the ratio.
     reference : Reference, optional
         Friction when the moves were first combined, for a valve without a baseline, or with one
-        that cannot be compared (`why_not_compared`).
+        that cannot be compared (`why_not_compared`). Where this cannot be compared either, as a
+        stem that sticks more moves at other speeds, a declared change is an alarm by itself.
 
     Returns
     -------
@@ -111,15 +122,31 @@ def diagnosis_by_evidence(
     found = None if baseline is None else _compared(evidence, baseline)
     if found is not None:
         return against(found, limits, effect)
-    if reference is None:
-        return None
-    found = _compared(evidence, Baseline(sliding=reference.sliding))
+    if reference is not None:
+        found = _compared(evidence, Baseline(sliding=reference.sliding))
+    if reference is None or found is None:
+        return _by_change(evidence, limits, effect)
     what = "no baseline" if baseline is None else "the baseline cannot be compared"
     healthy = (
         f"what it was until {_date(reference.time)}, when the moves of this valve were first "
         f"combined ({what}: call ~/set_baseline while it is healthy)"
     )
-    return None if found is None else against(found, limits, effect, healthy)
+    return against(found, limits, effect, healthy)
+
+
+def _by_change(evidence: Evidence, limits: FrictionLimits, effect: str) -> Diagnosis | None:
+    """Judge a declared change by itself; None where it is no alarm, for it says little else."""
+    change = evidence.change
+    if change is None:
+        return None
+    ratio = Ratio(change.ratio, change.low, change.high, SLIDING, evidence.sliding_speed)
+    healthy = (
+        f"what it was before it changed, between {_date(change.earliest)} and "
+        f"{_date(change.latest)} (no baseline and no first moves to compare with: call "
+        "~/set_baseline while it is healthy)"
+    )
+    found = against(ratio, limits, effect, healthy)
+    return found if found.level >= Level.WARN else None
 
 
 def _compared(evidence: Evidence, baseline: Baseline) -> Ratio | None:
