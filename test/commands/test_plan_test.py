@@ -63,6 +63,7 @@ def test_the_file_moves_the_stem_as_it_was_told(plan, tmp_path):
     assert friction["value"] == 152.7
     assert 0 < friction["half_width"] < 50
     play = told["play"]
+    assert play["converter_lag"] == 0.0
     assert play["file_minimum"] <= pressures.min() < pressures.max() <= play["file_maximum"]
     rate = np.max(np.abs(np.diff(pressures) / np.diff(times)))
     assert rate < play["file_rate"] < 1.01 * rate

@@ -1,7 +1,10 @@
 """Planned tests: they keep what they promise, and beat the square wave of equal band and time."""
 
+import itertools
+
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from benchmark.planned_tests import trials
 from valve_friction_ros.identification import (
@@ -28,12 +31,14 @@ from valve_friction_ros.planning import (
     unknown_friction,
 )
 from valve_friction_ros.planning.forecast import forecast, moved
+from valve_friction_ros.planning.stroke_test import SHAPES, Pattern, stroke_test
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
 CONDITIONS = Conditions(sample_rate=50.0)
 QUICK = Limits(0.2, 0.8, duration=30.0)
 SPRING = (HIGH_FRICTION.spring_constant, HIGH_FRICTION.spring_preload)
 KNOWN = known_friction(606.0, SPRING, 1.6, viscous_friction=4.48e4)
+KNOWN_EXACTLY = known_friction(606.0, SPRING, 1.6, viscous_friction=4.48e4, factor=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +74,7 @@ def test_the_same_question_has_the_same_answer(plan):
 
 
 def test_the_aim_decides():
-    certain = known_friction(606.0, SPRING, 1.6, viscous_friction=4.48e4, factor=1.0)
+    certain = KNOWN_EXACTLY
     found = {
         aim: plan_test(BENCH_VALVE, certain, QUICK, CONDITIONS, SETTINGS, aim)
         for aim in ("coulomb_friction", "viscous_friction")
@@ -102,6 +107,45 @@ def test_a_friction_that_holds_the_stem_is_named_and_not_refused():
     assert any(
         "2 times larger (F_s 1212 N) may hold the stem" in one for one in plan_remarks(found)
     )
+
+
+def test_an_end_that_the_atmosphere_sets_is_said():
+    """Against F_c = 606 N the spring alone does not bring the stem down to 2 %."""
+    for lowest, is_said in ((0.02, True), (0.2, False)):
+        limits = Limits(lowest, 0.6, duration=30.0, allow_stops=True)
+        found = plan_test(BENCH_VALVE, KNOWN_EXACTLY, limits, CONDITIONS, SETTINGS)
+        said = [one for one in plan_remarks(found) if "the lower end is the atmosphere" in one]
+        assert bool(said) is is_said
+        assert (found.band.low == BENCH_VALVE.pressure_reference) is is_said
+
+
+@pytest.mark.parametrize(
+    ("friction", "aim"),
+    [
+        (known_friction(152.7, SPRING, 1.6, viscous_friction=4865.0, factor=1.0), "friction"),
+        (KNOWN_EXACTLY, "viscous_friction"),
+    ],
+)
+def test_patterns_from_everywhere_tell_little_more(friction, aim):
+    """A witness that knows nothing of the search: points spread over all patterns."""
+    found = plan_test(BENCH_VALVE, friction, QUICK, CONDITIONS, SETTINGS, aim)
+
+    def loss(test):
+        motion = moved(test.excitation, test.duration, BENCH_VALVE, friction.draws[0], CONDITIONS)
+        told = forecast(motion, BENCH_VALVE, friction.draws[0], CONDITIONS, SETTINGS)
+        if told.refusal:
+            return 0.0
+        return np.mean([-np.log1p(1 / told.relative(name)) for name in AIMS[aim]])
+
+    mixes = [one for count in (1, 2) for one in itertools.permutations(SHAPES, count)]
+    others = []
+    for mix, count, hold, *speeds in qmc.Halton(6, scramble=False).random(150)[1:]:
+        chosen = tuple(0.1**one for one in speeds[: 1 + int(3 * count)])
+        pattern = Pattern(mixes[int(mix * len(mixes))], chosen, 0.05 * 60**hold)
+        if (test := stroke_test(pattern, found.band, QUICK.duration)) is not None:
+            others.append(loss(test))
+    assert len(others) > 10
+    assert loss(found.test) <= min(others) + 0.1  # 10 % of a half width
 
 
 def test_refusals_name_what_to_relax():
@@ -157,3 +201,9 @@ def test_valves_that_the_planner_does_not_know(seed):
     assert trial.errors[name] <= trial.reported[name] < 0.2
     assert 0.3 < trial.reported[name] / trial.predicted[name] < 6.0
     assert trial.square[name] > 2.0 * trial.reported[name]
+
+
+def test_friction_that_may_fall_with_speed_is_remarked_on():
+    slipping = known_friction(606.0, SPRING, 1.6, static_friction=700.0, factor=1.0)
+    found = plan_test(BENCH_VALVE, slipping, QUICK, CONDITIONS, SETTINGS)
+    assert any("(Stribeck)" in one for one in plan_remarks(found))

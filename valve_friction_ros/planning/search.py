@@ -28,15 +28,15 @@ AIMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 _SHAPES = (("full",), ("stairs",), ("turning",), ("full", "stairs"))
 _SPEEDS = ((1.0,), (0.4,), (0.15,), (1.0, 0.4), (1.0, 0.15), (1.0, 0.3, 0.1))
-_HOLDS = (0.3, 1.0, 4.0)
+_HOLDS = (0.1, 0.3, 1.0, 4.0)
 """Shapes, speeds and holds (s) whose combinations the search begins with."""
 
-_KEPT = 5
-"""Best patterns for the most likely valve, which are tried with all valves."""
+_FACTORS = (0.6, 0.8, 1.25, 1.6)
+_ROUNDS = 8
+"""Factors by which a speed or the hold is changed, and how often a start is improved on at most."""
 
-_FACTORS = (0.6, 1.6)
-_ROUNDS = 3
-"""Factors by which a speed or the hold is changed, and how often the best is improved on."""
+_MIXES = tuple(one for count in (1, 2) for one in itertools.permutations(SHAPES, count))
+"""Shapes that a neighbour may have."""
 
 _LONGEST_HOLD = 5.0
 
@@ -96,7 +96,8 @@ def _neighbours(pattern: Pattern) -> list[Pattern]:
     for factor in _FACTORS:
         hold = min(pattern.hold * factor, _LONGEST_HOLD)
         found.append(replace(pattern, hold=hold))
-    found += [replace(pattern, shapes=(name,)) for name in SHAPES]
+    found += [replace(pattern, shapes=names) for names in _MIXES]
+    found.append(replace(pattern, speeds=pattern.speeds[::-1]))
     return [one for one in found if one != pattern]
 
 
@@ -143,6 +144,10 @@ class _Search:
             self.known[pattern, place] = found
         return self.known[pattern, place]
 
+    def likely(self, pattern: Pattern) -> float:
+        """Return the loss of the most likely valve."""
+        return self.loss(pattern, self.frictions.middle)
+
     def overall(self, pattern: Pattern) -> float:
         """Return the mean of `loss` over all valves."""
         draws = range(len(self.frictions.draws))
@@ -162,19 +167,30 @@ class _Search:
         return fitting
 
     def best(self, progress: Callable[[float], object]) -> Pattern:
-        """Compare the patterns for the likely valve, the best for all, and their neighbours."""
+        """Compare patterns for the likely valve, and improve the best of each shape for all."""
         first = self.patterns()
         for count, one in enumerate(first):
-            self.loss(one, self.frictions.middle)
+            self.likely(one)
             progress(0.5 * (count + 1) / len(first))
-        kept = sorted(first, key=lambda one: self.loss(one, self.frictions.middle))[:_KEPT]
-        best = min(kept, key=self.overall)
-        for turn in range(_ROUNDS):
-            better = best
-            for one in _neighbours(best):
-                if self.overall(one) < self.overall(better):
-                    better = one
-            progress(0.5 + 0.4 * (turn + 1) / _ROUNDS)
+        # The loss has many valleys, so that the best pattern of each shape is improved on.
+        starts = [
+            min(same, key=self.likely)
+            for shapes in _SHAPES
+            if (same := [one for one in first if one.shapes == shapes])
+        ]
+        found = []
+        for count, one in enumerate(starts):
+            found.append(self.improved(one, self.likely))
+            progress(0.5 + 0.3 * (count + 1) / len(starts))
+        best = self.improved(min(found, key=self.overall), self.overall)
+        progress(0.9)
+        return best
+
+    def improved(self, pattern: Pattern, loss: Callable[[Pattern], float]) -> Pattern:
+        """Go from a pattern to the best of its neighbours, until none is better."""
+        best = pattern
+        for _ in range(_ROUNDS):
+            better = min([best, *_neighbours(best)], key=loss)
             if better == best:
                 break
             best = better
@@ -221,8 +237,9 @@ def plan_test(
     Returns
     -------
     StrokePlan
-        The test and its forecasts. It depends on no clock and no chance. The search is local: for
-        another aim it has missed a test whose interval was 26 % narrower.
+        The test and its forecasts. It depends on no clock and no chance. The search is local, from
+        several starts: of seven problems a global one (differential evolution, thousands of tests)
+        found intervals that were at most 12 % narrower.
 
     Raises
     ------

@@ -41,15 +41,18 @@ def write_test(path: Path, plan: StrokePlan) -> None:
     write_whole(path, text.getvalue().encode())
 
 
-def player(plan: StrokePlan, path: Path) -> dict[str, Any]:
-    """Return the parameters of `pressure_source` that play the file and hold its limits."""
+def player(plan: StrokePlan, path: Path, on_bench: bool = False) -> dict[str, Any]:
+    """Return the parameters of `pressure_source` that play the file and hold its limits.
+
+    The converter of a valve has a lag of its own; on the simulated bench the player has it.
+    """
     return {
         "excitation": "file",
         "file": str(path.resolve()),
         "file_minimum": math.floor(plan.band.low / _ROUND) * _ROUND,
         "file_maximum": math.ceil(plan.band.high / _ROUND) * _ROUND,
         "file_rate": math.ceil(1.001 * plan.test.largest_rate / _ROUND) * _ROUND,
-        "converter_lag": plan.conditions.converter_lag,
+        "converter_lag": plan.conditions.converter_lag if on_bench else 0.0,
     }
 
 
@@ -96,10 +99,13 @@ def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
         ],
         "tried": plan.tried,
         "warnings": [*plan_remarks(plan)],
-        "play": {
-            name: plain(v) if isinstance(v, float) else v for name, v in player(plan, path).items()
-        },
+        "play": _plain(player(plan, path)),
+        "play_on_bench": _plain(player(plan, path, on_bench=True)),
     }
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: plain(one) if isinstance(one, float) else one for name, one in values.items()}
 
 
 def _cell(one: Forecast, name: str) -> str:
@@ -150,16 +156,15 @@ def print_plan(plan: StrokePlan, path: Path) -> None:
         "pressure where it is, and restore it by hand. After: identify the record before the loop "
         "goes back to automatic."
     )
-    play = player(plan, path)
     console.print(
         "On a valve, the topic is that of your converter's command, never that of the measured "
         "pressure: invented pressure would enter the identifier, and nothing would move. The "
         "converter has a lag of its own, so the player has none:"
     )
     topic = "-r actuator_pressure:=/YOUR/CONVERTER/COMMAND"
-    print(f"{_PLAY} {topic} {_parameters({**play, 'converter_lag': 0.0})}")
+    print(f"{_PLAY} {topic} {_parameters(player(plan, path))}")
     console.print("On the simulated bench, with the bench's lag:")
-    print(f"{_PLAY} -r __ns:=/YOUR_BENCH {_parameters(play)}")
+    print(f"{_PLAY} -r __ns:=/YOUR_BENCH {_parameters(player(plan, path, on_bench=True))}")
 
 
 def _parameters(values: dict[str, Any]) -> str:
