@@ -1,0 +1,114 @@
+"""Layouts and analyzers for other dashboards: they are their script's, and name what there is."""
+
+import json
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+import yaml
+
+from valve_friction_ros.identification import PARAMETER_UNITS
+
+PROJECT = Path(__file__).resolve().parents[1]
+CONFIG = PROJECT / "config"
+IDENTIFIER = PROJECT / "valve_friction_ros" / "nodes" / "identifier"
+WRITTEN = ("foxglove_plant.json", "foxglove_valve.json", "plotjuggler_valve.xml")
+STATUS = "/fv_101/identifier: friction"
+
+
+def write(folder, *words):
+    pytest.importorskip("foxglove.layouts", reason="run `make venv-test`")
+    command = [sys.executable, CONFIG / "write_dashboards.py", *words, "--output", folder]
+    subprocess.run(command, check=True, timeout=60)
+
+
+def test_the_files_are_what_the_script_writes(tmp_path):
+    write(tmp_path)
+    for name in WRITTEN:
+        assert (tmp_path / name).read_text() == (CONFIG / name).read_text()
+
+
+def test_another_valve(tmp_path):
+    write(tmp_path, "/area_1/fv_102")
+    for name in WRITTEN[1:]:
+        text = (tmp_path / name).read_text()
+        assert "/area_1/fv_102/" in text
+        assert "101" not in text
+    assert "/diagnostics/FV-102//area_1/fv_102/identifier: friction/" in text
+
+
+def panels(content):
+    """All panels of a layout of Foxglove."""
+    if content["type"] == "panel":
+        yield content
+    for item in content.get("items", ()):
+        yield from panels(item["content"])
+
+
+def keys():
+    """Keys of `~/estimate` and `/diagnostics` that dashboards draw."""
+    return {f"{name} [{unit}]" for name, unit in PARAMETER_UNITS.items()} | {"friction_ratio"}
+
+
+def sources():
+    return "".join(path.read_text() for path in sorted(IDENTIFIER.glob("*.py")))
+
+
+def test_foxglove_names_what_there_is():
+    plant, valve = (json.loads((CONFIG / name).read_text()) for name in WRITTEN[:2])
+    kinds = [panel["panelType"] for panel in panels(plant["content"])]
+    assert kinds == ["DiagnosticsSummary", "DiagnosticsDetail", "Log"]
+    drawn = set()
+    for panel in panels(valve["content"]):
+        config = panel["config"]
+        if panel["panelType"] == "Plot":
+            drawn |= {series["value"] for series in config["paths"]}
+        elif panel["panelType"] == "ServiceCall":
+            node, _, service = config["serviceName"].rpartition("/")
+            assert node == "/fv_101/identifier"
+            assert f'"~/{service}"' in sources()
+        else:
+            assert panel["panelType"] == "DiagnosticsDetail"
+            assert config["selectedName"] == STATUS
+    signals = {"/fv_101/actuator_pressure.fluid_pressure", "/fv_101/stem_state.position[0]"}
+    assert signals < drawn
+    found = [re.fullmatch(r'/fv_101/identifier/estimate\.values\[:\]\{key=="(.+)"\}\.value', path)
+             for path in drawn - signals]  # fmt: skip
+    assert {match[1] for match in found} <= keys()
+    assert len(found) == 2
+
+
+def test_plotjuggler_names_what_its_parser_makes():
+    """Its series: /TOPIC/HARDWARE_ID/STATUS/KEY of diagnostics, /TOPIC/JOINT/position of joints."""
+    root = ET.parse(CONFIG / "plotjuggler_valve.xml").getroot()
+    for splitter in root.iter("DockSplitter"):
+        assert len(splitter) == int(splitter.get("count")) == len(splitter.get("sizes").split(";"))
+    curves = {curve.get("name") for curve in root.iter("curve")}
+    prefix = f"/diagnostics/FV-101/{STATUS}/"
+    drawn = {name.removeprefix(prefix) for name in curves if name.startswith(prefix)}
+    assert drawn <= keys() | {"level"}
+    assert curves - {prefix + key for key in drawn} == {
+        "/fv_101/actuator_pressure/fluid_pressure",
+        "/fv_101/stem_state/stem/position",
+    }
+
+
+def test_the_analyzers_take_every_valve():
+    """The keys are those that aggregator.cpp and generic_analyzer.cpp of ros2-jazzy read."""
+    (node, section), *more = yaml.safe_load(
+        (CONFIG / "diagnostic_aggregator.yaml").read_text()
+    ).items()
+    assert (node, more) == ("analyzers", [])
+    root = section["ros__parameters"]
+    valves = root.pop("valves")
+    assert set(root) <= {"path", "pub_rate", "other_as_errors", "history_depth", "critical"}
+    assert isinstance(root["pub_rate"], float)
+    assert isinstance(valves["timeout"], float)
+    assert set(valves) <= {"type", "path", "contains", "startswith", "regex", "expected",
+                           "remove_prefix", "timeout", "num_items", "discard_stale"}  # fmt: skip
+    assert valves["type"] == "diagnostic_aggregator/GenericAnalyzer"
+    assert any(part in STATUS for part in valves["contains"])
+    assert ': friction"' in sources()
