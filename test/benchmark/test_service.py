@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from benchmark.service.course import Task
+from benchmark.service.drawn import valve_of
 from benchmark.service.plants import PLANTS, Duty
 from benchmark.service.report import bounds_met, tables
 from benchmark.service.service import stretches
-from benchmark.service.trial import Number, Task, Told, tried
+from benchmark.service.trial import Number, Told, tried
 
 
 def told(course="steady", **changes):
@@ -47,6 +49,7 @@ def test_a_good_outcome_meets_the_bounds():
         (told("step", declared=math.nan), "declared within one hour"),
         (told("step", alarmed=math.nan), "alarmed within one hour"),
         (told("slow", alarmed_by_reference=math.nan), "slowly alarmed within one hour"),
+        (told("weeks", alarmed_by_reference=math.nan), "slowly alarmed within one hour"),
         (told(numbers=[Number("sliding_friction", 100.0, 111.0, 20.0)]), "friction within 10 %"),
         (told(numbers=[Number("sliding_friction", 100.0, math.nan, 1.0)]), "friction within 10 %"),
         (told(numbers=[Number("dead_band", 100.0, 88.0, 20.0)]), "dead band within 10 %"),
@@ -90,3 +93,18 @@ def test_the_stem_follows_its_set_points_and_friction_is_that_of_the_plant():
         assert stretch.stamps[0].size == stretch.position.size == 24_000
         assert np.ptp(stretch.position) > 2 * duty.step * valve.plant.body.travel
     assert second.stamps[0][0] - first.stamps[0][-1] == pytest.approx(25e6, abs=1)
+
+
+def test_a_stem_at_rest_moves_as_in_small_steps():
+    """The rest is passed over at once; a step that is never longer than the rest must agree."""
+    valve = replace(PLANTS["high"], step=2e-4)
+    constant = (lambda _: 1.0, lambda _: 0.0, lambda _: Duty())
+    (first,) = stretches(valve, 1 / 6, 1, *constant)
+    (fine,) = stretches(replace(valve, step=2e-5), 1 / 6, 1, *constant)
+    assert first.work / first.distance == pytest.approx(fine.work / fine.distance, rel=1e-3)
+    assert np.percentile(np.abs(first.position - fine.position), 99) < 100e-6
+
+
+def test_a_drawn_valve_is_that_of_its_number():
+    assert valve_of("drawn 3") == valve_of("drawn 3") != valve_of("drawn 4")
+    assert valve_of("high") is PLANTS["high"]

@@ -34,7 +34,7 @@ from valve_friction_ros.streams import Arrivals, utc
 __all__ = ["EvidenceWatch"]
 
 _COMBINE_EVERY = 300_000_000_000
-"""Nanoseconds of stamps from one combination to the next: thousands of moves take 0.1 s."""
+"""Nanoseconds of stamps from one combination to the next: thousands of moves take 0.05 s."""
 
 _SHOWN = ("sliding_friction", "static_friction", "spring_constant", "spring_preload")
 
