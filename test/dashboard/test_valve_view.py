@@ -49,7 +49,7 @@ def test_all_that_an_identifier_says_is_read():
     # What has no place of its own is in exactly one list.
     names = [one.name for some in shown.groups().values() for one in some]
     assert len(names) == len(set(names))
-    assert {"rms", "evidence moves", "reversals", "buffered samples"} <= set(names)
+    assert {"rms", "moves", "reversals", "buffered samples"} <= set(names)
 
 
 def test_the_time_of_the_estimate_is_utc():

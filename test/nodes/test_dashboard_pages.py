@@ -7,7 +7,7 @@ from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
 from browser import Tab, chromium, free_port
-from live_nodes import NAMESPACE, SECOND, START
+from live_nodes import NAMESPACE, SECOND, START, buffered
 from records import quick_record
 
 from valve_friction_ros.model import HIGH_FRICTION
@@ -179,11 +179,16 @@ def test_an_address_is_text_from_outside_too(tab):
 # Valve: one after the other, as a person works with it
 
 
+def is_full(status):
+    """Whether the identifier holds a quick record; the made-up valves hold other counts."""
+    return status.name.startswith(NODE) and buffered(status) == 1000
+
+
 @pytest.fixture(scope="module")
 def identified(plant):
     """Samples in the identifier's buffer."""
     plant.client.send_record(quick_record())
-    plant.client.wait_for_buffered(1000)
+    plant.client.next_status(is_full, "1000 samples in the buffer")
     return plant
 
 
@@ -288,10 +293,15 @@ def test_signals_are_heard_while_the_page_is_open(identified, tab):
 
 
 def test_two_identifications_are_compared(identified, tab):
-    identified.client.identified(quick_record(HIGH_FRICTION), START + 600 * SECOND)
+    client = identified.client
+    for turn, record in enumerate((quick_record(), quick_record(HIGH_FRICTION))):
+        assert client.trigger("clear").success
+        client.send_record(record, START + (turn + 10) * 60 * SECOND)
+        client.next_status(is_full, "1000 samples in the buffer")
+        assert client.trigger("identify").success
     page = tab.open(VALVE)
     page.locator(".vf-long tbody tr").nth(1).wait_for()
-    page.locator(".vf-long a").last.click()
+    page.locator(".vf-long a").nth(1).click()  # the one before the last
     page.locator(".vf-compared").wait_for()
     row = page.locator(".vf-compared tr").filter(has_text="coulomb friction").inner_text()
     assert "differs" in row  # of the record before, and of that with the high friction

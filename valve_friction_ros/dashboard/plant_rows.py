@@ -53,7 +53,8 @@ def number_and_width(value: float, half_width: float) -> tuple[str, str]:
     places = min(max(0, min(of_width, of_value)), 6)
     if abs(value) >= 1e6:
         return f"{value:.4g}", f"± {two_digits(half_width)}"
-    return f"{value:.{places}f}".replace("-", "−"), f"± {two_digits(half_width)}"
+    width = f"{half_width:.{max(0, min(of_width, 6))}f}"
+    return f"{value:.{places}f}".replace("-", "−"), f"± {width}"
 
 
 def _place(ratio: float) -> float:

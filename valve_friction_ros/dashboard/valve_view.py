@@ -321,7 +321,9 @@ def _groups(values: Mapping[str, str], parameters: set[str]) -> dict[str, tuple[
     for key in values:
         if place := _group(key, parameters):
             keys[place].append(key)
-    return {name: entries_of(values, some) for name, some in keys.items()}
+    found = {name: entries_of(values, some) for name, some in keys.items()}
+    bare = (one._replace(name=one.name.removeprefix("evidence ")) for one in found["evidence"])
+    return {**found, "evidence": tuple(bare)}
 
 
 _SHOWN = ("NE 107", "estimate_", "reason", "friction_ratio", "friction_drift", "limit_expected",

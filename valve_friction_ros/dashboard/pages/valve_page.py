@@ -322,7 +322,8 @@ def _drift_words(view: ValveView) -> str:
         return "none that is significant"
     words = _with_unit(view.drift.value, view.drift.half_width, "N a month")
     expected = view.drift.expected
-    return f"{words}; limit {expected.date}" if expected else words
+    sign = "+" if view.drift.value > 0 else ""
+    return f"{sign}{words}; limit {expected.date}" if expected else f"{sign}{words}"
 
 
 def _trend_words(kept: ValveHistory) -> str:
