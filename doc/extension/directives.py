@@ -1,0 +1,57 @@
+"""Directives that write pages of the reference from the code."""
+
+from collections.abc import Callable
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+from extension.command_options import command_as_markdown, list_as_markdown
+from extension.diagnostic_keys import keys_as_markdown
+from extension.history_schema import schema_as_markdown
+from extension.node_graph import graph_as_markdown
+from extension.node_parameters import parameters_as_markdown
+from extension.project_file import file_as_markdown, rst_as_markdown
+
+__all__ = ["setup"]
+
+
+def _directive(
+    write: Callable[..., str], arguments: int, more: int = 0
+) -> type[SphinxDirective]:
+    """Return a directive that shows what a function writes of its arguments."""
+
+    class Written(SphinxDirective):
+        required_arguments = arguments
+        optional_arguments = more
+
+        def run(self) -> list[nodes.Node]:
+            return self.parse_text_to_nodes(write(*self.arguments), allow_section_headings=True)
+
+    return Written
+
+
+def _keep_bars(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:  # noqa: ARG001
+    """Let |x| in a docstring be a magnitude, which reStructuredText takes as a substitution."""
+    for place, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            parts = line.split("``")
+            parts[::2] = [part.replace("|", "\\|") for part in parts[::2]]
+            lines[place] = "``".join(parts)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Add the directives."""
+    app.add_directive("node-parameters", _directive(parameters_as_markdown, 1, 1))
+    for name, write, arguments in (
+        ("node-graph", graph_as_markdown, 2),
+        ("diagnostic-keys", keys_as_markdown, 1),
+        ("command-options", command_as_markdown, 1),
+        ("command-list", list_as_markdown, 0),
+        ("history-schema", schema_as_markdown, 0),
+        ("project-file", file_as_markdown, 1),
+        ("project-rst", rst_as_markdown, 1),
+    ):
+        app.add_directive(name, _directive(write, arguments))
+    app.connect("autodoc-process-docstring", _keep_bars)
+    return {"parallel_read_safe": True}
