@@ -12,7 +12,7 @@ from valve_friction_ros import __version__  # noqa: E402
 
 project = "valve_friction_ros"
 author = "valve_friction_ros developers"
-copyright = "valve_friction_ros developers, Apache-2.0"  # noqa: A001 - Sphinx's name
+copyright = "valve_friction_ros developers, Apache-2.0"
 version = release = __version__
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser"]

@@ -33,9 +33,7 @@ def _term(action: argparse.Action) -> str:
     return names if action.nargs == 0 else f"{names} {value}"
 
 
-def _entries(
-    parser: argparse.ArgumentParser, actions: list[argparse.Action]
-) -> Iterator[Entry]:
+def _entries(parser: argparse.ArgumentParser, actions: list[argparse.Action]) -> Iterator[Entry]:
     for action in actions:
         if action.dest != "help" and action.help != argparse.SUPPRESS:
             words = (action.help or "") % {**vars(action), "prog": parser.prog}

@@ -3,12 +3,13 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from extension.markdown import Entry, definition_list
 from extension.meanings import meanings, require_all
 
-__all__ = ["declared_keys", "entries", "keys_as_markdown", "pattern_of"]
+__all__ = ["declared_keys", "entries", "is_explained", "keys_as_markdown", "pattern_of"]
 
 _WRITERS = {
     "identifier/status.py": (
@@ -46,7 +47,9 @@ def _text(node: ast.expr) -> str | None:
         )
         return "".join(parts)
     if isinstance(node, ast.BinOp):
-        sides = (f"<{one.id}>" if isinstance(one, ast.Name) else "" for one in (node.left, node.right))
+        sides = (
+            f"<{one.id}>" if isinstance(one, ast.Name) else "" for one in (node.left, node.right)
+        )
         return "".join(sides)
     return None
 
@@ -72,9 +75,7 @@ def declared_keys() -> set[str]:
     found: set[str] = set()
     for file, functions in _WRITERS.items():
         tree = ast.parse((nodes / file).read_text(encoding="utf-8"))
-        written = {
-            each.name: each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)
-        }
+        written = {each.name: each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)}
         for name in functions:
             found |= set(_keys(written[name]))
     return found
@@ -96,7 +97,30 @@ def entries() -> dict[str, list[Entry]]:
 
 def pattern_of(key: str) -> re.Pattern[str]:
     """Return what the keys that an entry stands for look like."""
-    return re.compile(".+".join(map(re.escape, re.split(r"<[^>]+>", key))))
+    from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
+    from valve_friction_ros.identification import PARAMETER_UNITS
+
+    parts = {
+        "parameter": "|".join(PARAMETER_UNITS),
+        "number": "|".join((*RATIOS, *DIFFERENCES)),
+        "figure": "dead_time|T63|T86|overshoot|steady_error",
+        "which": "dead_time|T86|deviation",
+    }
+    pieces = re.split(r"<([^>]+)>", key)
+    pieces[::2] = map(re.escape, pieces[::2])
+    pieces[1::2] = (f"(?:{parts.get(part, '[^]]+')})" for part in pieces[1::2])
+    return re.compile("".join(pieces))
+
+
+@cache
+def _patterns() -> tuple[re.Pattern[str], ...]:
+    return tuple(pattern_of(entry.term) for some in entries().values() for entry in some)
+
+
+@cache
+def is_explained(key: str) -> bool:
+    """Return whether an entry stands for a key."""
+    return any(pattern.fullmatch(key) for pattern in _patterns())
 
 
 def keys_as_markdown(section: str) -> str:

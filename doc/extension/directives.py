@@ -1,6 +1,7 @@
 """Directives that write pages of the reference from the code."""
 
 from collections.abc import Callable
+from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
@@ -16,9 +17,7 @@ from extension.project_file import file_as_markdown, rst_as_markdown
 __all__ = ["setup"]
 
 
-def _directive(
-    write: Callable[..., str], arguments: int, more: int = 0
-) -> type[SphinxDirective]:
+def _directive(write: Callable[..., str], arguments: int, more: int = 0) -> type[SphinxDirective]:
     """Return a directive that shows what a function writes of its arguments."""
 
     class Written(SphinxDirective):
@@ -31,8 +30,9 @@ def _directive(
     return Written
 
 
-def _keep_bars(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:  # noqa: ARG001
+def _keep_bars(*event: Any) -> None:
     """Let |x| in a docstring be a magnitude, which reStructuredText takes as a substitution."""
+    lines = event[-1]
     for place, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
             parts = line.split("``")

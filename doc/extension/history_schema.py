@@ -48,7 +48,14 @@ def schema_as_markdown() -> str:
     lines = []
     used = set()
     for table, row in said["tables"].items():
-        lines += [f"## `{table}`", "", row["is"].strip(), "", "| column | type | meaning |", "| --- | --- | --- |"]
+        lines += [
+            f"## `{table}`",
+            "",
+            row["is"].strip(),
+            "",
+            "| column | type | meaning |",
+            "| --- | --- | --- |",
+        ]
         own = row.get("columns", {})
         require = [one.name for one in tables[table]]
         require_all(f"columns of {table}", require, {*own, *(set(said["columns"]) & set(require))})
@@ -56,7 +63,8 @@ def schema_as_markdown() -> str:
             used.add(one.name)
             kind = one.kind or "text"
             facts = f"{kind.lower()}{', key' if one.is_key else ''}"
-            null = "" if one.is_needed or one.is_key else "; may be NULL"
+            is_sure = one.is_needed or one.is_key or table == "friction"
+            null = "" if is_sure else ", or NULL"
             meaning = own.get(one.name, said["columns"].get(one.name, "")).strip()
             lines.append(f"| `{one.name}` | {facts}{null} | {meaning} |")
         lines.append("")

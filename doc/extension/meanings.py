@@ -23,4 +23,6 @@ def require_all(what: str, declared: Collection[str], said: Collection[str]) -> 
     if mute:
         raise ValueError(f"{what} without a meaning in doc/extension/meanings.yaml: {mute}")
     if idle:
-        raise ValueError(f"{what} that doc/extension/meanings.yaml explains, and no code has: {idle}")
+        raise ValueError(
+            f"{what} that doc/extension/meanings.yaml explains, and no code has: {idle}"
+        )

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
 
-from extension.markdown import definition_list, Entry
+from extension.markdown import Entry, definition_list
 from extension.meanings import meanings, require_all
 
 __all__ = ["Graph", "graph_as_markdown", "graph_of"]
@@ -66,7 +66,9 @@ def graph_of(node: str) -> Graph:
                     for one in running.get_publishers_info_by_topic(name)
                     if one.qos_profile.durability.name == "TRANSIENT_LOCAL"
                 ]
-                found[kind][short] = ", ".join([type_.replace("/msg/", "/").replace("/srv/", "/"), *latched[:1]])
+                found[kind][short] = ", ".join(
+                    [type_.replace("/msg/", "/").replace("/srv/", "/"), *latched[:1]]
+                )
     return found
 
 

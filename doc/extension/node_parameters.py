@@ -52,7 +52,7 @@ def _facts(spec: object, unit: str) -> str:
 
 
 def parameter_entries(node: str, *names: str) -> list[Entry]:
-    """Return the parameters of a node, or those of some names, in the order of their declaration."""
+    """Return the parameters of a node, or some of them, in the order of their declaration."""
     module = import_module(f"valve_friction_ros.nodes.{NODES[node]}")
     found = []
     for spec in module.PARAMETERS:
