@@ -1,5 +1,6 @@
 """Settings of Sphinx, for `make docs` and for rosdoc2, which runs them in a copy of this folder."""
 
+import contextlib
 import sys
 from pathlib import Path
 
@@ -8,12 +9,13 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 from extension.directives import setup  # noqa: E402, F401 - Sphinx calls it
 
-from valve_friction_ros import __version__  # noqa: E402
-
 project = "valve_friction_ros"
 author = "valve_friction_ros developers"
 copyright = "valve_friction_ros developers, Apache-2.0"
-version = release = __version__
+with contextlib.suppress(ImportError):  # rosdoc2 knows the version, and may know the path later
+    from valve_friction_ros import __version__
+
+    version = release = __version__
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser"]
 myst_enable_extensions = ["attrs_inline", "deflist", "fieldlist"]

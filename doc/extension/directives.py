@@ -5,6 +5,7 @@ from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
 from extension.command_options import command_as_markdown, list_as_markdown
@@ -16,6 +17,8 @@ from extension.project_file import file_as_markdown, rst_as_markdown
 
 __all__ = ["setup"]
 
+_log = logging.getLogger(__name__)
+
 
 def _directive(write: Callable[..., str], arguments: int, more: int = 0) -> type[SphinxDirective]:
     """Return a directive that shows what a function writes of its arguments."""
@@ -25,7 +28,12 @@ def _directive(write: Callable[..., str], arguments: int, more: int = 0) -> type
         optional_arguments = more
 
         def run(self) -> list[nodes.Node]:
-            return self.parse_text_to_nodes(write(*self.arguments), allow_section_headings=True)
+            try:
+                text = write(*self.arguments)
+            except ImportError as error:  # where rosdoc2 runs without the libraries of the package
+                text = f"*Not written here: {error}.*"
+                _log.warning("%s: %s", self.name, error)
+            return self.parse_text_to_nodes(text, allow_section_headings=True)
 
     return Written
 
