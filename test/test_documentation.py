@@ -88,4 +88,4 @@ def test_a_name_without_a_meaning_is_refused():
         require_all("keys", ["old", "new"], ["old"])
     with pytest.raises(ValueError, match=r"no code has: \['gone'\]"):
         require_all("keys", ["old"], ["old", "gone"])
-    assert meanings()["graph"].keys() == {"identifier", "simulator", "pressure_source"}
+    assert meanings()["graph"].keys() == {"dashboard", "identifier", "simulator", "pressure_source"}

@@ -29,6 +29,7 @@ _WRITERS = {
     "identifier/alerts.py": ("_mark",),
     "identifier/history_writer.py": ("values",),
     "identifier/schedule.py": ("values",),
+    "identifier/valve_inputs.py": ("values",),
     "plumbing/readiness.py": ("values",),
 }
 """Functions that write keys, by file below ``valve_friction_ros/nodes``."""

@@ -23,6 +23,7 @@ def _running(node: str) -> Iterator[object]:
     import rclpy
 
     from valve_friction_ros.alerts import AlertSender
+    from valve_friction_ros.nodes.dashboard.node import Dashboard
     from valve_friction_ros.nodes.identifier.node import Identifier
     from valve_friction_ros.nodes.identifier.workers import Workers
     from valve_friction_ros.nodes.plumbing.worker import Worker
@@ -32,6 +33,7 @@ def _running(node: str) -> Iterator[object]:
     workers = Workers(Worker("identify"), Worker("files"), Worker("evidence"), AlertSender())
     made = {
         "identifier": lambda: Identifier(workers),
+        "dashboard": Dashboard,
         "simulator": Simulator,
         "pressure_source": PressureSource,
     }

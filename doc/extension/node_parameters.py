@@ -14,6 +14,7 @@ NODES = {
     "identifiers": "identifiers",
     "simulator": "simulator",
     "pressure_source": "pressure_source",
+    "dashboard": "dashboard.parameters",
 }
 """Module of each node that has its `PARAMETERS`, below ``valve_friction_ros.nodes``."""
 

@@ -15,6 +15,7 @@ PAGE = Path(__file__).resolve().parents[2] / "doc" / "reference" / "nodes.md"
         ("identifier", {"stem_command", "~/friction/mass", "~/identify"}),
         ("simulator", {"actuator_pressure", "stem_state"}),
         ("pressure_source", {"actuator_pressure"}),
+        ("dashboard", {"/diagnostics"}),
     ],
 )
 def test_each_topic_and_service_has_a_meaning(node, some):
