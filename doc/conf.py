@@ -28,7 +28,6 @@ suppress_warnings = ["ref.python"]  # a word in a docstring that names several t
 autodoc_member_order = "groupwise"
 autodoc_typehints = "none"  # the docstrings have them
 napoleon_google_docstring = False
-napoleon_use_ivar = True
 
 html_theme = "sphinx_rtd_theme"
 html_theme_options = {"navigation_depth": 2}

@@ -48,6 +48,12 @@ def _keep_bars(*event: Any) -> None:
             lines[place] = "``".join(parts)
 
 
+def _skip_aliases(*event: Any) -> bool | None:
+    """Leave out the fields of a named tuple, which its docstring describes."""
+    found = event[3]
+    return True if type(found).__name__ == "_tuplegetter" else None
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Add the directives."""
     app.add_directive("node-parameters", _directive(parameters_as_markdown, 1, 1))
@@ -62,4 +68,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     ):
         app.add_directive(name, _directive(write, arguments))
     app.connect("autodoc-process-docstring", _keep_bars)
+    app.connect("autodoc-skip-member", _skip_aliases)
     return {"parallel_read_safe": True}
