@@ -93,6 +93,13 @@ browser:  ## Chromium for the tests of pages, by apt-get where root runs make; t
 	        apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null; \
 	else echo "make: tests of pages in a browser are skipped: run \`apt install chromium\`"; fi
 
+.PHONY: docs
+docs:  ## the documentation as pages, build/docs/index.html
+	@$(python-found)
+	@$(INSTALL) docs
+	@"$(VENV)/bin/python" -m sphinx --builder html --fail-on-warning --keep-going --quiet doc build/docs
+	@echo "build/docs/index.html"
+
 .PHONY: accuracy
 accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--seeds 3" for less
 	@"$(VENV)/bin/python" -m benchmark.accuracy $(ACCURACY_ARGS)

@@ -1,8 +1,8 @@
 """Make or reuse a virtual environment: `python3 requirements/install.py .venv [WORD]`.
 
 run.txt goes in, ros.txt where no ROS 2 Jazzy is sourced, the package itself as an editable install;
-with the word `dashboard` dashboard.txt too, with `test` dashboard.txt and test.txt; with `oldest`
-oldest.txt in place of them all.
+with the word `dashboard` dashboard.txt too, with `test` also test.txt, with `docs` also docs.txt;
+with `oldest` oldest.txt in place of them all.
 It is made anew when Python, ROS or one of the files changed. Where the versions of oldest.txt
 cannot be had, it ends with one line and the exit code 3.
 This file must parse on any Python, to say that it is too old.
@@ -18,10 +18,12 @@ PROJECT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 NOT_HERE = 3
 """Exit code where this machine can have no such environment."""
 MESSAGES = ("diagnostic_msgs", "sensor_msgs", "std_msgs", "std_srvs")
-ADDED = {
-    "dashboard": [("dashboard", "the dashboard needs")],
-    "test": [("dashboard", "the dashboard needs"), ("test", "checks the package")],
-}
+ORDER = [
+    ("dashboard", "the dashboard needs"),
+    ("test", "checks the package"),
+    ("docs", "builds the documentation"),
+]
+ADDED = {ORDER[last][0]: ORDER[: last + 1] for last in range(len(ORDER))}
 """The files that a word adds to run.txt, in this order, and what they hold."""
 
 
@@ -36,12 +38,15 @@ def skip(reason):
     sys.exit(NOT_HERE)
 
 
-def check_python(oldest):
+def check_python(oldest, docs):
     """Refuse a Python that the pinned wheels do not serve, or that cannot make environments."""
     here = "%d.%d" % sys.version_info[:2]
     if not (3, 10) <= sys.version_info[:2] <= (3, 13):
         stop("Python 3.10 to 3.13 is needed and %s is %s: choose another, as in `make "
              "PYTHON=python3.12 demo`", sys.executable, here)  # fmt: skip
+    if docs and sys.version_info[:2] < (3, 11):
+        stop("the documentation needs Python 3.11 to 3.13 and %s is %s: choose another, as in "
+             "`make PYTHON=python3.12 docs`", sys.executable, here)  # fmt: skip
     if oldest and sys.version_info[:2] > (3, 12):
         skip("requirements/oldest.txt is for CPython 3.10 to 3.12 and %s is %s; choose another, as "
              "in `make PYTHON=python3.12 test-oldest`" % (sys.executable, here))  # fmt: skip
@@ -94,7 +99,7 @@ def refuse_strange(path):
 def main(path, word):
     """Bring the environment at `path` up to date; its `made-by-make` holds what it came from."""
     oldest = word == "oldest"
-    check_python(oldest)
+    check_python(oldest, word == "docs")
     import venv
 
     system = sourced_ros()

@@ -18,6 +18,7 @@ from unittest.mock import MagicMock
 
 import pytest
 import rclpy
+from documentation import TEXT
 
 PROJECT = Path(__file__).resolve().parents[1]
 NAME = "valve_friction_ros"
@@ -146,7 +147,7 @@ def test_setup_names_every_library():
 
 
 def test_the_dashboard_is_an_extra():
-    """Its limits hold for what is pinned, and the README says how it is installed."""
+    """Its limits hold for what is pinned, and a page says how it is installed."""
     (needed,) = requirements("extras_require")["dashboard"]
     name, limits = parted(needed)
     lowest, highest = re.fullmatch(r">=(\d+\.\d+),<(\d+)", limits).groups()
@@ -154,7 +155,7 @@ def test_the_dashboard_is_an_extra():
     assert pinned.startswith(f"{lowest}.")
     assert int(pinned.partition(".")[0]) == int(highest) - 1
     for command in (f"pip install '{needed}'", "make venv-dashboard"):
-        assert command in (PROJECT / "README.md").read_text()
+        assert command in TEXT
 
 
 def test_the_oldest_versions_are_those_that_are_tested():
@@ -176,7 +177,7 @@ def test_the_remedy_is_the_extra():
     text = (PROJECT / NAME / "records" / "bags" / "libraries.py").read_text()
     remedy = re.search(r"pip install ([^`]+)`", text)[1]
     assert sorted(word.strip("'") for word in remedy.split()) == sorted(bags)
-    assert f"pip install {remedy}" in (PROJECT / "README.md").read_text()
+    assert f"pip install {remedy}" in TEXT
 
 
 def test_entry_points_exist():

@@ -1,30 +1,30 @@
-"""The README: its Python can be pasted, and its links lead somewhere."""
+"""README and pages: their Python and commands can be pasted, and their links lead somewhere."""
 
 import contextlib
 import re
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 import yaml
+from documentation import PAGES, PROJECT, README, snippets
 
 from valve_friction_ros.commands.main import run
 from valve_friction_ros.records.yaml_file import read_yaml
 
-PROJECT = Path(__file__).resolve().parents[1]
-README = (PROJECT / "README.md").read_text(encoding="utf-8")
+
+def test_the_readme_is_short():
+    assert PAGES[README].count("\n") < 180
 
 
-def test_the_notebook_section_runs(tmp_path, monkeypatch, capsys):
+def test_the_page_of_the_notebook_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    section = README.partition("## From a notebook\n")[2].partition("\n## ")[0]
-    snippets = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
-    assert len(snippets) == 2
+    found = snippets("python", PAGES[PROJECT / "doc" / "start" / "notebook.md"])
+    assert len(found) == 2
     names: dict[str, object] = {}
-    for snippet in snippets:
-        exec(compile(snippet, "README.md", "exec"), names)
+    for snippet in found:
+        exec(compile(snippet, "notebook.md", "exec"), names)
     printed = capsys.readouterr().out
     assert printed.startswith("parameter ")
     assert "friction is" in printed or "coulomb friction" in printed
@@ -45,9 +45,30 @@ NEED_NODES = (
 
 
 def offline_commands():
-    blocks = "".join(re.findall(r"```sh\n(.*?)```", README, re.DOTALL)).replace("\\\n", " ")
+    """Commands that need neither nodes nor minutes, each once."""
+    blocks = "".join(snippets("sh")).replace("\\\n", " ")
     commands = re.findall(r"^\.venv/bin/valve_friction (.*)$", blocks, re.MULTILINE)
-    return [each for each in commands if not each.startswith(NEED_NODES)]
+    each_once = dict.fromkeys(re.sub(r" {2,}", " ", one) for one in commands)
+    return [each for each in each_once if not each.startswith(NEED_NODES)]
+
+
+def test_the_examples_of_the_readme_print_its_table(monkeypatch, capsys):
+    monkeypatch.chdir(PROJECT)
+    (command,) = (one for one in offline_commands() if "one_minute.png" in one)
+    assert run(shlex.split(command.partition(" --plot")[0])) == 0
+    found = capsys.readouterr().out.splitlines()
+    shown = snippets("text", PAGES[README])[0].splitlines()
+    assert len(shown) == 8
+    for line, written in zip(found, shown, strict=False):
+        assert [word for word in line.split() if not word[0].isdigit()] == [
+            word for word in written.split() if not word[0].isdigit()
+        ]
+    assert float(found[3].split()[1]) == pytest.approx(float(shown[3].split()[1]), rel=1e-3)
+    (snippet,) = snippets("python", PAGES[README])
+    exec(compile(snippet, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert printed.startswith("parameter ")
+    assert "friction is 2.0" in printed
 
 
 def test_options_describe_a_table_as_its_valve_file_does(tmp_path, monkeypatch, capsys):
@@ -111,14 +132,22 @@ def test_the_examples_are_what_their_script_makes(tmp_path):
         assert sum(one != other for one, other in zip(made, kept, strict=True)) < 10
 
 
-@pytest.mark.parametrize("target", sorted(set(re.findall(r"\]\(([^)]+)\)", README))))
-def test_links_lead_somewhere(target):
-    if target.startswith("http"):
-        pytest.skip("another site")
+def links():
+    for page, text in PAGES.items():
+        for target in sorted(set(re.findall(r"\]\(([^)\s]+)\)", text))):
+            if not target.startswith("http"):
+                yield pytest.param(page, target, id=f"{page.relative_to(PROJECT)}:{target}")
+
+
+def anchors(page):
+    headings = re.findall(r"^#+ (.+)$", PAGES[page], re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", each.lower()).replace(" ", "-") for each in headings}
+
+
+@pytest.mark.parametrize(("page", "target"), links())
+def test_links_lead_somewhere(page, target):
     path, _, anchor = target.partition("#")
-    if path:
-        assert (PROJECT / path).exists()
-    else:
-        headings = re.findall(r"^#+ (.+)$", README, re.MULTILINE)
-        slugs = {re.sub(r"[^\w\- ]", "", each.lower()).replace(" ", "-") for each in headings}
-        assert anchor in slugs
+    found = (page.parent / path).resolve() if path else page
+    assert found.exists()
+    if anchor:
+        assert anchor in anchors(found)

@@ -12,6 +12,7 @@ import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
+from extension.diagnostic_keys import is_explained
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -442,7 +443,11 @@ def stamp_of(time_message):
 
 
 def values_of(status):
-    return {entry.key: entry.value for entry in status.values}
+    """Values of a diagnostic by key; the reference explains each key that any test meets."""
+    values = {entry.key: entry.value for entry in status.values}
+    strange = [key for key in values if not is_explained(key)]
+    assert not strange, f"doc/extension/meanings.yaml does not explain {strange}"
+    return values
 
 
 def buffered(status):

@@ -122,8 +122,6 @@ class FrictionMonitor:
     ----------
     buffer : RecordBuffer
         The last seconds of both signals.
-    baseline : Baseline or None
-        The healthy valve. Setting it drops the numbers of the valve from before the latest result.
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
@@ -139,7 +137,7 @@ class FrictionMonitor:
 
     @property
     def baseline(self) -> Baseline | None:
-        """The healthy valve."""
+        """The healthy valve; setting it drops its numbers from before the latest result."""
         return self._baseline
 
     @baseline.setter

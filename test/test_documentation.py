@@ -1,0 +1,91 @@
+"""The pages of the reference hold what the code declares."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+from extension.command_options import command_as_markdown, command_names, parser_of
+from extension.diagnostic_keys import declared_keys, entries, is_explained
+from extension.history_schema import schema, schema_as_markdown
+from extension.meanings import meanings, require_all
+from extension.node_parameters import NODES, parameter_entries, parameters_as_markdown
+
+from valve_friction_ros.nodes.identifier.parameters import PARAMETERS
+
+PROJECT = Path(__file__).resolve().parents[1]
+REFERENCE = PROJECT / "doc" / "reference"
+
+
+def shown(name):
+    return (REFERENCE / f"{name}.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_a_page_shows_the_parameters_of_each_node(node):
+    assert re.search(rf"^```{{node-parameters}} {node}\b", shown("nodes"), re.MULTILINE)
+    for entry in parameter_entries(node):
+        assert entry.meaning.count(" ") >= 2, entry.term
+        assert entry.facts.startswith(("`", "empty")), entry.term
+
+
+def test_each_parameter_has_its_description_unit_and_default():
+    text = parameters_as_markdown("identifier")
+    for spec in PARAMETERS:
+        assert re.search(r" \[[^\]]+\]", spec.description), f"{spec.name} has no unit"
+        assert f"`{spec.name}`\n: " in text
+    assert (
+        "`window`\n: `60.0` s; 0.1 to 86400\n\n"
+        "  Length of the record that is kept and identified.\n"
+    ) in text
+    assert "`joint`\n: `stem`; at start only\n" in text
+    assert "`valve_tag`\n: empty; at start only\n" in text
+
+
+def test_a_page_shows_each_sub_command_with_all_its_options():
+    page = shown("commands")
+    for command in command_names():
+        assert f"## {command}\n\n```{{command-options}} {command}\n" in page
+        text = command_as_markdown(command)
+        for action in parser_of(command)._actions:
+            for option in set(action.option_strings) - {"-h", "--help"}:
+                assert re.search(rf"`[^`]*{option}\b[^`]*`\n: \S", text), (command, option)
+
+
+def test_each_key_of_diagnostics_has_a_meaning():
+    assert len(declared_keys()) > 100
+    page = shown("diagnostics")
+    for section, keys in entries().items():
+        assert f"```{{diagnostic-keys}} {section}\n" in page
+        assert all(entry.meaning for entry in keys)
+    assert is_explained("evidence spring_constant [N/m]")
+    assert is_explained("slip_force change low [N]")
+    assert not is_explained("spring_constancy [N/m]")
+
+
+def test_no_writer_of_keys_is_forgotten():
+    """Whatever offers `values` of a node's diagnostics is among those that are read."""
+    from extension.diagnostic_keys import _WRITERS
+
+    nodes = PROJECT / "valve_friction_ros" / "nodes"
+    for path in nodes.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.name == "values" and node.args.args:
+                name = path.relative_to(nodes).as_posix()
+                assert name == "identifier/watch.py" or "values" in _WRITERS[name]
+
+
+def test_each_column_of_the_history_has_a_meaning():
+    text = schema_as_markdown()
+    for table, columns in schema().items():
+        section = text.partition(f"## `{table}`\n")[2].partition("\n## ")[0]
+        for column in columns:
+            assert re.search(rf"^\| `{column.name}` \| [^|]+ \| [^|]+ \|$", section, re.MULTILINE)
+
+
+def test_a_name_without_a_meaning_is_refused():
+    with pytest.raises(ValueError, match=r"keys without a meaning .*\['new'\]"):
+        require_all("keys", ["old", "new"], ["old"])
+    with pytest.raises(ValueError, match=r"no code has: \['gone'\]"):
+        require_all("keys", ["old"], ["old", "gone"])
+    assert meanings()["graph"].keys() == {"dashboard", "identifier", "simulator", "pressure_source"}
