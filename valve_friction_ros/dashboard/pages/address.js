@@ -1,7 +1,10 @@
-// Keeps the state of the page in its address, and turns "/" into a jump to the search.
+// Keeps the state of the page in its address, turns "/" into a jump to the search, and looks often
+// for a dashboard that is back.
 export default {
   template: `<span hidden></span>`,
   mounted() {
+    // The socket is made after the elements. The usual 5000 ms keep a page waiting.
+    setTimeout(() => window.socket?.io?.reconnectionDelayMax?.(1500), 1000);
     this.jump = (event) => {
       const typing = /^(INPUT|TEXTAREA|SELECT)$/.test(document.activeElement?.tagName);
       const search = document.querySelector("input[type=search], .vf-search input");
