@@ -97,7 +97,7 @@ def _nodes() -> list[NodeProcess]:
     }
     return [
         NodeProcess("identifier", monitored),
-        NodeProcess("simulator", {"position_noise": 1e-5, "noise_seed": 1}),  # low friction
+        NodeProcess("simulator", {"position_noise": 3e-6, "noise_seed": 1}),  # low friction
         NodeProcess(
             "pressure_source", {"pressure_noise": 20.0, "time_jitter": 5e-5, "noise_seed": 2}
         ),
