@@ -10,7 +10,9 @@ from valve_friction_ros.commands.main import main
 
 QUICKER = {
     "identifier": {"derivative_window": 5, "fixed.mass": 1.64},
-    "pressure_source": {"sample_rate": 100.0, "speed": 6.0},
+    # So few samples in so short a window average little: a tenth of the noise.
+    "simulator": {"position_noise": 1e-6},
+    "pressure_source": {"sample_rate": 100.0, "speed": 6.0, "pressure_noise": 2.0},
 }
 UNDER_WAY = 10.4
 """Signal let pass after the change, s: the same two seconds of real time, and some."""

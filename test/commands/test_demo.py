@@ -15,6 +15,7 @@ import pytest
 from rich.console import Console
 
 from valve_friction_ros.commands.demo import command as demo
+from valve_friction_ros.commands.demo import plant
 from valve_friction_ros.commands.demo.bench_client import BenchError
 from valve_friction_ros.commands.demo.outcome import TOLERANCES, Outcome, identified
 from valve_friction_ros.figures import Case
@@ -31,9 +32,9 @@ from valve_friction_ros.nodes.plumbing.valve_parameters import KARNOPP_PARAMETER
 
 PNG = b"\x89PNG\r\n\x1a\n"
 ASKED = {
-    "viscous_friction": 0.001,
-    "coulomb_friction": 0.001,
-    "spring_constant": 0.001,
+    "viscous_friction": 0.02,
+    "coulomb_friction": 0.01,
+    "spring_constant": 0.002,
     "mass": 0.1,
 }
 
@@ -278,10 +279,48 @@ class TestOptions:
 def test_nodes_start_as_the_bench_valve():
     nodes = {node.executable: node.parameters for node in demo._nodes()}
     assert set(nodes) == {"identifier", "simulator", "pressure_source"}
-    assert nodes["simulator"] == {}
+    assert not {one.name for one in KARNOPP_PARAMETERS} & nodes["simulator"].keys()
     assert all(getattr(LOW_FRICTION, one.name) == one.default for one in KARNOPP_PARAMETERS)
     bias = LOW_FRICTION.spring_preload / LOW_FRICTION.spring_constant
     assert nodes["identifier"]["position_bias"] == bias
+
+
+def test_a_demo_without_noise_would_prove_nothing():
+    nodes = {node.executable: node.parameters for node in demo._nodes()}
+    assert nodes["simulator"]["position_noise"] >= 3e-6
+    assert nodes["pressure_source"]["pressure_noise"] > 0
+    assert nodes["pressure_source"]["time_jitter"] > 0
+    # Of one seed, the noise of both would be the same numbers.
+    assert nodes["simulator"]["noise_seed"] != nodes["pressure_source"]["noise_seed"]
+
+
+class TestPlant:
+    def test_each_packing_has_its_fate(self):
+        steps = {one.fate: [one.friction(step) for step in range(30)] for one in plant.VALVES}
+        assert steps["healthy"] == [300.0] * 30
+        assert steps["tightening"] == sorted(steps["tightening"])
+        assert steps["tightening"][-1] == pytest.approx(900.0)
+        assert steps["leaking"] == sorted(steps["leaking"], reverse=True)
+        assert steps["leaking"][-1] == pytest.approx(90.0)
+        assert {each[0] for each in steps.values()} == {300.0}
+
+    def test_no_two_sensors_have_the_same_noise(self, tmp_path):
+        seeds = [
+            node.parameters["noise_seed"]
+            for number, valve in enumerate(plant.VALVES)
+            for node in plant.plant_nodes(valve, number, tmp_path / "history.sqlite")
+            if node.executable != "identifier"
+        ]
+        assert len(set(seeds)) == len(seeds) == 6
+
+    def test_without_nicegui_it_says_so_in_one_line(self, command, monkeypatch):
+        monkeypatch.setitem(sys.modules, "nicegui", None)
+        monkeypatch.setattr(plant.importlib.util, "find_spec", lambda _: None)
+        monkeypatch.setattr(demo, "free_domain", pytest.fail)
+        code, out, err = command("demo", "--dashboard")
+        assert (code, out) == (2, "")
+        assert err.startswith("valve_friction demo: the dashboard needs NiceGUI: run `pip install")
+        assert err.count("\n") == 1
 
 
 def children(pid):
@@ -333,7 +372,7 @@ def test_the_whole_story(ros_environment, tmp_path):
     )
     assert [loose[0], tight[0]] == ["152.7", "606"]
     for true, published, refined_value, half_width in (loose, tight):
-        assert float(published) == pytest.approx(float(true), rel=1e-3)
+        assert float(published) == pytest.approx(float(true), rel=TOLERANCES["coulomb_friction"])
         assert abs(float(refined_value) - float(true)) <= 3 * float(half_width)
     assert len(re.findall(r"static_friction N \S+ \S+ \S+ % – not identifiable", words)) == 2
     said = re.search(

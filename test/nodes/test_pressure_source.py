@@ -1,4 +1,7 @@
-"""The bench's pressure over topics: the signal behind the converter, stamped without jitter."""
+"""The bench's pressure over topics: the signal behind the converter, and its stamps."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -103,3 +106,29 @@ def test_isa_steps(live):
     first = place_in(expected, pressure)
     np.testing.assert_allclose(pressure, expected[first : first + 200], rtol=1e-12)
     assert np.unique(pressure).size > 5
+
+
+def test_jitter_is_of_the_time_alone_and_bounded(live):
+    """Stamps leave the grid by up to the jitter either way; the pressures are as before."""
+    jitter = 1e-3
+    stamps, pressure = heard(live, {**PARAMETERS, "time_jitter": jitter}, 2 * ONE_PERIOD)
+    expected = published(WAVE)
+    first = place_in(expected, pressure)
+    np.testing.assert_allclose(pressure, expected[first : first + pressure.size], rtol=1e-12)
+    off = (stamps - stamps[0]) / SECOND - np.arange(stamps.size) / RATE
+    off -= (off.max() + off.min()) / 2
+    assert np.abs(off).max() <= 1.001 * jitter
+    assert off.std() == pytest.approx(jitter / np.sqrt(3), rel=0.1)
+    assert np.all(np.diff(stamps) > 0)
+
+
+@pytest.mark.usefixtures("ros_environment")
+def test_jitter_of_half_a_period_is_refused():
+    done = subprocess.run(
+        [sys.executable, "-m", "valve_friction_ros.nodes.pressure_source", "--ros-args",
+         "-p", "sample_rate:=200.0", "-p", "time_jitter:=0.0025"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("cannot start: time_jitter (0.0025 s) must be below half")
+    assert done.stderr.count("\n") == 1

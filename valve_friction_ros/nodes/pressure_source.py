@@ -83,7 +83,14 @@ PARAMETERS = (
         (0.0, 1e9),
         True,
     ),
-    ParameterSpec("noise_seed", 0, "Seed of the noise [-]", (0, 2**31 - 1), True),
+    ParameterSpec(
+        "time_jitter",
+        0.0,
+        "Largest deviation of a sample's time, either way; below half of a period [s]",
+        (0.0, 1.0),
+        True,
+    ),
+    ParameterSpec("noise_seed", 0, "Seed of the noise and the jitter [-]", (0, 2**31 - 1), True),
 )
 
 
@@ -143,6 +150,12 @@ class PressureSource(PolledNode):
         self._speed = values["speed"]
         self._lag = values["converter_lag"]
         self._noise = values["pressure_noise"]
+        self._jitter = values["time_jitter"]
+        if not self._jitter < self._period / 2:
+            raise ValueError(
+                f"time_jitter ({self._jitter:g} s) must be below half of the sampling period "
+                f"({self._period:g} s): stamps would not rise"
+            )
         self._random = np.random.default_rng(values["noise_seed"])
         self._sent = 0
         self._before: tuple[float, float] | None = None
@@ -172,10 +185,13 @@ class PressureSource(PolledNode):
         pressure = self._response(self._excitation.sample(sample * self._period))
         if self._noise > 0:
             pressure = pressure + self._noise * self._random.standard_normal(count)
+        times = sample * self._period
+        if self._jitter > 0:
+            times = times + self._random.uniform(-self._jitter, self._jitter, count)
         message = FluidPressure(variance=self._noise**2)
         message.header.frame_id = "actuator"
-        for index, value in zip(sample, pressure, strict=True):
-            message.header.stamp = time_message(start + round(index * self._period * 1e9))
+        for seconds, value in zip(times, pressure, strict=True):
+            message.header.stamp = time_message(start + round(seconds * 1e9))
             message.fluid_pressure = float(value)
             self._publisher.publish(message)
         self._sent += count

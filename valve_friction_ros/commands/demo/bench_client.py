@@ -137,7 +137,7 @@ class BenchClient(Node):
         self.wait(future.done, timeout, f"answer of {what}")
         return future.result()
 
-    def trigger(self, service: str, timeout: float = 30.0) -> str:
+    def trigger(self, service: str, timeout: float = 120.0) -> str:
         """Call a Trigger service of the identifier and return its message."""
         if service not in self._triggers:
             name = f"{self._identifier}/{service}"

@@ -20,6 +20,7 @@ from valve_friction_ros.commands.demo.bench_processes import (
     running_nodes,
 )
 from valve_friction_ros.commands.demo.outcome import Outcome, identified, table_of
+from valve_friction_ros.commands.demo.plant import require_dashboard, show_plant
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.figures import friction_figure, require_picture_file, save_picture
@@ -60,6 +61,11 @@ def declare(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.png",
         help="picture of the result (%(default)s)",
     )
+    parser.add_argument(
+        "--dashboard",
+        action="store_true",
+        help="show three valves, healthy, tightening and leaking, on the dashboard until Ctrl-C",
+    )
 
 
 def _record(client: BenchClient, console: Console, label: str) -> None:
@@ -85,14 +91,16 @@ def _record(client: BenchClient, console: Console, label: str) -> None:
 def _nodes() -> list[NodeProcess]:
     monitored = {
         "position_bias": _POSITION_BIAS,
-        "assumed_mass": 1.6,
+        "fixed.mass": 1.6,  # weighed: noise hides it from a square wave
         "valve_tag": _NAMESPACE.upper().replace("_", "-"),
         "history_file": "''",  # empty, as ROS arguments write it: a demo is no plant's history
     }
     return [
         NodeProcess("identifier", monitored),
-        NodeProcess("simulator", {}),  # the bench valve, low friction
-        NodeProcess("pressure_source", {}),
+        NodeProcess("simulator", {"position_noise": 3e-6, "noise_seed": 1}),  # low friction
+        NodeProcess(
+            "pressure_source", {"pressure_noise": 20.0, "time_jitter": 5e-5, "noise_seed": 2}
+        ),
     ]
 
 
@@ -144,11 +152,14 @@ def _report(story: _Story, output: Path, console: Console) -> int:
 def run(options: argparse.Namespace) -> int:
     """Run the bench, and report what was seen."""
     console = OutputConsole(width=None if sys.stdout.isatty() else _PRINTED_WIDTH)
-    require_picture_file(options.output)
+    if options.dashboard:
+        require_dashboard()
+    else:
+        require_picture_file(options.output)
     os.environ.update(quick_discovery())
     with free_domain() as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
-        return _demonstrated(options, console)
+        return show_plant(console) if options.dashboard else _demonstrated(options, console)
 
 
 def _demonstrated(options: argparse.Namespace, console: Console) -> int:

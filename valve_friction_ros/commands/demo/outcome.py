@@ -22,16 +22,19 @@ __all__ = ["TOLERANCES", "Outcome", "identified", "table_of"]
 
 TOLERANCES = {
     "mass": 0.10,
-    "viscous_friction": 0.001,
-    "coulomb_friction": 0.001,
-    "static_friction": 0.01,
-    "spring_constant": 0.001,
-    "spring_preload": 0.001,
+    "viscous_friction": 0.02,
+    "coulomb_friction": 0.01,
+    "static_friction": 0.1,
+    "spring_constant": 0.002,
+    "spring_preload": 0.002,
 }
-"""Relative errors that a published estimate may have, by parameter."""
+"""Relative errors that a published estimate may have, by parameter, with the noise of the demo.
+
+The mass is given, 1.6 kg for both packings. A published F_s is read from single samples.
+"""
 _INTERVALS = 3.0
 """Half widths of its interval by which an identified value may be off."""
-_ANSWER_TIMEOUT = 30.0
+_ANSWER_TIMEOUT = 120.0
 _NEWEST = 2.0
 """Age, s, up to which a diagnosed estimate is the one just asked for."""
 

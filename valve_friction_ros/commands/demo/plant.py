@@ -1,0 +1,235 @@
+"""Three simulated valves on the dashboard: one healthy, one tightening, one leaking."""
+
+import contextlib
+import importlib.util
+import socket
+import subprocess
+import tempfile
+import time
+import webbrowser
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.signals import SignalHandlerOptions
+from rich.console import Console
+from std_srvs.srv import Trigger
+
+from valve_friction_ros.commands.demo.bench_client import BenchError
+from valve_friction_ros.commands.demo.bench_processes import NodeProcess, running_nodes
+from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.model import SquareWave
+
+__all__ = ["VALVES", "PlantValve", "plant_nodes", "require_dashboard", "show_plant"]
+
+_PORT = 8080
+_RATE = 200.0
+_RECORD = 2 * SquareWave().period
+_FRICTION = 300.0
+_START_TIMEOUT = 90.0
+_ANSWER_TIMEOUT = 120.0
+
+
+class PlantValve(NamedTuple):
+    """A valve of the plant, and what happens to its packing.
+
+    Attributes
+    ----------
+    name : str
+        Its namespace.
+    fate : str
+        What happens, in a word.
+    growth, end : float
+        Factor of its friction from one identification to the next, and after all of them.
+    """
+
+    name: str
+    fate: str
+    growth: float
+    end: float
+
+    def friction(self, step: int) -> float:
+        """Return its Coulomb friction at an identification, N."""
+        bound = max if self.growth < 1 else min
+        return _FRICTION * bound(self.growth**step, self.end)
+
+
+VALVES = (
+    PlantValve("fv_101", "healthy", 1.0, 1.0),
+    PlantValve("fv_102", "tightening", 1.15, 3.0),
+    PlantValve("fv_103", "leaking", 0.85, 0.3),
+)
+
+
+def require_dashboard() -> None:
+    """Raise BenchError where NiceGUI is not installed."""
+    if importlib.util.find_spec("nicegui") is None:
+        raise BenchError(
+            "the dashboard needs NiceGUI: run `pip install 'nicegui>=3.18,<4'`, or `make demo "
+            "DEMO_ARGS=--dashboard`"
+        )
+
+
+def plant_nodes(valve: PlantValve, number: int, history: Path) -> list[NodeProcess]:
+    """Return the nodes of a valve: a slow sine, noise of 10 µm and 20 Pa, jitter of 1 ms."""
+    return [
+        NodeProcess(
+            "identifier",
+            {
+                "valve_tag": valve.name.upper().replace("_", "-"),
+                "history_file": history,
+                "window": _RECORD,
+            },
+        ),
+        NodeProcess(
+            "simulator",
+            {
+                **_packing(valve.friction(0)),
+                "viscous_friction": 1.0e4,
+                "mass": 1.6,
+                "position_noise": 1e-5,
+                "noise_seed": 2 * number + 1,
+            },
+        ),
+        NodeProcess(
+            "pressure_source",
+            {
+                "excitation": "sine",
+                "sample_rate": _RATE,
+                "pressure_noise": 20.0,
+                "time_jitter": 1e-3,
+                "noise_seed": 2 * number + 2,
+            },
+        ),
+    ]
+
+
+def _packing(friction: float) -> dict[str, float]:
+    return {"coulomb_friction": friction, "static_friction": friction}
+
+
+class _Plant:
+    """A client of all valves."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        # Made long before their use: an answer to a client that is not yet discovered is lost.
+        self._triggers = {
+            (valve.name, service): node.create_client(
+                Trigger, f"/{valve.name}/identifier/{service}"
+            )
+            for valve in VALVES
+            for service in ("identify", "set_baseline", "clear")
+        }
+        self._simulators = {
+            valve.name: AsyncParameterClient(node, f"/{valve.name}/simulator") for valve in VALVES
+        }
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+
+    def rest(self, seconds: float) -> None:
+        """Let time pass."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def wait_for_services(self) -> None:
+        """Wait until all have been met; raises BenchError if one is not there in time."""
+        deadline = time.monotonic() + _START_TIMEOUT
+        clients = [*self._triggers.values(), *self._simulators.values()]
+        while not all(
+            one.services_are_ready()
+            if isinstance(one, AsyncParameterClient)
+            else one.service_is_ready()
+            for one in clients
+        ):
+            if time.monotonic() > deadline:
+                raise BenchError(f"no answer of the nodes within {_START_TIMEOUT:g} s")
+            self.rest(0.1)
+
+    def call(self, valve: PlantValve, service: str) -> str:
+        """Call a service of an identifier; return its answer, also one without success."""
+        future = self._triggers[valve.name, service].call_async(Trigger.Request())
+        self._executor.spin_until_future_complete(future, _ANSWER_TIMEOUT)
+        answer = future.result()
+        return f"{service}: no answer" if answer is None else str(answer.message)
+
+    def turn(self, valve: PlantValve, values: Mapping[str, float]) -> None:
+        """Change the packing of a valve."""
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        future = self._simulators[valve.name].set_parameters_atomically(parameters)
+        self._executor.spin_until_future_complete(future, _ANSWER_TIMEOUT)
+
+
+def _tell(plant: _Plant, console: Console) -> None:
+    """Identify all valves again and again, each time with the packing of the next step."""
+    step = 0
+    while True:
+        for valve in VALVES:
+            plant.turn(valve, _packing(valve.friction(step)))
+            plant.call(valve, "clear")
+        plant.rest(_RECORD)
+        for valve in VALVES:
+            answer = plant.call(valve, "identify")
+            if step == 0:
+                answer = plant.call(valve, "set_baseline")
+            says = f"{valve.name} ({valve.fate}, F_c {valve.friction(step):.0f} N): {answer}"
+            console.print(says, highlight=False, markup=False)
+        step += 1
+
+
+def _free_port() -> int:
+    """Return the usual port, or any other that is free."""
+    with socket.socket() as tried:
+        for port in (_PORT, 0):
+            with contextlib.suppress(OSError):
+                tried.bind(("127.0.0.1", port))
+                break
+        found: int = tried.getsockname()[1]
+        return found
+
+
+def _wait_for_page(process: subprocess.Popen[bytes], port: int) -> None:
+    deadline = time.monotonic() + _START_TIMEOUT
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            break
+        with socket.socket() as tried:
+            if tried.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.1)
+    raise BenchError(f"the dashboard did not open port {port} within {_START_TIMEOUT:g} s")
+
+
+def show_plant(console: Console) -> int:
+    """Run three valves and the dashboard until Ctrl-C."""
+    port = _free_port()
+    with contextlib.ExitStack() as running, contextlib.suppress(KeyboardInterrupt):
+        folder = running.enter_context(tempfile.TemporaryDirectory(prefix="valve_friction_demo"))
+        history = Path(folder) / "history.sqlite"
+        shown = NodeProcess("dashboard", {"port": port, "history_file": history})
+        (dashboard,) = running.enter_context(running_nodes([shown], ""))
+        for number, valve in enumerate(VALVES):
+            nodes = plant_nodes(valve, number, history)
+            running.enter_context(running_nodes(nodes, valve.name))
+        _wait_for_page(dashboard, port)
+        address = f"http://127.0.0.1:{port}/"
+        console.print(f"the dashboard is at {address} until Ctrl-C", highlight=False)
+        webbrowser.open(address)
+        # Ctrl-C is Python's own: the handler of rclpy would end the context under the client.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        running.callback(rclpy.try_shutdown)
+        plant = _Plant(rclpy.create_node("demo"))
+        running.callback(plant.close)
+        plant.wait_for_services()
+        _tell(plant, console)
+    return ExitCode.DONE
