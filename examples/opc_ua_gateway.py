@@ -1,0 +1,113 @@
+"""A gateway from OPC UA: two variables of a server become the inputs of a valve's identifier.
+
+``python examples/opc_ua_gateway.py --ros-args -r __ns:=/fv_101 -p url:=opc.tcp://plc:4840/ ...``;
+Ctrl-C ends it. It needs asyncua (``pip install asyncua``). Copy it, and change what differs.
+"""
+
+import asyncio
+import contextlib
+from datetime import datetime, timezone
+from typing import Any
+
+import rclpy
+from asyncua import Client, ua
+from builtin_interfaces.msg import Time
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import FluidPressure, JointState
+
+LOST = (OSError, asyncio.TimeoutError, ua.UaError)
+"""What a server that is away, or ends, raises."""
+PARAMETERS = {
+    "url": "opc.tcp://localhost:4840/",
+    "pressure_node": "ns=2;s=FV-101.pressure",
+    "position_node": "ns=2;s=FV-101.position",
+    "pressure_scale": 1e5,  # Pa in a unit of the server: bar
+    "position_scale": 0.0,  # m in a unit of the server: for percent the travel over 100
+    "position_at_zero": 0.0,  # m where the server says 0; the travel, and a scale below 0, where
+    # the opening of an air-to-close valve is served
+    "sampling": 20.0,  # ms between two samples that the server is asked for
+}
+
+
+class OpcUaGateway(Node):
+    """Publishes each change of the two variables, with the stamp of its source."""
+
+    def __init__(self) -> None:
+        super().__init__("opc_ua_gateway")
+        for name, default in PARAMETERS.items():
+            self.declare_parameter(name, default)
+        if not self.value("position_scale"):
+            raise SystemExit("opc_ua_gateway: set position_scale, m in a unit of the server")
+        self._pressures = self.create_publisher(FluidPressure, "actuator_pressure", 1000)
+        self._stems = self.create_publisher(JointState, "stem_state", 1000)
+
+    def value(self, name: str) -> Any:
+        """Return a parameter."""
+        return self.get_parameter(name).value
+
+    def datachange_notification(self, node: Any, value: float, data: Any) -> None:
+        """Publish a sample; asyncua calls it for each. A bad or unstamped one is left out."""
+        given = data.monitored_item.Value
+        stamp = _time(given.SourceTimestamp)
+        if stamp is None or not given.StatusCode.is_good():
+            return
+        if node.nodeid.to_string() == self.value("pressure_node"):
+            pressure = FluidPressure(fluid_pressure=value * self.value("pressure_scale"))
+            pressure.header.stamp = stamp
+            self._pressures.publish(pressure)
+        else:
+            place = self.value("position_at_zero") + value * self.value("position_scale")
+            stem = JointState(name=["stem"], position=[place])
+            stem.header.stamp = stamp
+            self._stems.publish(stem)
+
+    def _request(self, node: Any, handle: int) -> ua.MonitoredItemCreateRequest:
+        """Ask for each sample: a server tells only changes of the value unless it is asked."""
+        always = ua.DataChangeFilter(Trigger=ua.DataChangeTrigger.StatusValueTimestamp)
+        return ua.MonitoredItemCreateRequest(
+            ItemToMonitor=ua.ReadValueId(NodeId=node.nodeid, AttributeId=ua.AttributeIds.Value),
+            MonitoringMode=ua.MonitoringMode.Reporting,
+            RequestedParameters=ua.MonitoringParameters(
+                ClientHandle=handle,
+                SamplingInterval=self.value("sampling"),
+                Filter=always,
+                QueueSize=1000,
+                DiscardOldest=True,
+            ),
+        )
+
+    async def follow(self) -> None:
+        """Follow the server, again and again if it is lost."""
+        log = self.get_logger()
+        while rclpy.ok():
+            try:
+                async with Client(self.value("url")) as client:
+                    names = ("pressure_node", "position_node")
+                    nodes = [client.get_node(self.value(name)) for name in names]
+                    subscription = await client.create_subscription(100.0, self)
+                    await subscription.create_monitored_items(
+                        [self._request(node, handle) for handle, node in enumerate(nodes, 1)]
+                    )
+                    log.info(f"ready: follows {self.value('url')}")
+                    while rclpy.ok():
+                        await asyncio.sleep(0.5)
+                        await client.check_connection()
+            except LOST as error:  # noqa: PERF203 - it is the loop that tries again
+                log.warning(f"{self.value('url')} is lost, tried again: {error!r}")
+                await asyncio.sleep(1.0)
+
+
+def _time(given: datetime | None) -> Time | None:
+    """Return a time of OPC UA, which is UTC."""
+    if given is None:
+        return None
+    since = given.replace(tzinfo=timezone.utc) - datetime(1970, 1, 1, tzinfo=timezone.utc)
+    nanoseconds = (since.days * 86_400 + since.seconds) * 10**9 + since.microseconds * 1000
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+if __name__ == "__main__":
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(OpcUaGateway().follow())
