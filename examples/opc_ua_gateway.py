@@ -82,7 +82,7 @@ class OpcUaGateway(Node):
         log = self.get_logger()
         while rclpy.ok():
             try:
-                async with Client(self.value("url")) as client:
+                async with Client(self.value("url"), timeout=20.0) as client:
                     names = ("pressure_node", "position_node")
                     nodes = [client.get_node(self.value(name)) for name in names]
                     subscription = await client.create_subscription(100.0, self)
