@@ -35,6 +35,7 @@ from valve_friction_ros.health.known_numbers import DatedNumber, KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError
+from valve_friction_ros.health.standing_alarm import is_standing
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_diagnosis import (
     ValveDiagnosis,
@@ -82,6 +83,7 @@ __all__ = [
     "explains",
     "friction_words",
     "identify_snapshot",
+    "is_standing",
     "percentage",
     "qualified",
     "reference_by_evidence",

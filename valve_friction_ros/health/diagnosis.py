@@ -14,6 +14,7 @@ from valve_friction_ros.identification.trust.rounding import percentage, two_dig
 from valve_friction_ros.model.valve import Valve
 
 __all__ = [
+    "DOUBT",
     "Diagnosis",
     "EarlierEstimate",
     "FrictionLimits",
@@ -22,10 +23,12 @@ __all__ = [
     "dead_band",
     "diagnose",
     "diagnose_again",
+    "is_compared",
     "percentage",
 ]
 
-_DOUBT = "the Karnopp model does not describe this valve"
+DOUBT = "the Karnopp model does not describe this valve"
+"""How the diagnosis of a valve begins that the model does not describe."""
 
 
 @dataclass(frozen=True)
@@ -238,15 +241,18 @@ def diagnose(
 
 
 def diagnose_again(
-    earlier: EarlierEstimate, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
+    earlier: EarlierEstimate,
+    kept: Diagnosis,
+    valve: Valve,
+    baseline: Baseline | None,
+    limits: FrictionLimits,
 ) -> Diagnosis:
     """Return the diagnosis of an estimate that was kept.
 
-    It is the one of that time, unless another baseline, or other limits, are in force and the kept
+    It is `kept`, that of its time, unless another baseline, or other limits, are in force and the
     frictions can be compared with them. Without a baseline it stays: an alarm does not end because
     the baseline of that time was not kept. A doubt about the model stays.
     """
-    kept = earlier.diagnosis
     is_same = (baseline, limits) == (earlier.baseline, earlier.limits)
     if baseline is None or is_same or any(one.value < 0 for one in _frictions(earlier)):
         return kept
@@ -254,7 +260,15 @@ def diagnose_again(
         return kept
     again = _by_size(earlier, valve, baseline, limits)
     doubt, _, _ = kept.message.partition(";")
-    return _doubted(again, doubt) if doubt.startswith(_DOUBT) else again
+    return _doubted(again, doubt) if doubt.startswith(DOUBT) else again
+
+
+def is_compared(result: Frictions, baseline: Baseline | None, limits: FrictionLimits) -> bool:
+    """Return whether a result says how its friction compares with the baseline."""
+    if baseline is None or any(one.value < 0 for one in _frictions(result)):
+        return False
+    found = compared(result.parameters, result.sliding_speed, baseline)
+    return found is not None or bool(_vanished(result, baseline, limits))
 
 
 def _by_size(
@@ -323,7 +337,7 @@ def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
     misfit = result.misfit
     if misfit is None or misfit.describes:
         return diagnosis
-    return _doubted(diagnosis, f"{_DOUBT} ({misfit.words} of misfit)")
+    return _doubted(diagnosis, f"{DOUBT} ({misfit.words} of misfit)")
 
 
 def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:

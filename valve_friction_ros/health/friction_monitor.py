@@ -12,11 +12,13 @@ from valve_friction_ros.health.diagnosis import (
     FrictionLimits,
     diagnose,
     diagnose_again,
+    is_compared,
 )
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
+from valve_friction_ros.health.standing_alarm import is_standing, standing, without_standing
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
@@ -110,6 +112,13 @@ def _ago(age: int) -> str:
     return f"{seconds // length:.0f} {unit} ago, "
 
 
+class _Compared(NamedTuple):
+    """The newest estimate whose friction could be compared with the baseline, and its time, ns."""
+
+    estimate: Result | EarlierEstimate
+    time: int
+
+
 class FrictionMonitor:
     """The monitor of one valve.
 
@@ -129,6 +138,7 @@ class FrictionMonitor:
         self._result: Result | None = None
         self._known = KnownNumbers()
         self._earlier: EarlierEstimate | None = None
+        self._compared: _Compared | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
         self._internal_error: str | None = None
@@ -137,12 +147,14 @@ class FrictionMonitor:
 
     @property
     def baseline(self) -> Baseline | None:
-        """The healthy valve; setting it drops its numbers from before the latest result."""
+        """The healthy valve; setting it drops what is known from before the latest result."""
         return self._baseline
 
     @baseline.setter
     def baseline(self, baseline: Baseline | None) -> None:
         self._baseline, self._known = baseline, self._known.since(self._stamp)
+        self._compared = None
+        self._follow_comparison()
 
     @property
     def settings(self) -> MonitorSettings:
@@ -218,10 +230,12 @@ class FrictionMonitor:
     def change_settings(self, settings: MonitorSettings) -> None:
         """Put new settings in force; a new window or valve empties the buffer.
 
-        With a new valve only the numbers of the latest record stay.
+        With a new valve only what the latest record says stays.
         """
         if settings.valve != self._settings.valve:
             self._known = self._known.only_latest()
+            self._compared = None
+            self._follow_comparison()
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear("valve or window parameters were changed")
@@ -238,12 +252,33 @@ class FrictionMonitor:
         """
         self._earlier, self._stamp = earlier, earlier.time
         self._known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
+        is_alarm = earlier.diagnosis.level is Level.ERROR or is_standing(earlier.diagnosis)
+        if is_alarm and self.baseline in (None, earlier.baseline):
+            self._compared = _Compared(earlier, earlier.time)
+        self._follow_comparison()
+
+    def renew(self, time: int) -> None:
+        """Begin anew with a packing of the time `time`, ns: alarms of older records end.
+
+        What the latest record itself says stays until the next one.
+        """
+        if self._compared is not None and self._compared.time <= time:
+            self._compared = None
 
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
         self._result, self._earlier, self._stamp = result, None, stamp
         self._known = self._known.followed_by(valve_numbers(result), stamp)
         self._refusal = self._internal_error = None
+        self._follow_comparison()
+
+    def _follow_comparison(self) -> None:
+        """Hold the latest estimate, if it can be compared, as the newest that could be."""
+        latest, limits = self.estimate, self._settings.limits
+        if latest is None or self._stamp is None:
+            return
+        if is_compared(latest, self.baseline, limits):
+            self._compared = _Compared(latest, self._stamp)
 
     def learn(self, numbers: Mapping[str, Measured], stamp: int) -> None:
         """Remember what a refused record shows of the valve, if anything, found at `stamp` (ns)."""
@@ -282,19 +317,33 @@ class FrictionMonitor:
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
 
     def _diagnosis_by_result(self, now: int | None) -> Diagnosis:
-        valve, limits = self._settings.valve, self._settings.limits
-        if self._result is not None:
-            diagnosis = diagnose(self._result, valve, self.baseline, limits)
-        elif self._earlier is not None:
-            diagnosis = diagnose_again(self._earlier, valve, self.baseline, limits)
-            if now is not None:
+        if (estimate := self.estimate) is not None:
+            diagnosis = self._with_alarm(estimate)
+            if self._earlier is not None and now is not None:
                 age = f"(identified {_ago(now - self._earlier.time)}before the restart)"
                 diagnosis = replace(diagnosis, message=f"{diagnosis.message} {age}")
         else:
             reason = self._refusal or "nothing has been identified yet"
             return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
-        diagnosis = qualified(diagnosis, self.common_factor, valve)
         if self._refusal is None:
             return diagnosis
         message = f"the latest identification was refused: {self._refusal}; before: "
         return replace(diagnosis, message=message + diagnosis.message)
+
+    def _with_alarm(self, estimate: Result | EarlierEstimate) -> Diagnosis:
+        """Return the diagnosis by the latest estimate, and the alarm that it does not end."""
+        latest, before = self._diagnosis_of(estimate), self._compared
+        if before is None or before.estimate is estimate or self.baseline is None:
+            return latest
+        limits = self._settings.limits
+        return standing(self._diagnosis_of(before.estimate), before.time, latest, limits)
+
+    def _diagnosis_of(self, estimate: Result | EarlierEstimate) -> Diagnosis:
+        valve, limits = self._settings.valve, self._settings.limits
+        if isinstance(estimate, Result):
+            found = diagnose(estimate, valve, self.baseline, limits)
+        else:
+            is_newest = self._compared is not None and self._compared.estimate is estimate
+            kept = estimate.diagnosis if is_newest else without_standing(estimate)
+            found = diagnose_again(estimate, kept, valve, self.baseline, limits)
+        return qualified(found, self.common_factor, valve)

@@ -123,6 +123,7 @@ class Identifier(PolledNode):
             results.publish(earlier, self._monitor)
         self._history.read_trend()
         self._usage = UsageWatch(self, self._monitor, self._history)
+        self._monitor.renew(self._usage.usage().renewal)
         self._response = ResponseWatch(self, self._history)
         self._reports = ReportWriter(
             self, self._monitor, self._history, self._usage, self._response
@@ -293,6 +294,7 @@ class Identifier(PolledNode):
         self._inputs.take()
         self._evidence.renew()
         self._response.renew()
+        self._monitor.renew(self.get_clock().now().nanoseconds)
         answer = await self._usage.reset()
         self._publish_diagnostics()
         return answer
