@@ -155,13 +155,13 @@ class UsageWatch:
         self._gather(is_end=True)
         used, since = self._since_renewal, self._renewal
         self._renewal = now = self._node.get_clock().now().nanoseconds
+        self._add_up()  # before others see the new packing, while its renewal is written
 
         def renew(file: HistoryFile) -> None:
             self._write(file)
             keep_renewal(file, self._history.valve, now)
 
         await self._history.keep_change(renew)
-        self._add_up()
         answer = (
             f"the packing counts from {_date(now)} on; the one before, "
             f"{f'of {_date(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
