@@ -113,6 +113,14 @@ class TestLimits:
         state = self.state(UsageLimits(travel=162.0))._replace(has_warned=True)
         assert state.warns
 
+    def test_what_has_warned_and_has_no_date_is_near_and_not_reached(self):
+        near = self.state(UsageLimits(travel=110.0), pace=None)._replace(has_warned=True)
+        assert near.warns
+        assert near.message == (
+            "packing life: 100 m of travel of 110 (travel_limit), near its limit (warned before): "
+            "renew the packing, then call ~/reset_usage"
+        )
+
     def test_what_has_warned_is_found_again(self):
         """It warned at 3 m a day; then the valve rests."""
         used = [*days(20, distance=3.0), *days(28, first=TODAY, distance=0.0)]

@@ -88,11 +88,15 @@ class LimitState(NamedTuple):
             if self.name == "travel_limit"
             else f"{self.used:.0f} reversals"
         )
-        state = f"of {self.limit:.6g} ({self.name}): reached"
-        if not self.is_reached and self.expected is not None:
-            day = utc(self.expected)
-            state = f"of {self.limit:.6g} ({self.name}), expected on {day:%Y-%m-%d}"
-        return f"packing life: {figures} {state}: renew the packing, then call ~/reset_usage"
+        state = ", near its limit (warned before)"
+        if self.is_reached:
+            state = ": reached"
+        elif self.expected is not None:
+            state = f", expected on {utc(self.expected):%Y-%m-%d}"
+        return (
+            f"packing life: {figures} of {self.limit:.6g} ({self.name}){state}: renew the packing, "
+            "then call ~/reset_usage"
+        )
 
 
 def limit_states(
