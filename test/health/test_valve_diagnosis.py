@@ -152,6 +152,33 @@ class TestCausesThatLookTheSame:
         assert "one common factor points to the scale of the pressure sensor" in finding.message
         assert "and the diaphragm area rather than to spring and packing" in finding.message
 
+    @pytest.mark.parametrize(
+        ("factor", "level"), [(0.75, WARN), (1.25, WARN), (0.6, ERROR), (1.4, ERROR)]
+    )
+    def test_a_factor_beyond_the_failure_of_a_spring_is_an_error(self, factor, level):
+        finding = only(found(**scaled(factor, *FORCES)))
+        assert (finding.level, finding.status_signal) == (level, FUNCTION)
+        assert "one common factor" in finding.message
+
+    @pytest.mark.parametrize("factor", [0.6, 1.4])
+    def test_a_slip_jump_that_a_factor_does_not_explain_is_told(self, factor):
+        common, slip = found(**scaled(factor, *FORCES), slip_force=(120.0, 5.0))
+        assert "one common factor" in common.message
+        assert slip.message.startswith("the slip jump has grown")
+
+    def test_a_slip_jump_that_a_factor_explains_is_not(self):
+        forces = scaled(4.0, *FORCES)
+        assert "one common factor" in only(found(**forces, slip_force=(80.0, 5.0))).message
+        assert len(found(**forces, slip_force=(180.0, 5.0))) == 2
+
+    def test_a_vague_viscous_friction_that_a_factor_does_not_explain_is_told(self):
+        forces = scaled(1.4, *FORCES[:-1])
+        common, viscous = found(**forces, viscous_friction=(2e4, 4e3))
+        assert "one common factor" in common.message
+        assert viscous.message.startswith("viscous friction has grown to 4")
+        forces = scaled(2.5, *FORCES[:-1])
+        assert len(found(**forces, viscous_friction=(1.3e4, 1.9e3))) == 1
+
     def test_the_noise_of_a_new_scale_is_no_finding_of_its_own(self):
         assert "one common factor" in only(found(**scaled(2.3, *FORCES, "drive_noise"))).message
         both = found(**scaled(2.3, *FORCES), **scaled(6.0, "drive_noise"))

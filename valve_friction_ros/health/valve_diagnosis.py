@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
@@ -110,15 +110,15 @@ def diagnose_numbers(
         valve,
         limits or ValveLimits(),
     )
-    common = [*_common_scale(case)]
-    single = [] if common else [*_spring(case), *_slip(case), *_viscous(case)]
+    factor = common_factor(case.changes, case.limits)
     return (
-        *common,
-        *single,
+        *(_spring(case) if factor is None else _common_scale(case, factor)),
+        *_slip(case, factor),
+        *_viscous(case, factor),
         *_preload(case),
         *_asymmetry(case),
         *stop_findings(case.now, case.healthy, case.valve, case.limits.stop_change),
-        *_noises(case, has_scaled=bool(common)),
+        *_noises(case, has_scaled=factor is not None),
         *_lag(case),
     )
 
@@ -173,16 +173,20 @@ def _by(change: Change, unit: str) -> str:
     return f"{change.value:+.3g} {unit} ({change.low:+.3g} to {change.high:+.3g})"
 
 
-def _common_scale(case: _Case) -> Iterator[Finding]:
-    """Find that all forces have changed by one factor, as by another scale of the drive."""
-    if (factor := common_factor(case.changes, case.limits)) is not None:
-        yield _check(
-            f"spring constant and friction have changed alike, to {_times(factor)} the baseline: "
-            f"one common factor points to {drive_scale(case.valve)} rather than to spring and "
-            "packing at once: check them",
-            "spring_constant",
-            "coulomb_friction",
-        )
+def _common_scale(case: _Case, factor: Change) -> Iterator[Finding]:
+    """Find that all forces have changed by one factor, as by another scale of the drive.
+
+    A change that would be the failure of a spring stays one, as nothing proves that it is sound.
+    """
+    share = case.limits.spring_failure
+    found = _check(
+        f"spring constant and friction have changed alike, to {_times(factor)} the baseline: "
+        f"one common factor points to {drive_scale(case.valve)} rather than to spring and "
+        "packing at once: check them",
+        "spring_constant",
+        "coulomb_friction",
+    )
+    yield replace(found, level=Level.ERROR) if factor.beyond(1 - share, 1 + share) else found
 
 
 def _spring(case: _Case) -> Iterator[Finding]:
@@ -279,9 +283,13 @@ def _preload_causes(case: _Case, shift: Change) -> list[str]:
     return causes
 
 
-def _slip(case: _Case) -> Iterator[Finding]:
+def _slip(case: _Case, factor: Change | None) -> Iterator[Finding]:
+    """Find that the slip jump has grown, unless all forces have by a factor that explains it."""
     growth, bound = case.changes.get("slip_force"), case.limits.slip_change * case.spring_force
     if growth is None or not growth.low > bound:
+        return
+    healthy = case.healthy["slip_force"].value
+    if factor is not None and growth.low <= healthy * (factor.high - 1):
         return
     jump = percentage(case.now["slip_force"].value / case.spring_force)
     yield _maintenance(
@@ -291,10 +299,12 @@ def _slip(case: _Case) -> Iterator[Finding]:
     )
 
 
-def _viscous(case: _Case) -> Iterator[Finding]:
-    ratio, factor = case.changes.get("viscous_friction"), case.limits.viscous_factor
-    way = 0 if ratio is None else ratio.beyond(1 / factor, factor)
-    if ratio is not None and way:
+def _viscous(case: _Case, factor: Change | None) -> Iterator[Finding]:
+    """Find that viscous friction has changed, unless all forces have alike."""
+    ratio, bound = case.changes.get("viscous_friction"), case.limits.viscous_factor
+    way = 0 if ratio is None else ratio.beyond(1 / bound, bound)
+    is_explained = factor is not None and ratio is not None and ratio.agrees_with(factor)
+    if ratio is not None and way and not is_explained:
         yield _maintenance(
             f"viscous friction has {'grown' if way > 0 else 'fallen'} to {_times(ratio)} the "
             "baseline: check packing and lubricant, and the air path of the actuator; a changed "
