@@ -123,7 +123,7 @@ class Identifier(PolledNode):
             results.publish(earlier, self._monitor)
         self._history.read_trend()
         self._usage = UsageWatch(self, self._monitor, self._history)
-        self._response = ResponseWatch(self, self._history)
+        self._response = ResponseWatch(self, self._monitor, self._history)
         self._reports = ReportWriter(
             self, self._monitor, self._history, self._usage, self._response
         )
