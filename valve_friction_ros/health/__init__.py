@@ -23,6 +23,7 @@ from valve_friction_ros.health.diagnosis import (
     dead_band,
     diagnose,
     diagnose_again,
+    leading_ratio,
     percentage,
 )
 from valve_friction_ros.health.friction_monitor import (
@@ -82,6 +83,7 @@ __all__ = [
     "explains",
     "friction_words",
     "identify_snapshot",
+    "leading_ratio",
     "percentage",
     "qualified",
     "reference_by_evidence",

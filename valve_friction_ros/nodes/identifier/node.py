@@ -344,7 +344,7 @@ class Identifier(PolledNode):
                 **self._readiness.values(),
             },
         )
-        self._alerts.follow(status, self._monitor.diagnosis())
+        self._alerts.follow(status, self._monitor.diagnosis(), findings)
         self._level_log.follow(status)
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"
