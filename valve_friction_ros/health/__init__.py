@@ -23,6 +23,7 @@ from valve_friction_ros.health.diagnosis import (
     dead_band,
     diagnose,
     diagnose_again,
+    leading_ratio,
     percentage,
 )
 from valve_friction_ros.health.friction_monitor import (
@@ -84,6 +85,7 @@ __all__ = [
     "friction_words",
     "identify_snapshot",
     "is_standing",
+    "leading_ratio",
     "percentage",
     "qualified",
     "reference_by_evidence",

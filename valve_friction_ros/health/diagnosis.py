@@ -1,13 +1,13 @@
 """From a result to the diagnosis: whether friction has grown or collapsed, and its consequence."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
-from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
@@ -24,6 +24,7 @@ __all__ = [
     "diagnose",
     "diagnose_again",
     "is_compared",
+    "leading_ratio",
     "percentage",
 ]
 
@@ -177,6 +178,18 @@ def dead_band(result: Frictions, valve: Valve) -> float:
     if math.isnan(static_friction):
         static_friction = coulomb_friction
     return valve.share_of_travel((coulomb_friction + static_friction) / spring_constant)
+
+
+def leading_ratio(diagnosis: Diagnosis, findings: Iterable[Finding], level: Level) -> float:
+    """Return the friction over its baseline that a level of a valve rests on; nan if on none.
+
+    A finding on the friction that leads comes before the latest identification, any other after it.
+    """
+    known = [f for f in findings if f.level == level and not math.isnan(f.friction_ratio)]
+    leading = [f.friction_ratio for f in known if f.leads]
+    if diagnosis.level == level and diagnosis.ratio is not None:
+        leading.append(diagnosis.ratio.value)
+    return [*leading, *(f.friction_ratio for f in known), math.nan][0]
 
 
 def _consequence(result: Frictions, valve: Valve) -> str:

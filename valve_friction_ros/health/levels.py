@@ -1,5 +1,6 @@
 """Severity of what is found on a valve."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
@@ -42,6 +43,8 @@ class Finding:
         Names of the numbers that it rests on, if any.
     leads : bool
         Whether it is about the friction, and newer or surer than the latest identification.
+    friction_ratio : float
+        Friction over its baseline that it rests on; nan if on none.
     """
 
     level: Level
@@ -49,6 +52,7 @@ class Finding:
     message: str
     numbers: tuple[str, ...] = field(default=(), compare=False)
     leads: bool = field(default=False, compare=False)
+    friction_ratio: float = field(default=math.nan, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a mapping of plain values: ``level``, ``ne_107`` and ``message``."""

@@ -111,26 +111,25 @@ def deviation_cause(moves: Sequence[Move], slope: float) -> Cause:
     """Return why a stem comes to rest where the command does not want it.
 
     Friction leaves it behind after moves of either direction. Where the stem is off to one side
-    after both, its pressure has been led there.
+    after both, its pressure has been led there, if the stem moves at all.
     """
-    errors = {
-        way: [m.steady_error for m in moves if m.settled and not m.at_stop and m.change * way > 0]
-        for way in (1.0, -1.0)
-    }
+    resting = [m for m in moves if m.settled and not m.at_stop]
+    follows = 2 * sum(m.moved for m in resting) > len(resting)
+    errors = {way: [m.steady_error for m in resting if m.change * way > 0] for way in (1.0, -1.0)}
     if min(map(len, errors.values())) < _FEWEST_OF_A_DIRECTION:
         return Cause.UNKNOWN
     up, down = (float(np.median(each)) for each in errors.values())
     size = float(np.median(np.abs([*errors[1.0], *errors[-1.0]])))
     offset, behind = abs(up + down) / 2, (up - down) / 2
     if offset >= _DOMINANT * size and abs(behind) <= (1 - _DOMINANT) * size:
-        return Cause.SETTING
+        return Cause.SETTING if follows else Cause.UNKNOWN
     if behind < _DOMINANT * size:
         return Cause.UNKNOWN
     pushes = [m.push * slope for m in moves if m.rested and not m.at_stop]
     push = float(np.percentile(pushes or [math.nan], 75))
     if push >= max(_STICKY, behind):
         return Cause.FRICTION
-    return Cause.SETTING if push <= _FREE < behind else Cause.UNKNOWN
+    return Cause.SETTING if follows and push <= _FREE < behind else Cause.UNKNOWN
 
 
 def blamed(moves: Sequence[Move], slope: float, cause_of: Callable[[Move, float], Cause]) -> Cause:

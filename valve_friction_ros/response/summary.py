@@ -19,6 +19,7 @@ from valve_friction_ros.response.blame import (
     travel_per_pressure,
 )
 from valve_friction_ros.response.hunting import Hunting
+from valve_friction_ros.response.ignored import has_ignored, ignored_steps, large_step
 from valve_friction_ros.response.move import Move
 
 __all__ = ["FIGURES", "SIZES", "ResponseLimits", "ResponseSummary", "Spread", "found", "summarised"]
@@ -31,9 +32,6 @@ FIGURES = ("dead_time", "t63", "t86", "overshoot", "steady_error", "steady_devia
 
 _FEWEST = 5
 """Moves whose median is compared with a limit."""
-
-_ANSWER_TIME = 5.0
-"""Time, s, for which a step must last before a stem that rests has ignored it."""
 
 
 class Spread(NamedTuple):
@@ -141,6 +139,19 @@ class ResponseSummary:
         """10 % quantile of those that it answered; nan if none."""
         return Spread.of([abs(m.change) for m in self.moves if m.moved]).low
 
+    def least_dead_time(self, dead_band: float = math.nan) -> Spread:
+        """Return the dead times, s, with the time that large steps which were ignored have lasted.
+
+        The latter is a lower bound. `dead_band` is a share of the travel, nan if not known.
+        """
+        large = large_step(self.moves, dead_band)
+        return Spread.of(
+            [
+                m.held if has_ignored(m) and abs(m.change) >= large else m.dead_time
+                for m in self.moves
+            ]
+        )
+
     def cause(self, which: str, limit: float = 0.0) -> Cause:
         """Return what is to blame for the `dead_time`, the `t86` or the `deviation`.
 
@@ -158,15 +169,15 @@ class ResponseSummary:
             m
             for m in self.moves
             if getattr(m, which) >= least
-            or (which == "dead_time" and m in self.ignored and m.held >= least)
+            or (which == "dead_time" and has_ignored(m) and m.held >= least)
         ]
         return blamed(slow, slope, cause_of)
 
 
 def summarised(moves: Sequence[Move]) -> ResponseSummary:
     """Summarise moves; those whose stem may still have answered count as neither."""
-    ignored = tuple(m for m in moves if not m.moved and m.held >= _ANSWER_TIME)
-    counted = [m for m in moves if m.moved or m in ignored]
+    ignored = tuple(m for m in moves if has_ignored(m))
+    counted = [m for m in moves if m.moved or has_ignored(m)]
     by_size = []
     for low, high in pairwise(SIZES):
         group = [m.moved for m in counted if low <= abs(m.change) < high]
@@ -190,12 +201,28 @@ def _warning(message: str) -> Finding:
 
 
 def found(
-    summary: ResponseSummary, limits: ResponseLimits, swinging: Hunting | None
+    summary: ResponseSummary,
+    limits: ResponseLimits,
+    swinging: Hunting | None,
+    dead_band: float = math.nan,
 ) -> list[Finding]:
-    """Say what is wrong with the answers: limits that the median of five moves passes, hunting."""
+    """Say what is wrong with the answers.
+
+    That is: large steps that are ignored, limits that the median of five moves passes, hunting. The
+    dead band is a share of the travel, nan if not known.
+    """
     findings = []
+    ignored = ignored_steps(summary.moves, dead_band)
+    if ignored is not None:
+        findings.append(
+            _warning(
+                f"the stem ignored {ignored.number} of the latest {len(ignored.latest)} steps of "
+                f"its command of {percentage(ignored.least)} of the travel or more: "
+                f"{ignored.remaining_causes}"
+            )
+        )
     for name, what, spread, limit in (
-        ("dead_time", "begins to move", summary.dead_time, limits.dead_time),
+        ("dead_time", "begins to move", summary.least_dead_time(dead_band), limits.dead_time),
         ("t86", "has moved by 86 %", summary.t86, limits.t86),
     ):
         if limit > 0 and spread.number >= _FEWEST and spread.median > limit:

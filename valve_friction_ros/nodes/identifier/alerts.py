@@ -2,12 +2,13 @@
 
 import math
 import time
+from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from valve_friction_ros.alerts import Alert, AlertSender
-from valve_friction_ros.health import Diagnosis, Level, StatusSignal
+from valve_friction_ros.health import Diagnosis, Finding, Level, StatusSignal, leading_ratio
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.service_parameters import (
     WEBHOOK_PERIOD,
@@ -39,8 +40,12 @@ class Alerts:
         self._told = level if self._kept is None else self._kept
         self._told_at = -math.inf if self._kept is None else time.monotonic()
 
-    def follow(self, status: DiagnosticStatus, diagnosis: Diagnosis) -> None:
+    def follow(
+        self, status: DiagnosticStatus, diagnosis: Diagnosis, findings: Sequence[Finding]
+    ) -> None:
         """Post the level of a status if it has changed; then add to it what became of alerts.
+
+        The level rests on the diagnosis of the friction, and on what else is found on the valve.
 
         What is wrong with the alerts themselves raises the level afterwards, and is not posted.
         """
@@ -55,7 +60,7 @@ class Alerts:
             self._keep(self._told)
         now = time.monotonic()
         if level != self._told and now - self._told_at >= period:
-            self._outbox.put(self._alert(status, self._told, level, diagnosis))
+            self._outbox.put(self._alert(status, level, leading_ratio(diagnosis, findings, level)))
             self._told, self._told_at = level, now
         self._mark(status, str(webhook))
 
@@ -65,19 +70,16 @@ class Alerts:
             self._kept = level
             self._history.keep_told_level(level)
 
-    def _alert(
-        self, status: DiagnosticStatus, old: Level, new: Level, diagnosis: Diagnosis
-    ) -> Alert:
+    def _alert(self, status: DiagnosticStatus, level: Level, ratio: float) -> Alert:
         values = {entry.key: entry.value for entry in status.values}
-        ratio = float(values.get("friction_ratio", math.nan))
         return Alert(
             valve=self._history.valve.tag,
             node=self._node.get_fully_qualified_name(),
-            old_level=old,
-            new_level=new,
+            old_level=self._told,
+            new_level=level,
             ne_107=values[_NE_107],
             message=status.message,
-            friction_ratio=ratio if diagnosis.level == new else None,
+            friction_ratio=ratio,
         )
 
     def _mark(self, status: DiagnosticStatus, place: str) -> None:

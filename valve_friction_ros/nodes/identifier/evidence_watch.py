@@ -122,7 +122,16 @@ class EvidenceWatch:
         message, leads = diagnosis.message, self._leads(diagnosis)
         if not leads:
             message += f" (until {_date(self._evidence.until)}, before that identification)"
-        return (Finding(diagnosis.level, diagnosis.status_signal, message, leads=leads),)
+        ratio = math.nan if diagnosis.ratio is None else diagnosis.ratio.value
+        return (
+            Finding(
+                diagnosis.level,
+                diagnosis.status_signal,
+                message,
+                leads=leads,
+                friction_ratio=ratio,
+            ),
+        )
 
     def _leads(self, diagnosis: Diagnosis) -> bool:
         """Return whether the moves are newer than the latest identification, or not against it."""

@@ -1,7 +1,6 @@
 """The history of the plant, as the identifier writes it, and reads it at the start."""
 
 import contextlib
-from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
@@ -43,6 +42,7 @@ from valve_friction_ros.history import (
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_guard import HistoryGuard
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
+from valve_friction_ros.nodes.identifier.waiting_changes import WaitingChanges
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.response import Move as CommandAnswer
@@ -50,8 +50,6 @@ from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["HistoryWriter"]
 
-_MOST_WAITING = 1000
-"""Changes that wait for a file that cannot be written; then the oldest are given up."""
 _LONGEST = 60.0
 """Time, s, after which a writing that has not ended is a problem; a busy file ends it sooner."""
 _END_OF_TIME = 2**63 - 1
@@ -80,7 +78,7 @@ class HistoryWriter:
         if self._file is not None:
             self._guard = HistoryGuard(self._file.path, self._valve.name)
         self._writer = Worker("history", finishes=True)
-        self._waiting: deque[Callable[[HistoryFile], None]] = deque(maxlen=_MOST_WAITING)
+        self._waiting = WaitingChanges()
         self._problem: str | None = None
         self._trend: Trend | None = None
         self._baseline: KeptBaseline | None = None
@@ -100,9 +98,13 @@ class HistoryWriter:
     @property
     def problems(self) -> list[str]:
         """Why the latest writing failed, or has not ended; empty if it did not."""
+        problem = self._problem
         if (busy := self._writer.busy_for()) > _LONGEST:
-            return [f"the history is not written: {self.path} has not answered for {busy:.0f} s"]
-        return [f"the history is not written: {self._problem}"] if self._problem else []
+            problem = f"{self.path} has not answered for {busy:.0f} s"
+        if not problem:
+            return []
+        lost = self._waiting.given_up
+        return [f"the history is not written: {problem}{f'; given up: {lost}' * bool(lost)}"]
 
     @property
     def conflict(self) -> str | None:
@@ -194,7 +196,7 @@ class HistoryWriter:
         days = self._node.get_parameter(HISTORY_DAYS.name).value
         with self._failures_remembered():
             entry = entry_of(monitor, self._valve, *identified, found or now, refusal)
-            await self._written(lambda file: file.add(entry, days))
+            await self._written(lambda file: file.add(entry, days), identification=True)
 
     def kept_now(
         self, baseline: Baseline, level: Level, evidence_since: int | None = None
@@ -285,8 +287,7 @@ class HistoryWriter:
         """
         if self._file is None:
             return
-        if change not in self._waiting:
-            self._waiting.append(change)
+        self._waiting.add(change)
         # A job that has begun may have looked for the last time.
         if all(one.running() or one.done() for one in self._under_way):
             self._under_way.append(self._writer.submit(self._write_waiting, self._file))
@@ -306,11 +307,13 @@ class HistoryWriter:
             current_trend, valve=name, baseline=monitor.baseline, settings=monitor.settings
         )
 
-    async def _written(self, change: Callable[[HistoryFile], None]) -> None:
+    async def _written(
+        self, change: Callable[[HistoryFile], None], identification: bool = False
+    ) -> None:
         """Write a change, and what waits since before; then compute the trend."""
         if self._file is None:
             return
-        self._waiting.append(change)
+        self._waiting.add(change, identification)
         self._trend = await done_in(self._writer, self._write, self._file, self._trend_job())
 
     @contextlib.contextmanager
@@ -319,6 +322,11 @@ class HistoryWriter:
             with bugs_reported(self._node, HistoryError, known=self._problem):
                 yield
             self._problem = None
+            if lost := self._waiting.given_up:
+                self._waiting.forget_given_up()
+                self._node.get_logger().warning(
+                    f"the history is written again, but too much waited: it lacks {lost}"
+                )
         except (HistoryError, InternalError) as error:
             self._complain(error)
 
@@ -330,7 +338,7 @@ class HistoryWriter:
         return trend(file)
 
     def _write_waiting(self, file: HistoryFile) -> None:
-        if self._guard is None or not self._waiting:
+        if self._guard is None or self._waiting.first() is None:
             return
         if self._guard.is_another:
             self._keep_again(file)
@@ -350,11 +358,9 @@ class HistoryWriter:
         )
 
     def _write_all(self, file: HistoryFile) -> None:
-        while self._waiting:
-            change = self._waiting[0]
+        while (change := self._waiting.first()) is not None:
             change(file)
-            with contextlib.suppress(ValueError):  # given up meanwhile
-                self._waiting.remove(change)
+            self._waiting.remove(change)
 
     def _complain(self, error: HistoryError | InternalError) -> None:
         if str(error) != self._problem:

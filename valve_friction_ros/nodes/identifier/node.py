@@ -124,7 +124,7 @@ class Identifier(PolledNode):
         self._history.read_trend()
         self._usage = UsageWatch(self, self._monitor, self._history)
         self._monitor.renew(self._usage.usage().renewal)
-        self._response = ResponseWatch(self, self._history)
+        self._response = ResponseWatch(self, self._monitor, self._history)
         self._reports = ReportWriter(
             self, self._monitor, self._history, self._usage, self._response
         )
@@ -346,7 +346,7 @@ class Identifier(PolledNode):
                 **self._readiness.values(),
             },
         )
-        self._alerts.follow(status, self._monitor.diagnosis())
+        self._alerts.follow(status, self._monitor.diagnosis(), findings)
         self._level_log.follow(status)
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from valve_friction_ros.health import Finding
+from valve_friction_ros.health import Finding, FrictionMonitor, dead_band
 from valve_friction_ros.history import keep_answers
 from valve_friction_ros.nodes.identifier.command_trouble import CommandTrouble
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -49,8 +49,8 @@ _MOST_WAITING = 20_000
 class ResponseWatch:
     """Follows ``stem_command``; without one it says nothing, but what earlier runs have kept."""
 
-    def __init__(self, node: Node, history: HistoryWriter) -> None:
-        self._node, self._history = node, history
+    def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
+        self._node, self._friction, self._history = node, monitor, history
         self._polled = PolledSubscription(node, JointState, "stem_command", stream(), raw=True)
         self._input = InputWatch(node, self._polled.subscription)
         self._drop()
@@ -177,8 +177,15 @@ class ResponseWatch:
         findings = self._trouble.findings()
         if self._monitor is not None:
             limits = response_limits(values_of(self._node, RESPONSE_LIMITS))
-            findings += found(self._monitor.summary, limits, self._monitor.hunting)
+            findings += found(
+                self._monitor.summary, limits, self._monitor.hunting, self._dead_band()
+            )
         return findings
+
+    def _dead_band(self) -> float:
+        """Return that of the latest identification, share of the travel; nan if not known."""
+        estimate = self._friction.estimate
+        return math.nan if estimate is None else dead_band(estimate, self._friction.settings.valve)
 
     def _follow_publishers(self) -> None:
         """Follow another quality of service; forget a command that nobody gives any more."""
