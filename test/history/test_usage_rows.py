@@ -67,6 +67,54 @@ def test_a_renewal_parts_a_day(history):
     assert found.total == usage(3.25, 12, 6, 3)
 
 
+def rows(history):
+    connection = sqlite3.connect(history.path)
+    found = connection.execute("SELECT day, run FROM usage ORDER BY day, run").fetchall()
+    connection.close()
+    return found
+
+
+def test_runs_of_finished_days_become_one(history):
+    """A node that restarts again and again: the sums stay, and old rows do not grow."""
+    for n in range(12):
+        keep_usage(history, VALVE, f"run {n}", [UsedDay(TODAY + n // 3, 0, usage(1.0))])
+    assert [day for day, run in rows(history) if run == ""] == [TODAY, TODAY + 1]
+    assert len(rows(history)) == 1 + 1 + 3 + 3
+    days = tuple(UsedDay(TODAY + n, 0, usage(3.0, 12, 6, 3)) for n in range(4))
+    assert read_usage(history, VALVE.name).days == days
+    keep_renewal(history, VALVE, START)
+    keep_usage(history, OTHER, "run", [UsedDay(TODAY, 0, usage(1.0))])
+    keep_usage(history, VALVE, "late", [UsedDay(TODAY, 0, usage(2.0))])
+    for run in ("late", "later"):
+        keep_usage(history, VALVE, run, [UsedDay(TODAY + 9, START, usage(1.0))])
+    found = read_usage(history, VALVE.name)
+    assert found.days[0].usage == usage(5.0, 16, 8, 4)
+    assert found.total == usage(16.0, 60, 30, 15)
+    assert found.since_renewal == usage(2.0, 8, 4, 2)
+    assert read_usage(history, OTHER.name).total == usage(1.0)
+
+
+def test_the_run_that_writes_keeps_its_days(history):
+    """It may write a day anew that is long over: where the file could not be written."""
+    for run in ("old", "older"):
+        keep_usage(history, VALVE, run, [UsedDay(TODAY, 0, usage(1.0))])
+    for distance in (3.0, 4.0):
+        days = [UsedDay(TODAY, 0, usage(distance)), UsedDay(TODAY + 9, 0, usage(1.0))]
+        keep_usage(history, VALVE, "run", days)
+    assert rows(history) == [(TODAY, ""), (TODAY, "run"), (TODAY + 9, "run")]
+    assert read_usage(history, VALVE.name).days[0].usage == usage(6.0, 12, 6, 3)
+
+
+def test_what_cannot_be_added_up_stays(history):
+    for run in ("old", "older"):
+        keep_usage(history, VALVE, run, [UsedDay(TODAY, 0, usage(1.0))])
+    connection = sqlite3.connect(history.path)
+    connection.executescript("UPDATE usage SET histogram_ns = '[1]' WHERE run = 'old'")
+    connection.close()
+    keep_usage(history, VALVE, "run", [UsedDay(TODAY + 9, 0, usage(1.0))])
+    assert rows(history) == [(TODAY, "old"), (TODAY, "older"), (TODAY + 9, "run")]
+
+
 def test_it_outlives_the_identifications(history):
     keep_usage(history, VALVE, "run", [UsedDay(TODAY - 4000, 0, usage(1.0))])
     history.add(success(), days=1.0)

@@ -21,7 +21,10 @@ CREATE TABLE packing_renewal (
     PRIMARY KEY (valve_id, time_ns)
 ) WITHOUT ROWID;
 """
-"""A row for each day (since 1970, UTC) of each run of an identifier, with the packing in use."""
+"""A row for each day (since 1970, UTC) of each run of an identifier, with the packing in use.
+
+Runs that have ended become one, "", once two days have passed.
+"""
 
 ALARM_RECORDINGS = """
 CREATE TABLE alarm_recording (

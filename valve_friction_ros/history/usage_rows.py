@@ -1,5 +1,6 @@
 """The usage of valves in the history: a row a day, and the renewals of the packing."""
 
+import contextlib
 import json
 import sqlite3
 from collections.abc import Iterable
@@ -10,40 +11,69 @@ from valve_friction_ros.history.evidence_rows import forget_evidence
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
-from valve_friction_ros.usage import Usage, UsedDay, ValveUsage
+from valve_friction_ros.usage import Usage, UsedDay, ValveUsage, total
 
 __all__ = ["keep_renewal", "keep_usage", "read_usage"]
+
+_EARLIER_RUNS = ""
+"""Run whose rows are the sums of runs that have ended."""
+
+_OPEN_DAYS = 1
+"""Days before the newest whose rows stay apart: a run may write about midnight. Chosen."""
 
 
 def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[UsedDay]) -> None:
     """Keep what a run of an identifier has counted on some days; `run` is a name of its own.
 
     The usage of a day is that of the whole run: it takes the place of what the run has kept of this
-    day before, so that keeping it twice changes nothing. Raises HistoryError if it cannot be
-    written.
+    day before, so that keeping it twice changes nothing. What other runs have kept of days
+    before the newest two becomes one row a day: of a valve one run writes at a time. Raises
+    HistoryError if it cannot be written.
     """
     with writing(file.path) as connection:
         row = valve_id(connection, valve)
-        for day, renewal, usage in days:
-            connection.execute(
-                "INSERT INTO usage (valve_id, renewal_ns, day, run, distance, reversals, "
-                "breakaways, time_watched_ns, histogram_ns) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
-                "ON CONFLICT (valve_id, renewal_ns, day, run) DO UPDATE SET "
-                "distance = excluded.distance, reversals = excluded.reversals, "
-                "breakaways = excluded.breakaways, time_watched_ns = excluded.time_watched_ns, "
-                "histogram_ns = excluded.histogram_ns",
-                (
-                    row,
-                    renewal,
-                    day,
-                    run,
-                    usage.distance,
-                    usage.reversals,
-                    usage.breakaways,
-                    usage.time_watched,
-                    json.dumps(usage.histogram),
-                ),
-            )
+        for one in days:
+            _write(connection, row, run, one)
+        _merge(connection, row, run)
+
+
+def _write(connection: sqlite3.Connection, row: int, run: str, one: UsedDay) -> None:
+    day, renewal, usage = one
+    connection.execute(
+        "INSERT OR REPLACE INTO usage (valve_id, renewal_ns, day, run, distance, reversals, "
+        "breakaways, time_watched_ns, histogram_ns) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        (
+            row,
+            renewal,
+            day,
+            run,
+            usage.distance,
+            usage.reversals,
+            usage.breakaways,
+            usage.time_watched,
+            json.dumps(usage.histogram),
+        ),
+    )
+
+
+def _merge(connection: sqlite3.Connection, row: int, run: str) -> None:
+    """Add up, for each finished day, the rows of all runs but this one."""
+    several = connection.execute(
+        "SELECT renewal_ns, day FROM usage WHERE valve_id = :row AND run != :run AND day < "
+        "(SELECT max(day) FROM usage WHERE valve_id = :row) - :open "
+        "GROUP BY renewal_ns, day HAVING count(*) > 1",
+        {"row": row, "run": run, "open": _OPEN_DAYS},
+    ).fetchall()
+    chosen = "FROM usage WHERE valve_id = ? AND run != ? AND renewal_ns = ? AND day = ?"
+    for renewal, day in several:
+        which = (row, run, renewal, day)
+        cursor = connection.cursor()
+        cursor.row_factory = sqlite3.Row
+        rows = cursor.execute(f"SELECT * {chosen}", which).fetchall()
+        with contextlib.suppress(TypeError, ValueError):  # rows that hold no usage: reading says so
+            merged = UsedDay(day, renewal, total(_day(each).usage for each in rows))
+            connection.execute(f"DELETE {chosen}", which)
+            _write(connection, row, _EARLIER_RUNS, merged)
 
 
 def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:

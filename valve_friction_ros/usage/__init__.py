@@ -2,7 +2,7 @@
 
 from valve_friction_ros.usage.counter import DEFAULT_BAND, UsageCounter
 from valve_friction_ros.usage.limits import LimitState, UsageLimits, limit_states, warned_limits
-from valve_friction_ros.usage.usage import BINS, Usage
+from valve_friction_ros.usage.usage import BINS, Usage, total
 from valve_friction_ros.usage.valve_usage import DAY, Pace, UsedDay, ValveUsage
 
 __all__ = [
@@ -17,5 +17,6 @@ __all__ = [
     "UsedDay",
     "ValveUsage",
     "limit_states",
+    "total",
     "warned_limits",
 ]
