@@ -15,6 +15,7 @@ from valve_friction_ros.history.entry import (
     trended,
 )
 from valve_friction_ros.history.evidence_rows import (
+    forget_moves_after,
     keep_moves,
     keep_reference,
     read_moves,
@@ -59,6 +60,7 @@ __all__ = [
     "drift_text",
     "end_of_trend",
     "entry_of",
+    "forget_moves_after",
     "friction_of",
     "history_mark",
     "keep_alarm_recording",

@@ -13,7 +13,14 @@ from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["forget_evidence", "keep_moves", "keep_reference", "read_moves", "read_reference"]
+__all__ = [
+    "forget_evidence",
+    "forget_moves_after",
+    "keep_moves",
+    "keep_reference",
+    "read_moves",
+    "read_reference",
+]
 
 _DAY = 86_400_000_000_000
 _OF_MOVE = (
@@ -57,6 +64,16 @@ def keep_moves(
             "(SELECT end_ns FROM move WHERE valve_id = ? ORDER BY end_ns DESC LIMIT 1 OFFSET ?)",
             (row, row, MOST_MOVES),
         )
+
+
+def forget_moves_after(file: HistoryFile, valve: KeptValve, time: int) -> None:
+    """Drop the moves of a valve that end after a time, ns since 1970 (UTC).
+
+    Raises HistoryError if the file cannot be written.
+    """
+    with writing(file.path) as connection:
+        row = valve_id(connection, valve)
+        connection.execute("DELETE FROM move WHERE valve_id = ? AND end_ns > ?", (row, time))
 
 
 def _row(move: Move) -> tuple[float, ...]:

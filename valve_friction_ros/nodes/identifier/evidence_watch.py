@@ -71,6 +71,11 @@ class EvidenceWatch:
         """What the evidence is of, in words."""
         return f"by {self._evidence.moves} moves in service since {_date(self._evidence.since)}"
 
+    @property
+    def problems(self) -> list[str]:
+        """Why the evidence does not follow the valve; empty if it does."""
+        return [self._ledger.problem] if self._ledger.problem else []
+
     def as_baseline(self) -> Baseline:
         """Return the sliding friction of the moves as baseline; raises RefusalError.
 
@@ -110,7 +115,7 @@ class EvidenceWatch:
         moves = self._stream.take(arrivals)
         if moves:
             self._ledger.add(moves)
-            if self._ledger.newest - self._combined >= _COMBINE_EVERY:
+            if abs(self._ledger.newest - self._combined) >= _COMBINE_EVERY:
                 self._combine()
 
     def findings(self) -> Sequence[Finding]:

@@ -335,7 +335,11 @@ class Identifier(PolledNode):
             estimate,
             self._monitor,
             now.nanoseconds,
-            [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
+            [
+                *filter(None, [self.poll_failure, self.overdue()]),
+                *self._evidence.problems,
+                *self._input_problems(),
+            ],
             [*self._history.problems, *filter(None, [self._history.conflict])],
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
