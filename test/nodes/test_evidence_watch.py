@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from service import START, made_moves
@@ -14,6 +15,8 @@ from test_move_ledger import Bench
 from valve_friction_ros.health import FrictionMonitor, MonitorSettings
 from valve_friction_ros.identification import IdentificationSettings, RefusalError
 from valve_friction_ros.nodes.identifier import evidence_watch
+from valve_friction_ros.nodes.identifier.node import Identifier
+from valve_friction_ros.nodes.identifier.workers import Workers
 from valve_friction_ros.nodes.plumbing.worker import Worker
 
 PATIENCE = 60.0
@@ -83,6 +86,43 @@ def test_a_packing_that_is_renewed_meanwhile_has_no_baseline(bench):
     with pytest.raises(RefusalError, match="0 moves up and 0 down"):
         finished(begun)
     assert bench.watch.evidence.moves == 0
+
+
+def settled(bench):
+    """Show the values once the thread has nothing to do."""
+    deadline = time.monotonic() + PATIENCE
+    while bench.worker.is_busy and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return bench.watch.values()
+
+
+def test_a_bug_in_the_thread_is_a_problem_until_it_is_gone(bench, monkeypatch):
+    def bug(*_):
+        raise ZeroDivisionError("a bug")
+
+    bench.add(made_moves(2.0, lambda _: 300.0))
+    with monkeypatch.context() as patched:
+        patched.setattr(evidence_watch, "evidence_of", bug)
+        bench.watch._combine()
+        assert settled(bench)["evidence moves"] == "0"
+    (problem,) = bench.watch.problems
+    assert problem.startswith("internal error: ZeroDivisionError: a bug")
+    assert any("Traceback" in one for one in bench.log)
+    bench.watch._combine()
+    assert settled(bench)["evidence moves"] == "600"
+    assert bench.watch.problems == []
+
+
+def test_a_thread_that_never_ends_is_overdue():
+    """As its watchdog sees it."""
+    idle = SimpleNamespace(busy_for=lambda: 0.0, is_preparing=False)
+    stuck = SimpleNamespace(busy_for=lambda: 200.0)
+    node = SimpleNamespace(
+        _workers=Workers(identify=idle, files=idle, evidence=stuck, alerts=None),
+        get_parameter=lambda _: SimpleNamespace(value=100.0),
+    )
+    problem = Identifier.overdue(node)
+    assert problem.startswith("the thread of moves in service has not ended its work for 200 s")
 
 
 @pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])

@@ -30,7 +30,7 @@ class Bench:
         )
         self.node = SimpleNamespace(
             get_clock=lambda: clock,
-            get_logger=lambda: SimpleNamespace(warning=self.log.append),
+            get_logger=lambda: SimpleNamespace(warning=self.log.append, error=self.log.append),
             get_parameter=lambda _: SimpleNamespace(value=0.0),
         )
         self.history = SimpleNamespace(

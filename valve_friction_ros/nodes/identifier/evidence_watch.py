@@ -1,6 +1,5 @@
 """The evidence of the moves in service: gathered, kept in the history, shown, and judged."""
 
-import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
@@ -56,6 +55,7 @@ class EvidenceWatch:
         self._worker = worker
         self._job: Future[Evidence] | None = None
         self._is_due = False
+        self._error = ""
         self._begun = 0
         self._settings = monitor.settings
         self._stream = MoveStream(self._settings.valve)
@@ -76,7 +76,7 @@ class EvidenceWatch:
     @property
     def problems(self) -> list[str]:
         """Why the evidence does not follow the valve; empty if it does."""
-        return [self._ledger.problem] if self._ledger.problem else []
+        return [one for one in (self._error, self._ledger.problem) if one]
 
     async def as_baseline(self) -> Baseline:
         """Return the sliding friction of the moves as baseline; raises RefusalError.
@@ -236,12 +236,16 @@ class EvidenceWatch:
         if self._job is None or not self._job.done():
             return
         job, self._job = self._job, None
-        with contextlib.suppress(InternalError), bugs_reported(self._node):
-            self._use(job.result())
+        try:
+            with bugs_reported(self._node, known=self._error):
+                self._use(job.result())
+        except InternalError as error:
+            self._error = str(error)
         if self._is_due:
             self._combine()
 
     def _use(self, evidence: Evidence) -> None:
+        self._error = ""
         self._evidence = evidence
         self._ledger.refer(evidence)
 

@@ -179,6 +179,7 @@ class Identifier(PolledNode):
         busy, thread = max(
             (0.0 if identify.is_preparing else identify.busy_for(), "identifications"),
             (self._workers.files.busy_for(), "bags and reports"),
+            (self._workers.evidence.busy_for(), "moves in service"),
         )
         if busy <= limit:
             return None
