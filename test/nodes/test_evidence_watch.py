@@ -1,6 +1,7 @@
 """The evidence of an identifier: combined in a thread, watched, and shown."""
 
 import os
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -10,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 from service import START, made_moves
 from service import VALVE as BUILT
-from test_move_ledger import Bench
+from test_move_ledger import HOUR, Bench
 
 from valve_friction_ros.health import FrictionMonitor, MonitorSettings
 from valve_friction_ros.identification import IdentificationSettings, RefusalError
@@ -123,6 +124,26 @@ def test_a_thread_that_never_ends_is_overdue():
     )
     problem = Identifier.overdue(node)
     assert problem.startswith("the thread of moves in service has not ended its work for 200 s")
+
+
+def test_a_change_stays_when_the_moves_before_it_have_gone(bench):
+    """Over a restart, too, and until the packing is renewed."""
+    bench.add(made_moves(4.0, lambda hour: 450.0 if hour >= 2 else 300.0))
+    finished(bench.watch.as_baseline())
+    shown = {key: one for key, one in bench.watch.values().items() if "change" in key}
+    assert float(shown["evidence change_ratio"]) == pytest.approx(1.5, rel=0.05)
+    assert len(shown) == 5
+    bench.ledger.close()
+    connection = sqlite3.connect(bench.file.path)
+    with connection:
+        connection.execute("DELETE FROM move WHERE end_ns < ?", (START + 3 * HOUR,))
+    connection.close()
+    bench.start()
+    assert bench.watch.evidence.change is None
+    assert 290 < bench.watch.evidence.moves < 310
+    assert shown.items() <= bench.watch.values().items()
+    bench.watch.renew()
+    assert not any("change" in key for key in bench.watch.values())
 
 
 @pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])

@@ -8,7 +8,7 @@ from service import SECOND, START
 from service import VALVE as BUILT
 
 from valve_friction_ros.evidence import Move
-from valve_friction_ros.history import HistoryFile, read_moves, read_reference
+from valve_friction_ros.history import HistoryFile, read_change, read_moves, read_reference
 from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
 
 HOUR, YEAR = 3600 * SECOND, 365 * 86_400 * SECOND
@@ -37,6 +37,7 @@ class Bench:
             valve=VALVE,
             moves=lambda: read_moves(self.file, VALVE.name, BUILT),
             reference=lambda: read_reference(self.file, VALVE.name, BUILT),
+            change=lambda: read_change(self.file, VALVE.name, BUILT),
             keep_soon=lambda change: change(self.file),
         )
         self.file.prepare()

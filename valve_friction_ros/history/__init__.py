@@ -16,8 +16,10 @@ from valve_friction_ros.history.entry import (
 )
 from valve_friction_ros.history.evidence_rows import (
     forget_moves_after,
+    keep_change,
     keep_moves,
     keep_reference,
+    read_change,
     read_moves,
     read_reference,
 )
@@ -65,6 +67,7 @@ __all__ = [
     "history_mark",
     "keep_alarm_recording",
     "keep_answers",
+    "keep_change",
     "keep_moves",
     "keep_reference",
     "keep_renewal",
@@ -72,6 +75,7 @@ __all__ = [
     "keep_usage",
     "ratios_after",
     "read_answers",
+    "read_change",
     "read_moves",
     "read_reference",
     "read_told_level",

@@ -176,7 +176,7 @@ class EvidenceWatch:
             values["evidence reference [N]"] = number_text(reference.sliding.value)
             values["evidence reference half width [N]"] = number_text(reference.sliding.half_width)
             values["evidence reference [time]"] = _date(reference.time)
-        if (change := found.change) is not None:
+        if (change := self._ledger.change) is not None:
             values["evidence change_ratio"] = number_text(change.ratio)
             values["evidence change_ratio low"] = number_text(change.low)
             values["evidence change_ratio high"] = number_text(change.high)
@@ -248,6 +248,7 @@ class EvidenceWatch:
         self._error = ""
         self._evidence = evidence
         self._ledger.refer(evidence)
+        self._ledger.note_change(evidence.change)
 
 
 def _combined_by(settings: MonitorSettings) -> tuple[Valve, IdentificationSettings]:

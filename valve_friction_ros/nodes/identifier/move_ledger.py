@@ -10,6 +10,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.evidence import (
     MOST_MOVES,
+    Change,
     Evidence,
     Move,
     lies_behind_those_ahead,
@@ -20,6 +21,7 @@ from valve_friction_ros.history import (
     HistoryFile,
     KeptValve,
     forget_moves_after,
+    keep_change,
     keep_moves,
     keep_reference,
 )
@@ -56,7 +58,10 @@ class _Batch:
 
 
 class MoveLedger:
-    """Moves of one actuator and one packing, oldest first, and what they said first."""
+    """Moves of one actuator and one packing, oldest first; what they said first; their change.
+
+    The last change of friction stays when the moves before it have gone.
+    """
 
     def __init__(self, node: Node, history: HistoryWriter, built: Valve) -> None:
         self._node, self._history, self._built = node, history, built
@@ -65,6 +70,7 @@ class MoveLedger:
         self._batch: _Batch | None = None
         self._written_at = time.monotonic()
         self.reference: Reference | None = history.reference()
+        self.change: Change | None = history.change()
         self.left_out = 0
         self._left_in_a_row = 0
         self._problem = ""
@@ -150,6 +156,15 @@ class MoveLedger:
                 partial(keep_reference, valve=valve, built=self._built, reference=self.reference)
             )
 
+    def note_change(self, change: Change | None) -> None:
+        """Keep a change of friction in place of the one before; None leaves that."""
+        if change in (None, self.change):
+            return
+        self.change = change
+        self._history.keep_soon(
+            partial(keep_change, valve=self._history.valve, built=self._built, change=change)
+        )
+
     def use(self, built: Valve) -> None:
         """Follow the valve; other forces need other moves, as they do in the file."""
         before, self._built = self._built, built
@@ -178,7 +193,7 @@ class MoveLedger:
 
     def _clear(self) -> None:
         self._moves.clear()
-        self._batch = self.reference = None
+        self._batch = self.reference = self.change = None
         self._left_in_a_row = 0
         self._behind.clear()
 
