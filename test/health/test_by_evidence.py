@@ -120,6 +120,17 @@ class TestReference:
         assert late.time == grown.change.earliest
         assert self.found(evidence(lambda _: 450.0), reference=late).level is Level.WARN
 
+    def test_one_that_is_first_known_after_two_changes_is_that_of_before_both(self):
+        def friction(hour):
+            return 300.0 if hour < 3 else 390.0 if hour < 9 else 510.0
+
+        grown = evidence(friction, hours=9.8)
+        first, second = grown.changes
+        assert grown.change is second
+        late = reference_by_evidence(grown)
+        assert abs(late.sliding.value - 300.0) < late.sliding.half_width < 60.0
+        assert late.time == first.earliest
+
     def test_it_is_known_as_well_as_a_baseline(self):
         assert reference_by_evidence(evidence(lambda _: 300.0, hours=0.2)) is None
         assert self.FIRST.sliding.value == pytest.approx(300.0, rel=0.02)

@@ -8,15 +8,17 @@ import pytest
 from histories import DAY, OTHER, SECOND, START, VALVE
 from test_file import write_version_2
 
-from valve_friction_ros.evidence import Move
+from valve_friction_ros.evidence import Change, Move
 from valve_friction_ros.health import Reference, SlidingFriction
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
     evidence_rows,
+    keep_change,
     keep_moves,
     keep_reference,
     keep_renewal,
+    read_change,
     read_moves,
     read_reference,
 )
@@ -116,6 +118,38 @@ class TestReference:
 
     def test_an_older_file_holds_none(self, history):
         write_version_2(history)
+        assert self.kept(history) is None
+
+
+class TestChange:
+    FIRST, LATER = (Change(START, START + DAY, one, 0.9 * one, 1.1 * one) for one in (1.3, 1.5))
+
+    def kept(self, history, built=BUILT, valve=VALVE):
+        return read_change(history, valve.name, built)
+
+    def test_the_last_one_stays_until_the_packing_is_renewed(self, history):
+        for valve, change in ((VALVE, self.FIRST), (OTHER, self.FIRST), (VALVE, self.LATER)):
+            keep_change(history, valve, BUILT, change)
+        assert self.kept(history) == self.LATER
+        assert self.kept(history, replace(BUILT, diaphragm_area=0.05)) is None
+        keep_renewal(history, VALVE, START + DAY)
+        assert self.kept(history) is None
+        assert self.kept(history, valve=OTHER) == self.FIRST
+
+    def test_an_older_file_and_one_without_the_table(self, history):
+        write_version_2(history)
+        assert self.kept(history) is None
+        for change in (
+            lambda: keep_change(history, VALVE, BUILT, self.FIRST),
+            lambda: keep_renewal(history, VALVE, START),
+        ):
+            keep_change(history, VALVE, BUILT, self.LATER)
+            connection = sqlite3.connect(history.path)
+            with connection:
+                connection.execute("DROP TABLE evidence_change")
+            connection.close()
+            assert self.kept(history) is None
+            change()
         assert self.kept(history) is None
 
 

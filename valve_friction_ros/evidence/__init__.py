@@ -2,7 +2,7 @@
 
 from valve_friction_ros.evidence.estimate import MOST_MOVES, Change, Evidence, evidence_of
 from valve_friction_ros.evidence.moves import Move, Moves
-from valve_friction_ros.evidence.stamps import stamp_problem
+from valve_friction_ros.evidence.stamps import lies_behind_those_ahead, stamp_problem
 from valve_friction_ros.evidence.stream import MoveStream
 
 __all__ = [
@@ -13,5 +13,6 @@ __all__ = [
     "MoveStream",
     "Moves",
     "evidence_of",
+    "lies_behind_those_ahead",
     "stamp_problem",
 ]

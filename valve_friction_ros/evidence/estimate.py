@@ -95,8 +95,8 @@ class Evidence:
         do not determine.
     sliding_speed : float
         Speed that the sliding friction belongs to, m/s.
-    change : Change or None
-        The last declared change that the ledger still shows.
+    changes : tuple of Change
+        The declared changes that the ledger still shows, oldest first.
     """
 
     moves: int
@@ -104,13 +104,18 @@ class Evidence:
     until: int
     parameters: Mapping[str, Parameter]
     sliding_speed: float = math.nan
-    change: Change | None = None
+    changes: tuple[Change, ...] = ()
     values: Mapping[str, float] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Give the values of the parameters by name."""
         values = {name: one.value for name, one in self.parameters.items()}
         object.__setattr__(self, "values", values)
+
+    @property
+    def change(self) -> Change | None:
+        """The last declared change that the ledger still shows."""
+        return self.changes[-1] if self.changes else None
 
     @property
     def is_known(self) -> bool:
@@ -139,7 +144,7 @@ def evidence_of(
     """
     settings = settings or IdentificationSettings()
     every = Moves.of(ledger)
-    first, change = _since_change(ledger, every, valve.travel)
+    first, changes = _since_change(ledger, every, valve.travel)
     used, moves = ledger[first:], every[first:]
     timing = settings.timing_uncertainty
     spring = settings.fixed.get("spring_constant")
@@ -147,27 +152,28 @@ def evidence_of(
     balance = balance_of(moves, timing, valve.travel, spring)
     span = (used[0].begin, used[-1].end) if used else (0, 0)
     if balance is None:
-        reason = _too_few(moves, change)
+        reason = _too_few(moves, bool(changes))
         parameters = {name: not_identifiable(name, reason) for name in _NAMES}
-        return Evidence(len(used), *span, parameters, math.nan, change)
+        return Evidence(len(used), *span, parameters, math.nan, changes)
     found = {
         name: calibrated(one, calibration_share(name, settings, valve.driven_by))
         for name, one in _parameters(balance, spring).items()
     }
     share = settings.position_scale_uncertainty
     found["dead_band"] = calibrated(found["dead_band"], share)
-    return Evidence(len(used), *span, found, balance.speed, change)
+    return Evidence(len(used), *span, found, balance.speed, changes)
 
 
-def _since_change(ledger: Sequence[Move], every: Moves, travel: float) -> tuple[int, Change | None]:
-    """Return the first move after the last change, and the last change that is declared."""
+def _since_change(
+    ledger: Sequence[Move], every: Moves, travel: float
+) -> tuple[int, tuple[Change, ...]]:
+    """Return the first move after the last change, and the changes that are declared."""
     series = series_of(every, travel)
     if series is None:
-        return 0, None
+        return 0, ()
     splits = last_splits(series)
-    declared = [split for split in splits if split.is_declared]
-    change = _change(declared[-1], ledger[0].begin) if declared else None
-    return (int(series.first[splits[-1].block]) if splits else 0), change
+    changes = tuple(_change(split, ledger[0].begin) for split in splits if split.is_declared)
+    return (int(series.first[splits[-1].block]) if splits else 0), changes
 
 
 def _change(split: Split, origin: int) -> Change:
@@ -175,10 +181,10 @@ def _change(split: Split, origin: int) -> Change:
     return Change(earliest, latest, split.ratio, split.low, split.high)
 
 
-def _too_few(moves: Moves, change: Change | None) -> str:
+def _too_few(moves: Moves, has_changed: bool) -> str:
     up, down = (int(np.sum(moves.direction == way)) for way in (1, -1))
     blocks = len(set(blocks_of(moves, MOST_BLOCKS).tolist()))
-    since = " since friction changed" if change is not None else ""
+    since = " since friction changed" if has_changed else ""
     return (
         f"{up} moves up and {down} down in {blocks} blocks of time{since}: {FEWEST_MOVES} of each "
         f"in {FEWEST_BLOCKS} blocks are needed; let the valve work on"

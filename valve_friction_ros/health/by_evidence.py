@@ -65,18 +65,18 @@ def baseline_by_evidence(evidence: Evidence) -> Baseline:
 def reference_by_evidence(evidence: Evidence) -> Reference | None:
     """Return what the moves say as reference; None where they could not be a baseline.
 
-    Where friction has changed before it was known well enough, it is carried back over the change.
+    Where friction has changed before it was known well enough, it is carried back over all changes.
     """
     with contextlib.suppress(RefusalError):
-        sliding, change = baseline_by_evidence(evidence).sliding, evidence.change
+        sliding, changes = baseline_by_evidence(evidence).sliding, evidence.changes
         if sliding is None:
             return None
-        if change is None:
+        if not changes:
             return Reference(sliding, evidence.until)
-        value = sliding.value / change.ratio
-        share = 0.5 * math.log(change.high / change.low)
-        width = value * math.hypot(sliding.half_width / sliding.value, share)
-        return Reference(SlidingFriction(value, width, sliding.speed), change.earliest)
+        value = sliding.value / math.prod(one.ratio for one in changes)
+        shares = (0.5 * math.log(one.high / one.low) for one in changes)
+        width = value * math.hypot(sliding.half_width / sliding.value, *shares)
+        return Reference(SlidingFriction(value, width, sliding.speed), changes[0].earliest)
     return None
 
 

@@ -15,8 +15,11 @@ from valve_friction_ros.history.entry import (
     trended,
 )
 from valve_friction_ros.history.evidence_rows import (
+    forget_moves_after,
+    keep_change,
     keep_moves,
     keep_reference,
+    read_change,
     read_moves,
     read_reference,
 )
@@ -59,10 +62,12 @@ __all__ = [
     "drift_text",
     "end_of_trend",
     "entry_of",
+    "forget_moves_after",
     "friction_of",
     "history_mark",
     "keep_alarm_recording",
     "keep_answers",
+    "keep_change",
     "keep_moves",
     "keep_reference",
     "keep_renewal",
@@ -70,6 +75,7 @@ __all__ = [
     "keep_usage",
     "ratios_after",
     "read_answers",
+    "read_change",
     "read_moves",
     "read_reference",
     "read_told_level",

@@ -4,16 +4,27 @@ import math
 import sqlite3
 import time
 from collections.abc import Sequence
+from dataclasses import astuple
 
-from valve_friction_ros.evidence import MOST_MOVES, Move
+from valve_friction_ros.evidence import MOST_MOVES, Change, Move
 from valve_friction_ros.health import Reference, SlidingFriction
 from valve_friction_ros.history.entry import KeptValve
+from valve_friction_ros.history.evidence_table import EVIDENCE_CHANGE
 from valve_friction_ros.history.file import HistoryFile
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["forget_evidence", "keep_moves", "keep_reference", "read_moves", "read_reference"]
+__all__ = [
+    "forget_evidence",
+    "forget_moves_after",
+    "keep_change",
+    "keep_moves",
+    "keep_reference",
+    "read_change",
+    "read_moves",
+    "read_reference",
+]
 
 _DAY = 86_400_000_000_000
 _OF_MOVE = (
@@ -57,6 +68,16 @@ def keep_moves(
             "(SELECT end_ns FROM move WHERE valve_id = ? ORDER BY end_ns DESC LIMIT 1 OFFSET ?)",
             (row, row, MOST_MOVES),
         )
+
+
+def forget_moves_after(file: HistoryFile, valve: KeptValve, time: int) -> None:
+    """Drop the moves of a valve that end after a time, ns since 1970 (UTC).
+
+    Raises HistoryError if the file cannot be written.
+    """
+    with writing(file.path) as connection:
+        row = valve_id(connection, valve)
+        connection.execute("DELETE FROM move WHERE valve_id = ? AND end_ns > ?", (row, time))
 
 
 def _row(move: Move) -> tuple[float, ...]:
@@ -137,7 +158,43 @@ def read_reference(file: HistoryFile, valve: str, built: Valve) -> Reference | N
     return None if row is None else Reference(SlidingFriction(*row[1:]), row[0])
 
 
+def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: Change) -> None:
+    """Keep the last change of friction that the moves of a valve show, in place of the one before.
+
+    Raises HistoryError if it cannot be written.
+    """
+    with writing(file.path) as connection:
+        connection.execute(EVIDENCE_CHANGE)  # a file of this schema may be older than its table
+        connection.execute(
+            "INSERT OR REPLACE INTO evidence_change VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            (
+                valve_id(connection, valve),
+                built.diaphragm_area,
+                built.pressure_reference,
+                *astuple(change),
+            ),
+        )
+
+
+def read_change(file: HistoryFile, valve: str, built: Valve) -> Change | None:
+    """Return the last change that the moves of the valve of this name, with this actuator, showed.
+
+    Raises HistoryError if the file cannot be read; an older one holds none.
+    """
+    with reading(file.path) as connection:
+        if not has_table(connection, "evidence_change"):
+            return None
+        row = connection.execute(
+            "SELECT earliest_ns, latest_ns, ratio, low, high FROM evidence_change "
+            "JOIN valve ON valve.id = valve_id "
+            "WHERE name = ? AND diaphragm_area IS ? AND pressure_reference = ?",
+            (valve, built.diaphragm_area, built.pressure_reference),
+        ).fetchone()
+    return None if row is None else Change(*row)
+
+
 def forget_evidence(connection: sqlite3.Connection, row: int) -> None:
-    """Drop the moves and the reference of the valve of this row: its packing was renewed."""
-    for table in ("move", "evidence_reference"):
+    """Drop moves, reference and change of the valve of this row: its packing was renewed."""
+    connection.execute(EVIDENCE_CHANGE)  # a file of this schema may be older than its table
+    for table in ("move", "evidence_reference", "evidence_change"):
         connection.execute(f"DELETE FROM {table} WHERE valve_id = ?", (row,))  # noqa: S608

@@ -1,6 +1,6 @@
 """The tables of the moves in service."""
 
-__all__ = ["EVIDENCE_TABLE"]
+__all__ = ["EVIDENCE_CHANGE", "EVIDENCE_TABLE"]
 
 EVIDENCE_TABLE = """
 CREATE TABLE move (
@@ -31,3 +31,18 @@ CREATE TABLE evidence_reference (
 """
 """A row a move, and one a valve of what its moves said first, since the packing was renewed; the
 forces hold for the area and the pressure reference beside them."""
+
+EVIDENCE_CHANGE = """
+CREATE TABLE IF NOT EXISTS evidence_change (
+    valve_id INTEGER PRIMARY KEY REFERENCES valve,
+    diaphragm_area REAL,
+    pressure_reference REAL NOT NULL,
+    earliest_ns INTEGER NOT NULL,
+    latest_ns INTEGER NOT NULL CHECK (earliest_ns <= latest_ns),
+    ratio REAL NOT NULL CHECK (ratio > 0),
+    low REAL NOT NULL CHECK (low > 0),
+    high REAL NOT NULL CHECK (low <= high)
+)
+"""
+"""A row a valve of the last change of friction that its moves have shown, since the packing was
+renewed."""

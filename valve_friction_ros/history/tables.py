@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from itertools import chain
 
-from valve_friction_ros.history.evidence_table import EVIDENCE_TABLE
+from valve_friction_ros.history.evidence_table import EVIDENCE_CHANGE, EVIDENCE_TABLE
 from valve_friction_ros.history.number_rows import NUMBER_TABLES
 from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, ANSWERS, TOLD_LEVEL, USAGE
 
@@ -143,7 +143,17 @@ UPDATE baseline SET
 """
 """Who set a baseline, at which level, and what it replaced: in an older file the row before it."""
 
-_SERVICE = ";".join((NUMBER_TABLES, USAGE, ALARM_RECORDINGS, TOLD_LEVEL, EVIDENCE_TABLE, ANSWERS))
+_SERVICE = ";".join(
+    (
+        NUMBER_TABLES,
+        USAGE,
+        ALARM_RECORDINGS,
+        TOLD_LEVEL,
+        EVIDENCE_TABLE,
+        EVIDENCE_CHANGE,
+        ANSWERS,
+    )
+)
 """The tables of the valve in service."""
 
 _ADDED = {

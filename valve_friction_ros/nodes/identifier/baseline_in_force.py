@@ -81,7 +81,7 @@ class BaselineInForce:
         the latest identification was refused, or where the result cannot be a baseline. Raises
         RefusalError in an alarm, or if neither can be a baseline.
         """
-        baseline, by_evidence = self._newest()
+        baseline, by_evidence = await self._newest()
         self._require_no_alarm()
         since = self._evidence.evidence.since if by_evidence else None
         seen = self._monitor.seen_until
@@ -92,17 +92,17 @@ class BaselineInForce:
         answer = await self._change(self._history.kept_now(baseline, self._level(), since))
         return f"{answer} ({source})"
 
-    def _newest(self) -> tuple[Baseline, bool]:
+    async def _newest(self) -> tuple[Baseline, bool]:
         """Return what is healthy now, and whether it is of the moves in service."""
         seen, is_refused = self._monitor.seen_until, self._monitor.refusal is not None
-        if is_refused or (seen is not None and self._evidence.outdates(seen)):
+        if is_refused or (seen is not None and await self._evidence.outdates(seen)):
             with contextlib.suppress(RefusalError):
-                return self._evidence.as_baseline(), True
+                return await self._evidence.as_baseline(), True
         try:
             return self._monitor.result_as_baseline(), False
         except RefusalError as refusal:
             try:
-                return self._evidence.as_baseline(), True
+                return await self._evidence.as_baseline(), True
             except RefusalError as of_moves:
                 raise RefusalError(f"{refusal}; {of_moves}") from None
 

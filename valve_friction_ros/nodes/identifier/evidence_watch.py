@@ -1,6 +1,5 @@
 """The evidence of the moves in service: gathered, kept in the history, shown, and judged."""
 
-import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
@@ -27,7 +26,7 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
 from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.streams import Arrivals, utc
 
@@ -46,7 +45,7 @@ def _date(stamp: int) -> str:
 class EvidenceWatch:
     """Gathers the moves of the valve, and compares their friction with the baseline; a `Watch`.
 
-    They are combined in a thread: at the start, and for a baseline, at once.
+    They are combined in a thread; at the start at once, so that no alarm of before ends.
     """
 
     def __init__(
@@ -56,10 +55,13 @@ class EvidenceWatch:
         self._worker = worker
         self._job: Future[Evidence] | None = None
         self._is_due = False
+        self._error = ""
+        self._begun = 0
         self._settings = monitor.settings
         self._stream = MoveStream(self._settings.valve)
         self._ledger = MoveLedger(node, history, self._settings.valve)
-        self._combine_now()
+        self._combined = self._ledger.newest
+        self._use(evidence_of(self._ledger.moves, *_combined_by(self._settings)))
 
     @property
     def evidence(self) -> Evidence:
@@ -71,18 +73,30 @@ class EvidenceWatch:
         """What the evidence is of, in words."""
         return f"by {self._evidence.moves} moves in service since {_date(self._evidence.since)}"
 
-    def as_baseline(self) -> Baseline:
+    @property
+    def problems(self) -> list[str]:
+        """Why the evidence does not follow the valve; empty if it does."""
+        return [one for one in (self._error, self._ledger.problem) if one]
+
+    async def as_baseline(self) -> Baseline:
         """Return the sliding friction of the moves as baseline; raises RefusalError.
 
         The newest number of everything else that is known of the valve goes with it.
         """
-        self._combine_now()
+        ledger = self._ledger.moves
+        begun, newest, before = self._begun, self._ledger.newest, self._job
+        found = await done_in(self._worker, evidence_of, ledger, *_combined_by(self._settings))
+        if begun == self._begun:
+            if self._job is before:
+                self._job, self._combined = None, newest  # what was under way is older
+            self._use(found)
         return replace(baseline_by_evidence(self._evidence), numbers=self._monitor.known.numbers)
 
-    def outdates(self, time: int) -> bool:
+    async def outdates(self, time: int) -> bool:
         """Return whether the moves since a time, ns, alone could be a baseline."""
         newer = [one for one in self._ledger.moves if one.begin > time]
-        return reference_by_evidence(evidence_of(newer, *_combined_by(self._settings))) is not None
+        found = await done_in(self._worker, evidence_of, newer, *_combined_by(self._settings))
+        return reference_by_evidence(found) is not None
 
     def follow_parameters(self) -> None:
         """Use the valve and the settings in force; other forces need other moves."""
@@ -91,7 +105,7 @@ class EvidenceWatch:
             self._stream = MoveStream(self._settings.valve)
             self._ledger.use(self._settings.valve)
             if not self._ledger.moves:
-                self._combine_now()
+                self._begin_anew()
         if _combined_by(self._settings) != _combined_by(before):
             self._combine()
 
@@ -103,14 +117,14 @@ class EvidenceWatch:
         """Begin anew, as the packing is renewed; the renewal that is kept says so to the file."""
         self._stream.forget()
         self._ledger.renew()
-        self._combine_now()
+        self._begin_anew()
 
     def take(self, arrivals: Arrivals) -> None:
         """Take samples; have the moves combined now and then."""
         moves = self._stream.take(arrivals)
         if moves:
             self._ledger.add(moves)
-            if self._ledger.newest - self._combined >= _COMBINE_EVERY:
+            if abs(self._ledger.newest - self._combined) >= _COMBINE_EVERY:
                 self._combine()
 
     def findings(self) -> Sequence[Finding]:
@@ -162,7 +176,7 @@ class EvidenceWatch:
             values["evidence reference [N]"] = number_text(reference.sliding.value)
             values["evidence reference half width [N]"] = number_text(reference.sliding.half_width)
             values["evidence reference [time]"] = _date(reference.time)
-        if (change := found.change) is not None:
+        if (change := self._ledger.change) is not None:
             values["evidence change_ratio"] = number_text(change.ratio)
             values["evidence change_ratio low"] = number_text(change.low)
             values["evidence change_ratio high"] = number_text(change.high)
@@ -203,10 +217,11 @@ class EvidenceWatch:
         )
         return None if found is None else qualified(found, factor, valve)
 
-    def _combine_now(self) -> None:
-        self._job, self._is_due = None, False  # what is under way may be of other moves
-        self._combined = self._ledger.newest
-        self._use(evidence_of(self._ledger.moves, *_combined_by(self._settings)))
+    def _begin_anew(self) -> None:
+        """Begin without moves; what is under way is of other ones."""
+        self._job, self._is_due = None, False
+        self._begun, self._combined = self._begun + 1, 0
+        self._use(evidence_of((), *_combined_by(self._settings)))
 
     def _combine(self) -> None:
         """Have the moves combined in the thread, once what is under way there is done."""
@@ -221,14 +236,19 @@ class EvidenceWatch:
         if self._job is None or not self._job.done():
             return
         job, self._job = self._job, None
-        with contextlib.suppress(InternalError), bugs_reported(self._node):
-            self._use(job.result())
+        try:
+            with bugs_reported(self._node, known=self._error):
+                self._use(job.result())
+        except InternalError as error:
+            self._error = str(error)
         if self._is_due:
             self._combine()
 
     def _use(self, evidence: Evidence) -> None:
+        self._error = ""
         self._evidence = evidence
         self._ledger.refer(evidence)
+        self._ledger.note_change(evidence.change)
 
 
 def _combined_by(settings: MonitorSettings) -> tuple[Valve, IdentificationSettings]:

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from rclpy.node import Node
 
-from valve_friction_ros.evidence import Move
+from valve_friction_ros.evidence import Change, Move
 from valve_friction_ros.health import (
     Baseline,
     FrictionMonitor,
@@ -33,6 +33,7 @@ from valve_friction_ros.history import (
     entry_of,
     keep_told_level,
     read_answers,
+    read_change,
     read_moves,
     read_reference,
     read_told_level,
@@ -274,6 +275,11 @@ class HistoryWriter:
         """Read what the moves of the valve said first; None without a file."""
         built = self._monitor.settings.valve
         return self._tried(lambda file: read_reference(file, self._valve.name, built))
+
+    def change(self) -> Change | None:
+        """Read the last change of friction that the moves showed; None without a file."""
+        built = self._monitor.settings.valve
+        return self._tried(lambda file: read_change(file, self._valve.name, built))
 
     def answers(self) -> tuple[CommandAnswer, ...]:
         """Read the answers of the stem to its command; none without a file."""

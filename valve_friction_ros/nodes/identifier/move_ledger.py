@@ -8,9 +8,23 @@ from functools import partial
 
 from rclpy.node import Node
 
-from valve_friction_ros.evidence import MOST_MOVES, Evidence, Move, stamp_problem
+from valve_friction_ros.evidence import (
+    MOST_MOVES,
+    Change,
+    Evidence,
+    Move,
+    lies_behind_those_ahead,
+    stamp_problem,
+)
 from valve_friction_ros.health import Reference, reference_by_evidence
-from valve_friction_ros.history import HistoryFile, KeptValve, keep_moves, keep_reference
+from valve_friction_ros.history import (
+    HistoryFile,
+    KeptValve,
+    forget_moves_after,
+    keep_change,
+    keep_moves,
+    keep_reference,
+)
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
@@ -19,6 +33,13 @@ __all__ = ["MoveLedger"]
 
 _WRITE_EVERY = 5.0
 """Time between two writings, s. A killed node loses so much, and a move that has not ended."""
+
+_TOLD = 3
+"""Moves in a row that are left out, from which it is a problem; one may have a stray stamp."""
+
+_SURE = 8
+"""Moves in a row that tell that the clock was ahead before. A clock that is not set yet after a
+start is set within less time."""
 
 
 @dataclass(eq=False)
@@ -37,7 +58,10 @@ class _Batch:
 
 
 class MoveLedger:
-    """Moves of one actuator and one packing, oldest first, and what they said first."""
+    """Moves of one actuator and one packing, oldest first; what they said first; their change.
+
+    The last change of friction stays when the moves before it have gone.
+    """
 
     def __init__(self, node: Node, history: HistoryWriter, built: Valve) -> None:
         self._node, self._history, self._built = node, history, built
@@ -46,7 +70,11 @@ class MoveLedger:
         self._batch: _Batch | None = None
         self._written_at = time.monotonic()
         self.reference: Reference | None = history.reference()
+        self.change: Change | None = history.change()
         self.left_out = 0
+        self._left_in_a_row = 0
+        self._problem = ""
+        self._behind: list[Move] = []
 
     @property
     def moves(self) -> tuple[Move, ...]:
@@ -60,16 +88,56 @@ class MoveLedger:
 
     def add(self, moves: Iterable[Move]) -> None:
         """Add moves, but those with impossible stamps; no kept move goes for them."""
-        now = self._node.get_clock().now().nanoseconds
+        clock = self._node.get_clock()
+        now = clock.now().nanoseconds
         for move in moves:
             if problem := stamp_problem(move, self.newest or None, now):
                 self._leave_out(problem)
+                # A recording that is played tells nothing of the clock.
+                if clock.ros_time_is_active or not lies_behind_those_ahead(move, self.newest, now):
+                    self._behind.clear()
+                    continue
+                self._behind.append(move)
+                if len(self._behind) == _SURE:
+                    self._drop_those_ahead()
                 continue
             self._moves.append(move)
             self._unwritten.append(move)
+            self._left_in_a_row = 0
+            self._behind.clear()
+
+    @property
+    def problem(self) -> str:
+        """Why the latest moves are all left out; empty if they are not."""
+        if self._left_in_a_row < _TOLD:
+            return ""
+        return (
+            f"the latest {self._left_in_a_row} moves in service are left out of the evidence: "
+            f"their stamps lie {self._problem}: check the clocks of the sensors and of this "
+            "machine, and give a recording that is played a history_file of its own"
+        )
+
+    def _drop_those_ahead(self) -> None:
+        """Drop the kept moves that a clock which was ahead has stamped, here and in the file."""
+        behind, self._behind = self._behind, []
+        begin, count = behind[0].begin, len(self._moves)
+        for kept in (self._moves, self._unwritten):
+            while kept and kept[-1].end > begin:
+                kept.pop()
+        self._batch = None
+        change = partial(forget_moves_after, valve=self._history.valve, time=begin)
+        self._history.keep_soon(change)
+        self._node.get_logger().warning(
+            f"the clock was ahead, and has been set back: {count - len(self._moves)} kept moves in "
+            "service with stamps of a time to come are dropped"
+        )
+        self.left_out -= len(behind)
+        self.add(behind)
 
     def _leave_out(self, problem: str) -> None:
         self.left_out += 1
+        self._left_in_a_row += 1
+        self._problem = problem
         if self.left_out == 1:
             self._node.get_logger().warning(
                 f"a move in service is left out of the evidence: its stamps lie {problem}; "
@@ -87,6 +155,15 @@ class MoveLedger:
             self._history.keep_soon(
                 partial(keep_reference, valve=valve, built=self._built, reference=self.reference)
             )
+
+    def note_change(self, change: Change | None) -> None:
+        """Keep a change of friction in place of the one before; None leaves that."""
+        if change in (None, self.change):
+            return
+        self.change = change
+        self._history.keep_soon(
+            partial(keep_change, valve=self._history.valve, built=self._built, change=change)
+        )
 
     def use(self, built: Valve) -> None:
         """Follow the valve; other forces need other moves, as they do in the file."""
@@ -116,7 +193,9 @@ class MoveLedger:
 
     def _clear(self) -> None:
         self._moves.clear()
-        self._batch = self.reference = None
+        self._batch = self.reference = self.change = None
+        self._left_in_a_row = 0
+        self._behind.clear()
 
     def _written_with(self, built: Valve) -> None:
         if self._unwritten:

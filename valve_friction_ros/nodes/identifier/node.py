@@ -179,6 +179,7 @@ class Identifier(PolledNode):
         busy, thread = max(
             (0.0 if identify.is_preparing else identify.busy_for(), "identifications"),
             (self._workers.files.busy_for(), "bags and reports"),
+            (self._workers.evidence.busy_for(), "moves in service"),
         )
         if busy <= limit:
             return None
@@ -335,7 +336,11 @@ class Identifier(PolledNode):
             estimate,
             self._monitor,
             now.nanoseconds,
-            [*filter(None, [self.poll_failure, self.overdue()]), *self._input_problems()],
+            [
+                *filter(None, [self.poll_failure, self.overdue()]),
+                *self._evidence.problems,
+                *self._input_problems(),
+            ],
             [*self._history.problems, *filter(None, [self._history.conflict])],
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
