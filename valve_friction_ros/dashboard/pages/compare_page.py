@@ -1,6 +1,5 @@
 """The page *Compare*: two identifications, of one valve or of two, side by side."""
 
-import math
 import time
 from urllib.parse import urlencode
 
@@ -10,7 +9,7 @@ from valve_friction_ros.dashboard.board import Board
 from valve_friction_ros.dashboard.compared import Side, compared, side_of_entry, side_of_view
 from valve_friction_ros.dashboard.pages.parts import chip, text
 from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
-from valve_friction_ros.dashboard.plant_rows import number_and_width
+from valve_friction_ros.dashboard.plant_rows import quantity_texts
 from valve_friction_ros.dashboard.times import moment
 from valve_friction_ros.history import HistoryError, ValveHistory
 
@@ -52,8 +51,20 @@ class _ComparePage:
         await self._show()
         ui.timer(1.0, self._tick)
 
-    def _tick(self) -> None:
+    async def _tick(self) -> None:
         self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
+        if self._heard_now() != self._drawn:
+            await self._show()
+
+    def _heard_now(self) -> tuple[tuple[int, bool] | None, ...]:
+        """Return what tells the views of now apart; None for a side that the history holds."""
+        found = []
+        for side in _SIDES:
+            heard = None
+            if self._stamps[side] == _NOW:
+                heard = self._board.plant.valve(self._nodes[side], time.monotonic())
+            found.append(None if heard is None else (heard.revision, heard.is_silent))
+        return tuple(found)
 
     async def _draw_choice(self, side: str, valves: list[tuple[str, str]]) -> None:
         names = {node: f"{tag}   {node.rpartition('/')[0]}" for tag, node in valves}
@@ -97,6 +108,7 @@ class _ComparePage:
         return None if entry is None else side_of_entry(entry)
 
     async def _show(self) -> None:
+        self._drawn = self._heard_now()
         sides = [await self._side(side) for side in _SIDES]
         self._body.clear()
         with self._body:
@@ -112,7 +124,11 @@ class _ComparePage:
                                    ("", "")):  # fmt: skip
                     text("th", title, css)
             with element("tbody"):
+                heard = tuple(
+                    "–" if now is None else ("silent" if now[1] else "now") for now in self._drawn
+                )
                 for name, words in (
+                    ("heard", heard),
                     ("valve", (one.tag, other.tag)),
                     ("identified", tuple(moment(s.time, self._page.zone) for s in (one, other))),
                     ("method", (one.method, other.method)),
@@ -124,8 +140,8 @@ class _ComparePage:
                     with element("tr"):
                         text("td", row.name.replace("_", " "))
                         for quantity in (row.one, row.other):
-                            value, width = number_and_width(quantity.value, quantity.half_width)
-                            unit = quantity.unit if math.isfinite(quantity.value) else ""
+                            value, width = quantity_texts(quantity)
+                            unit = quantity.unit if quantity.if_determined.is_known else ""
                             text("td", f"{value} {width} {unit}".strip(), "vf-n")
                         text("td", row.ratio_words, "vf-n")
                         with element("td"):

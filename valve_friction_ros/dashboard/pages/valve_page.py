@@ -1,6 +1,5 @@
 """The page *Valve*: all that is known of one."""
 
-import math
 import time
 from collections.abc import Callable
 from urllib.parse import urlencode
@@ -27,12 +26,20 @@ from valve_friction_ros.dashboard.pages.valve_history import (
     draw_identifications,
 )
 from valve_friction_ros.dashboard.plant import Heard
-from valve_friction_ros.dashboard.plant_rows import number_and_width, state_words
-from valve_friction_ros.dashboard.selection import state_of
+from valve_friction_ros.dashboard.plant_rows import (
+    interval_text,
+    number_and_width,
+    quantity_texts,
+    ratio_text,
+    state_words,
+)
+from valve_friction_ros.dashboard.selection import Selection, state_of
+from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.times import ago, moment
-from valve_friction_ros.dashboard.valve_files import ValveFiles
+from valve_friction_ros.dashboard.valve_files import OfferedFile, ValveFiles
 from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.history import HistoryError, KeptBaseline, ValveHistory, drift_text
+from valve_friction_ros.outside_text import printable
 
 __all__ = ["valve_page"]
 
@@ -53,7 +60,8 @@ class _ValvePage:
         self._shown: ValveView | None = None
         self._state = ""
         self._revision = -1
-        self._beat = 0
+        self._beat = self._looped = 0
+        self._drawn = (0, 0)
         self._history: ValveHistory | None = None
         self._strip = board.signals.watch(node)
         ui.context.client.on_delete(lambda: board.signals.unwatch(node))
@@ -70,7 +78,7 @@ class _ValvePage:
         with element("article", "vf-valve"):
             with element("div", "vf-valve-head"):
                 with element("div", "vf-valve-name"):
-                    with element("a", "vf-back", href=self._page.link("/")):
+                    with element("a", "vf-back", href=self._page.link("/", **_selection_before())):
                         ui.label("‹ Plant")
                     self._title = text("h1", "")
                     self._chip = element("span")
@@ -150,7 +158,11 @@ class _ValvePage:
         self._chip.clear()
         with self._chip:
             words = "not heard" if heard is None else state_words(heard)
-            chip(self._state, words, "" if self._state == "silent" else view.signal.value)
+            chip(
+                self._state,
+                words,
+                "" if self._state in ("silent", "unheard") else view.signal.value,
+            )
         _retitle(self._sentence, view.sentence or "No message of this valve has been heard.")
         if (
             before is None
@@ -166,12 +178,13 @@ class _ValvePage:
         silent = None if heard is None else heard.silent_for
         ratio = "–"
         if view.ratio is not None:
-            ratio = f"× {view.ratio.value:.2f}  ({view.ratio.low:.2f} to {view.ratio.high:.2f})"
+            between = interval_text(view.ratio, " to ")
+            ratio = f"× {ratio_text(view.ratio.value)}" + (f"  ({between})" if between else "")
         made = view.identified
         age = "" if made is None else f"  ({ago(time.time() - made / 1e9)} ago)"
         facts = {
             "friction ÷ baseline": ratio,
-            "dead band": _with_unit(view.dead_band.value, view.dead_band.half_width, "% of travel"),
+            "dead band": _with_unit(view.dead_band.if_determined, "% of travel"),
             "drift": _drift_words(view),
             "identified": moment(made, self._page.zone) + age,
             "heard": "never" if silent is None else f"{ago(silent)} ago",
@@ -196,7 +209,7 @@ class _ValvePage:
                         text("th", title, css)
                 with element("tbody"):
                     for one in view.parameters:
-                        value, width = number_and_width(one.value, one.half_width)
+                        value, width = quantity_texts(one)
                         with element("tr"):
                             text("td", one.name.replace("_", " "))
                             text("td", value, "vf-n")
@@ -224,13 +237,17 @@ class _ValvePage:
     # The signals
 
     def _show_signals(self) -> None:
-        pressure, stem = self._strip.strips(_COLUMNS)
-        is_there = bool(pressure.times.size or stem.times.size)
-        self._live_note.set_visibility(not is_there)
-        if not is_there:
+        note = self._strip.note()
+        _retitle(self._live_note, note)
+        self._live_note.set_visibility(bool(note))
+        revision = self._strip.revision
+        if revision == self._drawn:
             return
+        self._drawn = revision
+        pressure, stem = self._strip.strips(_COLUMNS)
         self._live.run_chart_method("setOption", {"series": live_data(pressure, stem)})
-        if self._beat % _SLOWER == 0 and hasattr(self, "_loop"):
+        if hasattr(self, "_loop") and self._looped + _SLOWER <= self._beat:
+            self._looped = self._beat
             loop = loop_data(self._strip.loop(_LOOP))
             self._loop.run_chart_method("setOption", {"series": [{}, {"data": loop}]})
 
@@ -253,12 +270,20 @@ class _ValvePage:
             (self._entries_body, lambda: draw_identifications(kept, zone, self._compare)),
             (self._baselines_body, lambda: draw_baselines(kept, zone)),
             (self._alarms_body, lambda: draw_alarms(kept, zone)),
-            (self._files_body, lambda: draw_files(files or [], zone)),
+            (self._files_body, lambda: self._draw_files(files or [])),
         )
         for body, draw in draws:
             body.clear()
             with body:
                 draw()
+
+    def _draw_files(self, files: list[OfferedFile]) -> None:
+        valves = self._board.plant.valves(time.monotonic())
+        sharing = ValveFiles.sharing(self._view().namespace, (one.view.namespace for one in valves))
+        if files and sharing:
+            names = printable(", ".join(sharing), 300)
+            text("p", f"Files of {names} have the same names: they stand here too.", "vf-none")
+        draw_files(files, self._page.zone)
 
     def _compare(self, stamp: int) -> str:
         return self._page.link("/compare", a=self._node, at=str(stamp), b=self._node)
@@ -282,6 +307,7 @@ class _ValvePage:
         record = None if healthy is None else healthy.record
         with self._loop_body:
             self._loop = ui.echart(loop_chart(record)).classes("vf-chart-loop")
+            self._drawn = (-1, 0)
             self._loop.props["aria-label"] = "Signature: stem over pressure"
             if record is None:
                 text("p", "The record of the baseline is not kept.", "vf-none")
@@ -299,6 +325,12 @@ class _ValvePage:
         self._revision = -1  # files and history may be new
 
 
+def _selection_before() -> dict[str, str]:
+    """Return search and filters of the plant, where the visitor has come from its page."""
+    referrer = ui.context.client.request.headers.get("referer", "")
+    return Selection.from_address(referrer).to_query()
+
+
 def _retitle(made: ui.element, words: str) -> None:
     label = made.default_slot.children[0]
     if isinstance(label, ui.label):
@@ -311,16 +343,14 @@ def _fact(name: str) -> ui.label:
         return ui.label("").classes("vf-fact-value")
 
 
-def _with_unit(value: float, half_width: float, unit: str) -> str:
-    if not math.isfinite(value):
-        return "–"
-    return f"{' '.join(number_and_width(value, half_width)).strip()} {unit}"
+def _with_unit(one: Quantity, unit: str) -> str:
+    return f"{' '.join(quantity_texts(one)).strip()} {unit}" if one.is_known else "–"
 
 
 def _drift_words(view: ValveView) -> str:
     if view.drift is None:
-        return "none that is significant"
-    words = _with_unit(view.drift.value, view.drift.half_width, "N a month")
+        return "none that is significant" if view.friction.is_known else "–"
+    words = _with_unit(Quantity("", view.drift.value, view.drift.half_width), "N a month")
     expected = view.drift.expected
     sign = "+" if view.drift.value > 0 else ""
     return f"{sign}{words}; limit {expected.date}" if expected else f"{sign}{words}"
