@@ -1,6 +1,8 @@
 """What was found on a valve stays until it is measured anew."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -83,15 +85,18 @@ def test_the_reach_is_that_of_the_farthest_record_until_a_stop_is_met():
 
 class TestMonitor:
     @pytest.fixture
-    def monitor(self, monkeypatch):
+    def monitor(self, monkeypatch, unknown):
         """A monitor of a valve that has lost travel, and then shows nothing of it."""
         monitor = FrictionMonitor(MonitorSettings(VALVE))
         monitor.baseline = HEALTHY
         monkeypatch.setattr(
-            "valve_friction_ros.health.friction_monitor.valve_numbers", lambda result: result
+            "valve_friction_ros.health.friction_monitor.valve_numbers",
+            lambda found: found.numbers,
         )
-        monitor.accept(LOST, 0)
-        monitor.accept(WITHIN, DAY)
+        for time, numbers in ((0, LOST), (DAY, WITHIN)):
+            friction = {"coulomb_friction": unknown()}
+            found = SimpleNamespace(numbers=numbers, parameters=friction, sliding_speed=math.nan)
+            monitor.accept(found, time)
         return monitor
 
     def test_the_finding_stays(self, monitor):
