@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from simulated_plant import hear
 
 from valve_friction_ros.dashboard import Selection, Status, selected
+from valve_friction_ros.dashboard.plant_rows import state_words, summary
 from valve_friction_ros.dashboard.selection import SORTS, STATES, levels_in, state_of
+from valve_friction_ros.health import Level
 
 NOW = 101.0
 
@@ -18,11 +20,49 @@ def tags(plant, selection=None, now=NOW):
 
 
 def test_the_worst_come_first(plant):
-    """Errors by their change, then warnings, then the good by theirs; those without ratio last."""
+    """Errors by their change, then warnings, then those without a baseline, then the good."""
     order = tags(plant)
     assert set(order[:2]) == {"FV-106", "FV-107"}  # × 2.3 and × 0.41
     assert set(order[2:4]) == {"FV-105", "FV-109"}
-    assert order[-1] == "FV-108"  # without a baseline
+    assert order[4] == "FV-108"  # without a baseline
+
+
+def test_a_valve_is_good_only_by_comparison_with_a_baseline(plant):
+    good, new = plant.valves(NOW)[0], plant.valves(NOW)[7]
+    assert (state_of(good), state_words(good)) == ("ok", "good")
+    assert (new.view.level, state_of(new), state_words(new)) == (Level.OK, "unknown", "no baseline")
+    unsure = replace(new, view=replace(new.view, parameters=()))
+    assert (state_of(unsure), state_words(unsure)) == ("unknown", "unknown")
+
+
+def test_all_good_is_said_of_good_valves_only():
+    assert summary({"error": 0, "ok": 2}) == "2 valves, all good"
+    assert summary({"unknown": 2, "ok": 0}) == "2 valves: 2 unknown"
+    assert summary({"error": 1, "unknown": 2, "ok": 1, "unheard": 3}) == (
+        "7 valves: 1 error, 2 unknown, 3 not heard"
+    )
+    assert summary({"ok": 0}) == "No valve yet"
+
+
+def test_what_only_the_history_knows_comes_last(plant):
+    plant.expect([("/x/identifier", "X")])
+    assert tags(plant)[-1] == "X"
+    assert tags(plant, Selection(states=frozenset({"unheard"}))) == ["X"]
+    hear(plant, Status("/x/identifier: friction", 0, "X", "", {}), NOW)
+    assert state_of(plant.valve("/x/identifier", NOW + 30.0)) == "silent"
+
+
+@pytest.mark.parametrize(
+    ("address", "query"),
+    [
+        ("http://127.0.0.1:8080/?q=fv&show=warn&tz=UTC", {"q": "fv", "show": "warn"}),
+        ("http://127.0.0.1:8080/valve?q=fv", {}),
+        ("http://[", {}),
+        ("", {}),
+    ],
+)
+def test_the_way_back_keeps_search_and_filters(address, query):
+    assert Selection.from_address(address).to_query() == query
 
 
 def test_a_silent_valve_comes_after_errors_and_before_warnings(plant):
@@ -90,7 +130,7 @@ def test_any_address_is_read(query):
 
 def test_states_are_counted(plant):
     assert levels_in(plant.valves(NOW)) == {
-        "error": 2, "silent": 0, "warn": 2, "ok": 5, "unknown": 0,
+        "error": 2, "silent": 0, "warn": 2, "unknown": 1, "ok": 4, "unheard": 0,
     }  # fmt: skip
     heard = plant.valves(NOW)[0]
     assert state_of(replace(heard, view=replace(heard.view, level=None))) == "unknown"

@@ -1,13 +1,24 @@
 """The store of a plant: filled by one thread, drained by others."""
 
+import math
 import threading
 
+import pytest
 from simulated_plant import hear, values_of_valve
 
 from valve_friction_ros.dashboard import Plant, Status
-from valve_friction_ros.dashboard.plant import MOST_VALVES
-from valve_friction_ros.dashboard.plant_rows import RowFeed, number_and_width, row_of
+from valve_friction_ros.dashboard.plant import MOST_VALVES, Heard
+from valve_friction_ros.dashboard.plant_rows import (
+    RowFeed,
+    interval_text,
+    number_and_width,
+    quantity_texts,
+    ratio_text,
+    row_of,
+)
+from valve_friction_ros.dashboard.selection import SORTS
 from valve_friction_ros.dashboard.sparkline import sparkline
+from valve_friction_ros.dashboard.valve_view import Interval
 
 DAY = 86_400_000_000_000
 
@@ -37,6 +48,31 @@ def test_names_from_outside_do_not_fill_the_memory():
     assert len(plant.valves(0.0)) == MOST_VALVES
     hear(plant, Status("/v3/identifier: friction", 2, "", "late", {}), 1.0)
     assert plant.valve("/v3/identifier", 1.0).view.sentence == "late"
+
+
+def test_a_name_that_nothing_keeps_is_forgotten():
+    plant = Plant(5.0)
+    plant.expect([("/kept/identifier", "KEPT")])
+    for name in ("kept", "passing", "late"):
+        hear(plant, Status(f"/{name}/identifier: friction", 0, "", "", {}), 0.0)
+    hear(plant, Status("/late/identifier: friction", 0, "", "", {}), 100.0)
+    assert {one.view.node for one in plant.valves(3599.0)} == {
+        "/kept/identifier", "/passing/identifier", "/late/identifier"
+    }  # fmt: skip
+    assert {one.view.node for one in plant.valves(3690.0)} == {
+        "/kept/identifier", "/late/identifier"
+    }  # fmt: skip
+    hear(plant, Status("/new/identifier: friction", 0, "", "", {}), 3691.0)
+    numbers = [one.number for one in plant.valves(3691.0)]
+    assert len(set(numbers)) == 3  # none takes the number of another
+
+
+def test_room_is_made_though_nobody_looks():
+    plant = Plant(5.0)
+    for index in range(MOST_VALVES):
+        hear(plant, Status(f"/v{index}/identifier: friction", 0, "", "", {}), 0.0)
+    hear(plant, Status("/new/identifier: friction", 0, "", "", {}), 4000.0)
+    assert [one.view.node for one in plant.valves(4000.0)] == ["/new/identifier"]
 
 
 def test_it_is_filled_while_it_is_drained():
@@ -107,6 +143,63 @@ def test_numbers_have_the_digits_that_their_intervals_leave():
     assert number_and_width(-3.14159, 0.21) == ("−3.14", "± 0.21")
     assert number_and_width(float("nan"), 1.0) == ("–", "")
     assert number_and_width(1.6, 0.0) == ("1.6", "")
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "texts"),
+    [
+        (3.2e-7, 4.1e-8, ("3.2e-07", "± 4.1e-08")),
+        (3.2e-7, math.nan, ("3.2e-07", "")),
+        (0.002, 0.00012, ("0.00200", "± 0.00012")),
+        (600.0, 2e-9, ("600", "± 2e-09")),
+        (1.234e300, 1e299, ("1.234e+300", "± 1e+299")),
+        (-1.234e300, math.nan, ("−1.23e+300", "")),
+        (12.0, 3e200, ("12", "± 3e+200")),
+        (0.0, 0.5, ("0.00", "± 0.50")),
+    ],
+)
+def test_tiny_and_huge_numbers_are_short(value, half_width, texts):
+    assert number_and_width(value, half_width) == texts
+
+
+def test_a_ratio_of_any_size_is_short():
+    assert [ratio_text(one) for one in (1.234, 0.0, 0.0004, 3e200)] == [
+        "1.23", "0.00", "0.0004", "3e+200"
+    ]  # fmt: skip
+    assert interval_text(Interval(1.05, math.nan, math.nan), " to ") == ""
+    assert interval_text(Interval(1.05, 1.0, 1.1), " to ") == "1.00 to 1.10"
+
+
+def valve(**changes):
+    """A row and the view of a made-up valve with other values."""
+    name, level, tag, message, values = values_of_valve(0)
+    plant = Plant(5.0)
+    hear(plant, Status(name, level, tag, message, {**values, **changes}), 0.0)
+    (heard,) = plant.valves(0.0)
+    return row_of(heard, None, 0.0, ""), heard.view
+
+
+def test_a_friction_that_the_record_does_not_determine_is_no_number():
+    row, view = valve()
+    assert row["fcof"] == "F_c"
+    assert row["dead"] != "–"
+    open_ = {"coulomb_friction verdict": "not identifiable"}
+    row, view = valve(**open_)
+    assert (row["fcof"], row["fc"]) == ("sliding", quantity_texts(view.friction)[0])
+    assert view.friction.name == "sliding_friction"
+    assert (row["dead"], row["deadw"]) == ("–", "")
+    row, view = valve(**open_, **{"sliding_friction verdict": "not identifiable"})
+    assert (row["fc"], row["fcw"], row["fcof"]) == ("–", "", "")
+    assert SORTS["friction"](plant_of(view))[0] == math.inf
+
+
+def plant_of(view):
+    return Heard(0, view, 0.0, False)
+
+
+def test_frictions_are_sorted_by_what_is_shown():
+    _, sliding = valve(**{"coulomb_friction [N]": "nan", "sliding_friction [N]": "512"})
+    assert SORTS["friction"](plant_of(sliding))[0] == -512
 
 
 def test_a_sparkline_grows_upwards():

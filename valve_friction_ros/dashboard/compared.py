@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from valve_friction_ros.dashboard.plant_rows import ratio_text
 from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.history import HistoryEntry
@@ -57,8 +58,9 @@ class Difference:
         """The ratio with its interval."""
         if not math.isfinite(self.ratio):
             return "–"
-        width = f" ± {self.half_width:.2f}" if math.isfinite(self.half_width) else ""
-        return f"{self.ratio:.2f}{width}"
+        if not math.isfinite(self.half_width) or not 0.01 <= abs(self.ratio) < 1e4:
+            return ratio_text(self.ratio)
+        return f"{self.ratio:.2f} ± {self.half_width:.2f}"
 
 
 def side_of_view(view: ValveView) -> Side:
@@ -98,8 +100,9 @@ def compared(one: Side, other: Side) -> tuple[Difference, ...]:
 
 
 def _difference(name: str, one: Quantity, other: Quantity) -> Difference:
-    ratio = other.value / one.value if one.value else math.nan
-    shares = [each.half_width / each.value if each.value else math.nan for each in (one, other)]
     is_open = any(each.verdict in ("fixed", "not identifiable") for each in (one, other))
+    known, value = one.if_determined.value, other.if_determined.value
+    ratio = value / known if known else math.nan
+    shares = [each.half_width / each.value if each.value else math.nan for each in (one, other)]
     width = math.nan if is_open else abs(ratio) * math.hypot(*shares)
     return Difference(name, one, other, ratio, width)

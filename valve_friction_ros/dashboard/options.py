@@ -31,8 +31,8 @@ class DashboardOptions:
         Port that it listens at.
     history_file : Path or None
         The history of the valves; None: there is none.
-    folders : mapping of str to Path
-        What it serves files from, by name: ``reports``, ``bags``, ``alarms``.
+    reports, bags, alarms : Path or None
+        The folders that it serves files from; None: there are none.
     time_zone : str
         Zone of the times, where the address names no other.
     silence : float

@@ -1,5 +1,7 @@
 """The valves of a plant as they were heard last: filled by callbacks, drained by pages."""
 
+import itertools
+import math
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -17,6 +19,11 @@ __all__ = ["MOST_VALVES", "Heard", "Plant"]
 
 MOST_VALVES = 5000
 """Most valves that are kept: the names come from outside, and might never end."""
+
+_FORGETTING = 3600.0
+"""Silence, s, after which a valve is forgotten that the history does not keep."""
+_TIDYING = 60.0
+"""Time between two looks for valves to forget, s."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,7 @@ class _Valve:
         self.unread: Callable[[], Status] | None = None
         self.essence: Essence = ()
         self.revision = 0
+        self.is_kept = False
         self.view = view
 
     def look(self, node: str) -> None:
@@ -87,6 +95,8 @@ class Plant:
         self._silence = silence
         self._lock = threading.Lock()
         self._valves: dict[str, _Valve] = {}
+        self._numbers = itertools.count()
+        self._tidied = -math.inf
 
     def hear(self, name: str, read: Callable[[], Status], at: float) -> None:
         """Take the status of this name that came at a time, s of the monotonic clock.
@@ -98,25 +108,44 @@ class Plant:
         if node is None:
             return
         with self._lock:
+            self._tidy(at)
             if (valve := self._entry(node, "")) is not None:
                 valve.at, valve.unread = at, read
 
     def expect(self, valves: Iterable[tuple[str, str]]) -> None:
-        """Show valves, (identifier, tag) each, that were never heard: silent until they are."""
+        """Show valves, (identifier, tag) each, that the history keeps, also before they are heard.
+
+        They are never forgotten.
+        """
         with self._lock:
             for node, tag in valves:
-                self._entry(node, tag)
+                if (valve := self._entry(node, tag)) is not None:
+                    valve.is_kept = True
+
+    def _tidy(self, now: float) -> None:
+        """Forget the valves that nothing keeps and that have been silent for long."""
+        if now < self._tidied + _TIDYING:
+            return
+        self._tidied = now
+        gone = [
+            node
+            for node, valve in self._valves.items()
+            if not valve.is_kept and valve.at is not None and now > valve.at + _FORGETTING
+        ]
+        for node in gone:
+            del self._valves[node]
 
     def _entry(self, node: str, tag: str) -> _Valve | None:
         valve = self._valves.get(node)
         if valve is None and len(self._valves) < MOST_VALVES:
             view = view_of(node, Status("", 3, tag, "", {}))
-            valve = self._valves[node] = _Valve(len(self._valves), view)
+            valve = self._valves[node] = _Valve(next(self._numbers), view)
         return valve
 
     def valves(self, now: float) -> list[Heard]:
         """Return all valves as they are at a time, s of the monotonic clock, in a fixed order."""
         with self._lock:
+            self._tidy(now)
             return [self._heard(node, valve, now) for node, valve in self._valves.items()]
 
     def valve(self, node: str, now: float) -> Heard | None:

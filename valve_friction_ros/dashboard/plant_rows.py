@@ -1,16 +1,26 @@
 """Rows of the plant's table: texts and numbers ready for the browser, and what has changed."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from valve_friction_ros.dashboard.plant import Heard
 from valve_friction_ros.dashboard.selection import state_of
 from valve_friction_ros.dashboard.sparkline import Sparkline
+from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.valve_view import Interval, ValveView
-from valve_friction_ros.identification import two_digits
 
-__all__ = ["SIGNAL_WORDS", "RowFeed", "row_of", "state_words"]
+__all__ = [
+    "SIGNAL_WORDS",
+    "RowFeed",
+    "interval_text",
+    "number_and_width",
+    "quantity_texts",
+    "ratio_text",
+    "row_of",
+    "state_words",
+    "summary",
+]
 
 _SAY = 240
 _LOWEST, _HIGHEST = 0.25, 4.0
@@ -24,7 +34,8 @@ SIGNAL_WORDS = {
     "": "good",
 }
 _SHORT = {"F": "failure", "C": "check", "S": "out of spec", "M": "maintenance"}
-_STATE_WORDS = {"silent": "silent", "unknown": "unknown", "ok": "good"}
+_STATE_WORDS = {"silent": "silent", "unheard": "not heard", "ok": "good"}
+_FRICTIONS = {"coulomb_friction": "F_c", "sliding_friction": "sliding"}
 
 Row = dict[str, Any]
 """A row under fixed keys: no key is ever a text from outside."""
@@ -33,28 +44,64 @@ Row = dict[str, Any]
 def state_words(valve: Heard) -> str:
     """Return the state of a valve in a word or two."""
     state = state_of(valve)
-    if state in ("silent", "unknown"):
-        return _STATE_WORDS[state]
-    return (
-        _SHORT[valve.view.signal.value]
-        if valve.view.signal.value
-        else _STATE_WORDS.get(state, state)
-    )
+    if state == "unknown":
+        view = valve.view
+        is_new = view.level is not None and view.friction.is_known and not view.baseline
+        return "no baseline" if is_new else "unknown"
+    if valve.is_silent or not valve.view.signal.value:
+        return _STATE_WORDS.get(state, state)
+    return _SHORT[valve.view.signal.value]
+
+
+def summary(counts: Mapping[str, int]) -> str:
+    """Say how many valves there are, and how many of each state that is not good."""
+    total = sum(counts.values())
+    if not total:
+        return "No valve yet"
+    others = [
+        f"{count} {_STATE_WORDS.get(state, state)}"
+        for state, count in counts.items()
+        if count and state != "ok"
+    ]
+    valves = f"{total} valve{'s' if total > 1 else ''}"
+    return f"{valves}: {', '.join(others)}" if others else f"{valves}, all good"
 
 
 def number_and_width(value: float, half_width: float) -> tuple[str, str]:
     """Write a number and half the width of its interval, to four digits at most."""
     if not math.isfinite(value):
         return "–", ""
+    is_plain = value == 0 or 1e-4 <= abs(value) < 1e6
     if not math.isfinite(half_width) or half_width <= 0:
-        return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}", ""
+        digits = f"{value:.3g}" if abs(value) < 1000 or not is_plain else f"{value:.0f}"
+        return _minus(digits), ""
+    if not is_plain or not 1e-6 <= half_width < 1e6:
+        return _minus(f"{value:.4g}"), f"± {half_width:.2g}"
     of_width = 1 - math.floor(math.log10(half_width))
     of_value = 3 - math.floor(math.log10(abs(value))) if value else 3
-    places = min(max(0, min(of_width, of_value)), 6)
-    if abs(value) >= 1e6:
-        return f"{value:.4g}", f"± {two_digits(half_width)}"
-    width = f"{half_width:.{max(0, min(of_width, 6))}f}"
-    return f"{value:.{places}f}".replace("-", "−"), f"± {width}"
+    places = min(max(0, min(of_width, of_value)), 7)
+    return _minus(f"{value:.{places}f}"), f"± {half_width:.{max(0, min(of_width, 7))}f}"
+
+
+def ratio_text(ratio: float) -> str:
+    """Write a ratio with two decimals, or with two digits where these would not show it."""
+    return f"{ratio:.2f}" if ratio == 0 or 0.01 <= abs(ratio) < 1e4 else f"{ratio:.2g}"
+
+
+def interval_text(ratio: Interval, between: str) -> str:
+    """Write the interval of a ratio; empty where it has none."""
+    ends = (ratio.low, ratio.high)
+    return between.join(map(ratio_text, ends)) if all(map(math.isfinite, ends)) else ""
+
+
+def _minus(number: str) -> str:
+    return f"−{number[1:]}" if number.startswith("-") else number
+
+
+def quantity_texts(one: Quantity) -> tuple[str, str]:
+    """Write a quantity and half its interval; a dash where the record does not determine it."""
+    known = one.if_determined
+    return number_and_width(known.value, known.half_width)
 
 
 def _place(ratio: float) -> float:
@@ -66,9 +113,8 @@ def _place(ratio: float) -> float:
 def _ratio(ratio: Interval | None) -> Row:
     if ratio is None:
         return {"ratio": "–", "between": "", "bar": None}
-    between = f"{ratio.low:.2f}–{ratio.high:.2f}" if math.isfinite(ratio.low) else ""
     bar = [_place(one) if math.isfinite(one) else _place(ratio.value) for one in ratio[:3]]
-    return {"ratio": f"{ratio.value:.2f}", "between": between, "bar": bar}
+    return {"ratio": ratio_text(ratio.value), "between": interval_text(ratio, "–"), "bar": bar}
 
 
 def _drift(view: ValveView) -> Row:
@@ -86,11 +132,9 @@ def _drift(view: ValveView) -> Row:
 def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row:
     """Return the row of a valve; `wall` is the time of day, s since 1970."""
     view = valve.view
-    dead, dead_width = number_and_width(view.dead_band.value, view.dead_band.half_width)
-    friction = view.parameter("coulomb_friction")
-    if not friction.is_known:
-        friction = view.parameter("sliding_friction")
-    value, width = number_and_width(friction.value, friction.half_width)
+    dead, dead_width = quantity_texts(view.dead_band)
+    friction = view.friction
+    value, width = quantity_texts(friction)
     silent = valve.is_silent and valve.silent_for is not None
     return {
         "i": valve.number,
@@ -106,6 +150,7 @@ def row_of(valve: Heard, spark: Sparkline | None, wall: float, href: str) -> Row
         "deadw": dead_width,
         "fc": value,
         "fcw": width,
+        "fcof": _FRICTIONS[friction.name] if friction.is_known else "",
         **_drift(view),
         "spark": spark.path if spark else "",
         "base": spark.base if spark else "",

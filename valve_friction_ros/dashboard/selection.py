@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
-from urllib.parse import urlencode
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from valve_friction_ros.dashboard.plant import Heard
-from valve_friction_ros.health import StatusSignal
+from valve_friction_ros.health import Level, StatusSignal
 
 __all__ = [
     "SIGNALS",
@@ -20,18 +20,24 @@ __all__ = [
     "worst_first",
 ]
 
-STATES = ("error", "silent", "warn", "ok", "unknown")
-"""States of a valve, the worst first."""
+STATES = ("error", "silent", "warn", "unknown", "ok", "unheard")
+"""States of a valve, the worst first; ``unheard``: only the history knows it."""
 
 SIGNALS = tuple(one.value for one in StatusSignal if one.value)
 _LONGEST_SEARCH = 200
 
 
 def state_of(valve: Heard) -> str:
-    """Return the state of a valve: its level in small letters, or that it is silent."""
+    """Return the state of a valve: its level in small letters, or that it is silent.
+
+    A valve is ``ok`` only where a comparison with a baseline found nothing.
+    """
     if valve.is_silent:
-        return "silent"
-    return "unknown" if valve.view.level is None else valve.view.level.name.lower()
+        return "unheard" if valve.silent_for is None else "silent"
+    level = valve.view.level
+    if level is None or (level is Level.OK and valve.view.ratio is None):
+        return "unknown"
+    return level.name.lower()
 
 
 def _severity(valve: Heard) -> float:
@@ -39,9 +45,10 @@ def _severity(valve: Heard) -> float:
 
     What was said last still orders the silent ones.
     """
-    if valve.is_silent:
+    state = state_of(valve)
+    if state == "silent":
         return 1.5 + 0.1 * (valve.view.level or 0)
-    return -1.0 if valve.view.level is None else float(valve.view.level)
+    return {"error": 2.0, "warn": 1.0, "unknown": 0.5, "ok": 0.0, "unheard": -1.0}[state]
 
 
 def _change(valve: Heard) -> float:
@@ -56,7 +63,12 @@ def _or(value: float | None, missing: float = -math.inf) -> float:
 
 def worst_first(valve: Heard) -> tuple[Any, ...]:
     """Return the key by which the valve that needs attention most comes first."""
-    return (-_severity(valve), -_change(valve), -_or(valve.view.dead_band.value), valve.view.tag)
+    return (
+        -_severity(valve),
+        -_change(valve),
+        -_or(valve.view.dead_band.if_determined.value),
+        valve.view.tag,
+    )
 
 
 def _by_number(value: Callable[[Heard], float | None]) -> Callable[[Heard], tuple[Any, ...]]:
@@ -67,8 +79,8 @@ SORTS: dict[str, Callable[[Heard], tuple[Any, ...]]] = {
     "worst": worst_first,
     "tag": lambda valve: (valve.view.tag, valve.view.node),
     "ratio": _by_number(lambda valve: valve.view.ratio and valve.view.ratio.value),
-    "dead_band": _by_number(lambda valve: valve.view.dead_band.value),
-    "friction": _by_number(lambda valve: valve.view.parameter("coulomb_friction").value),
+    "dead_band": _by_number(lambda valve: valve.view.dead_band.if_determined.value),
+    "friction": _by_number(lambda valve: valve.view.friction.value),
     "drift": _by_number(lambda valve: valve.view.drift and abs(valve.view.drift.value)),
     "age": lambda valve: (valve.view.identified or 0, valve.view.tag),
 }
@@ -113,6 +125,15 @@ class Selection:
             is_reversed=order.startswith("-"),
             is_tiled=query.get("view") == "tiles",
         )
+
+    @classmethod
+    def from_address(cls, address: str) -> "Selection":
+        """Read the address of a page of the plant; what shows all for that of another page."""
+        try:
+            parts = urlsplit(address)
+            return cls.from_query(dict(parse_qsl(parts.query)) if parts.path == "/" else {})
+        except ValueError:
+            return cls()
 
     def to_query(self) -> dict[str, str]:
         """Return what an address has to hold; nothing that is usual."""

@@ -48,6 +48,13 @@ class Quantity(NamedTuple):
         """Whether there is a value."""
         return math.isfinite(self.value)
 
+    @property
+    def if_determined(self) -> "Quantity":
+        """The same, without value and width where the record does not determine it."""
+        if self.verdict != "not identifiable":
+            return self
+        return self._replace(value=math.nan, half_width=math.nan)
+
 
 def number(text: str | None) -> float:
     """Read a number; nan for a text that is none."""

@@ -173,6 +173,13 @@ class ValveView:
         found = (one for one in self.parameters if one.name == name)
         return next(found, Quantity(name, math.nan))
 
+    @property
+    def friction(self) -> Quantity:
+        """The Coulomb friction; the sliding friction where the record determines that alone."""
+        coulomb = self.parameter("coulomb_friction").if_determined
+        sliding = self.parameter("sliding_friction").if_determined
+        return sliding if sliding.is_known and not coulomb.is_known else coulomb
+
 
 def identifier_in(name: str) -> str | None:
     """Return the identifier that a status of this name is of; None for another one's status."""
@@ -286,7 +293,9 @@ def _dead_band(values: Mapping[str, str], parameters: tuple[Quantity, ...]) -> Q
     if spring.verdict == "fixed":
         stiffness = 0.0
     share = math.hypot(friction, stiffness)
-    return Quantity("dead_band", value, abs(value * share), "%", coulomb.verdict)
+    verdicts = [one.verdict for one in (coulomb, static, spring)]
+    verdict = "not identifiable" if "not identifiable" in verdicts else coulomb.verdict
+    return Quantity("dead_band", value, abs(value * share), "%", verdict)
 
 
 def _baseline(values: Mapping[str, str]) -> tuple[Quantity, ...]:

@@ -1,6 +1,5 @@
 """The page *Compare*: two identifications, of one valve or of two, side by side."""
 
-import math
 import time
 from urllib.parse import urlencode
 
@@ -10,7 +9,7 @@ from valve_friction_ros.dashboard.board import Board
 from valve_friction_ros.dashboard.compared import Side, compared, side_of_entry, side_of_view
 from valve_friction_ros.dashboard.pages.parts import chip, text
 from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
-from valve_friction_ros.dashboard.plant_rows import number_and_width
+from valve_friction_ros.dashboard.plant_rows import quantity_texts
 from valve_friction_ros.dashboard.times import moment
 from valve_friction_ros.history import HistoryError, ValveHistory
 
@@ -124,8 +123,8 @@ class _ComparePage:
                     with element("tr"):
                         text("td", row.name.replace("_", " "))
                         for quantity in (row.one, row.other):
-                            value, width = number_and_width(quantity.value, quantity.half_width)
-                            unit = quantity.unit if math.isfinite(quantity.value) else ""
+                            value, width = quantity_texts(quantity)
+                            unit = quantity.unit if quantity.if_determined.is_known else ""
                             text("td", f"{value} {width} {unit}".strip(), "vf-n")
                         text("td", row.ratio_words, "vf-n")
                         with element("td"):

@@ -11,7 +11,7 @@ from valve_friction_ros.dashboard.board import Board
 from valve_friction_ros.dashboard.pages.plant_table import PlantTable
 from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
 from valve_friction_ros.dashboard.plant import Heard
-from valve_friction_ros.dashboard.plant_rows import SIGNAL_WORDS, RowFeed
+from valve_friction_ros.dashboard.plant_rows import SIGNAL_WORDS, RowFeed, summary
 from valve_friction_ros.dashboard.selection import (
     SIGNALS,
     STATES,
@@ -30,9 +30,9 @@ _COLUMNS = [
         ("state", "State", "", "worst"),
         ("tag", "Valve", "", "tag"),
         ("say", "Diagnosis", "", ""),
-        ("ratio", "Friction", "÷ baseline", "ratio"),
+        ("ratio", "Ratio", "÷ baseline", "ratio"),
         ("dead", "Dead band", "%", "dead_band"),
-        ("fc", "F_c", "N", "friction"),
+        ("fc", "Friction", "N", "friction"),
         ("trend", "Trend", "", ""),
         ("drift", "Drift", "N/month", "drift"),
         ("age", "Identified", "ago", "age"),
@@ -43,8 +43,9 @@ _STATE_TEXT = {
     "error": "error",
     "silent": "silent",
     "warn": "warn",
-    "ok": "good",
     "unknown": "unknown",
+    "ok": "good",
+    "unheard": "not heard",
 }
 
 
@@ -108,7 +109,7 @@ class _PlantPage:
         for state, (_, label) in self._chips.items():
             if state in counts:
                 label.set_text(str(counts[state]))
-        self._title.set_text(_summary(counts, len(heard)))
+        self._title.set_text(summary(counts))
         self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
         self._note.set_text(self._board.kept.problem or "")
 
@@ -175,14 +176,6 @@ class _PlantPage:
 
 def _wall() -> float:
     return time.time()
-
-
-def _summary(counts: dict[str, int], total: int) -> str:
-    if not total:
-        return "No valve yet"
-    urgent = [f"{counts[state]} {state}" for state in ("error", "silent", "warn") if counts[state]]
-    valves = f"{total} valve{'s' if total > 1 else ''}"
-    return f"{valves}: {', '.join(urgent)}" if urgent else f"{valves}, all good"
 
 
 def plant_page(board: Board, query: dict[str, str]) -> None:

@@ -46,7 +46,7 @@ export default {
               :style="{left: row.bar[0] + '%'}"></u><s></s></span>
             <b>{{ row.ratio }}</b><small>{{ row.between }}</small></td>
           <td class="vf-c-dead vf-n" data-label="dead band, %"><b>{{ row.dead }}</b><small>{{ row.deadw }}</small></td>
-          <td class="vf-c-fc vf-n" data-label="friction F_c, N"><b>{{ row.fc }}</b><small>{{ row.fcw }}</small></td>
+          <td class="vf-c-fc vf-n" data-label="friction, N"><b>{{ row.fc }}</b><small>{{ row.fcw }}</small><small class="vf-of">{{ row.fcof }}</small></td>
           <td class="vf-c-trend"><svg v-if="row.spark" viewBox="0 0 100 24" preserveAspectRatio="none"
               role="img" :aria-label="'friction ratio of the last ' + row.days + ' days'">
               <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg></td>
@@ -65,7 +65,7 @@ export default {
             <small>{{ row.between }}</small>
             <svg v-if="row.spark" viewBox="0 0 100 24" preserveAspectRatio="none" aria-hidden="true">
               <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg>
-            <small>{{ row.state === "silent" ? heard(row) : since(row) }}</small></span>
+            <small>{{ ["silent", "unheard"].includes(row.state) ? heard(row) : since(row) }}</small></span>
         </a>
       </li>
     </ul>
@@ -95,7 +95,7 @@ export default {
     },
     since(row) { return row.made ? age(this.now - row.made) : "–"; },
     heard(row) {
-      if (row.state !== "silent") return this.lost > 4 ? age(this.lost) : "live";
+      if (!["silent", "unheard"].includes(row.state)) return this.lost > 4 ? age(this.lost) : "live";
       return row.last ? age(this.now - row.last) : "never";
     },
     open(event, row) {

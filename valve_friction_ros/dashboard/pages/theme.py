@@ -72,7 +72,7 @@ def frame(
     ui.page_title(title)
     ui.dark_mode(_THEMES.get(theme))
     address = AddressBar()
-    element("a", "vf-skip", href="#content").set_visibility(True)
+    _link("Skip to the content", "#content").classes("vf-skip")
     with element("header", "vf-bar-top"):
         with element("nav", "vf-nav", aria_label="Pages"):
             element("span", "vf-mark", aria_hidden="true")
@@ -87,7 +87,7 @@ def frame(
             _choice("Time zone", _zones(board, zone), zone.key, "tz", common, here)
             _choice("Theme", tuple(_THEMES), theme, "theme", common, here)
             _account(board)
-    with element("main", "vf-main", id="content"):
+    with element("main", "vf-main", id="content", tabindex="-1"):
         yield Frame(zone, common, address, clock)
 
 

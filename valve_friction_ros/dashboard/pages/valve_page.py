@@ -1,6 +1,5 @@
 """The page *Valve*: all that is known of one."""
 
-import math
 import time
 from collections.abc import Callable
 from urllib.parse import urlencode
@@ -27,8 +26,15 @@ from valve_friction_ros.dashboard.pages.valve_history import (
     draw_identifications,
 )
 from valve_friction_ros.dashboard.plant import Heard
-from valve_friction_ros.dashboard.plant_rows import number_and_width, state_words
-from valve_friction_ros.dashboard.selection import state_of
+from valve_friction_ros.dashboard.plant_rows import (
+    interval_text,
+    number_and_width,
+    quantity_texts,
+    ratio_text,
+    state_words,
+)
+from valve_friction_ros.dashboard.selection import Selection, state_of
+from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.times import ago, moment
 from valve_friction_ros.dashboard.valve_files import ValveFiles
 from valve_friction_ros.dashboard.valve_view import ValveView
@@ -70,7 +76,7 @@ class _ValvePage:
         with element("article", "vf-valve"):
             with element("div", "vf-valve-head"):
                 with element("div", "vf-valve-name"):
-                    with element("a", "vf-back", href=self._page.link("/")):
+                    with element("a", "vf-back", href=self._page.link("/", **_selection_before())):
                         ui.label("‹ Plant")
                     self._title = text("h1", "")
                     self._chip = element("span")
@@ -150,7 +156,11 @@ class _ValvePage:
         self._chip.clear()
         with self._chip:
             words = "not heard" if heard is None else state_words(heard)
-            chip(self._state, words, "" if self._state == "silent" else view.signal.value)
+            chip(
+                self._state,
+                words,
+                "" if self._state in ("silent", "unheard") else view.signal.value,
+            )
         _retitle(self._sentence, view.sentence or "No message of this valve has been heard.")
         if (
             before is None
@@ -166,12 +176,13 @@ class _ValvePage:
         silent = None if heard is None else heard.silent_for
         ratio = "–"
         if view.ratio is not None:
-            ratio = f"× {view.ratio.value:.2f}  ({view.ratio.low:.2f} to {view.ratio.high:.2f})"
+            between = interval_text(view.ratio, " to ")
+            ratio = f"× {ratio_text(view.ratio.value)}" + (f"  ({between})" if between else "")
         made = view.identified
         age = "" if made is None else f"  ({ago(time.time() - made / 1e9)} ago)"
         facts = {
             "friction ÷ baseline": ratio,
-            "dead band": _with_unit(view.dead_band.value, view.dead_band.half_width, "% of travel"),
+            "dead band": _with_unit(view.dead_band.if_determined, "% of travel"),
             "drift": _drift_words(view),
             "identified": moment(made, self._page.zone) + age,
             "heard": "never" if silent is None else f"{ago(silent)} ago",
@@ -196,7 +207,7 @@ class _ValvePage:
                         text("th", title, css)
                 with element("tbody"):
                     for one in view.parameters:
-                        value, width = number_and_width(one.value, one.half_width)
+                        value, width = quantity_texts(one)
                         with element("tr"):
                             text("td", one.name.replace("_", " "))
                             text("td", value, "vf-n")
@@ -299,6 +310,13 @@ class _ValvePage:
         self._revision = -1  # files and history may be new
 
 
+def _selection_before() -> dict[str, str]:
+    """Return search and filters of the plant, where the visitor has come from its page."""
+    request = ui.context.client.request
+    referrer = "" if request is None else request.headers.get("referer", "")
+    return Selection.from_address(referrer).to_query()
+
+
 def _retitle(made: ui.element, words: str) -> None:
     label = made.default_slot.children[0]
     if isinstance(label, ui.label):
@@ -311,16 +329,14 @@ def _fact(name: str) -> ui.label:
         return ui.label("").classes("vf-fact-value")
 
 
-def _with_unit(value: float, half_width: float, unit: str) -> str:
-    if not math.isfinite(value):
-        return "–"
-    return f"{' '.join(number_and_width(value, half_width)).strip()} {unit}"
+def _with_unit(one: Quantity, unit: str) -> str:
+    return f"{' '.join(quantity_texts(one)).strip()} {unit}" if one.is_known else "–"
 
 
 def _drift_words(view: ValveView) -> str:
     if view.drift is None:
-        return "none that is significant"
-    words = _with_unit(view.drift.value, view.drift.half_width, "N a month")
+        return "none that is significant" if view.friction.is_known else "–"
+    words = _with_unit(Quantity("", view.drift.value, view.drift.half_width), "N a month")
     expected = view.drift.expected
     sign = "+" if view.drift.value > 0 else ""
     return f"{sign}{words}; limit {expected.date}" if expected else f"{sign}{words}"
