@@ -57,6 +57,74 @@ def test_a_bag_that_begins_again_empties_the_signal():
     assert set(strip.strips(100)[0].values) == {2.0}
 
 
+class Clock:
+    now = 1000.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_the_axis_goes_on_when_the_samples_stop():
+    clock = Clock()
+    strip = LiveStrip(60.0, clock=clock)
+    assert strip.note() == "No sample has come yet."
+    for signal in (0, 1):
+        strip.add(signal, np.array([1, 2, 3]) * SECOND, np.array([1.0, 2.0, 3.0]))
+    clock.now += 1.0
+    assert strip.note() == ""
+    assert strip.strips(100)[0].times.tolist() == [-2.0, -1.0, 0.0]
+    clock.now += 9.0
+    assert strip.note() == "no sample for 10 s"
+    assert strip.strips(100)[1].times.tolist() == [-12.0, -11.0, -10.0]
+    clock.now += 49.0
+    assert strip.strips(100)[0].times.tolist() == [-60.0, -59.0]
+    clock.now += 60.0
+    assert strip.strips(100)[0].times.size == 0
+
+
+def test_a_signal_that_stops_alone_is_named():
+    clock = Clock()
+    strip = LiveStrip(60.0, clock=clock)
+    strip.add(0, np.array([1]) * SECOND, np.array([1.0]))
+    assert strip.note() == "no stem"
+    strip.add(1, np.array([1]) * SECOND, np.array([1.0]))
+    clock.now += 7.0
+    strip.add(1, np.array([8]) * SECOND, np.array([1.0]))
+    assert strip.note() == "no pressure for 7 s"
+    strip.trouble = "no such topic"
+    assert strip.note() == "no such topic"
+
+
+def test_nothing_is_drawn_anew_without_samples():
+    """While samples come each counts; then the axis goes on each second, until all has left."""
+    clock = Clock()
+    strip = LiveStrip(60.0, clock=clock)
+    none = strip.revision
+    strip.add(0, np.array([1]) * SECOND, np.array([1.0]))
+    seen = [strip.revision]
+    assert seen[0] != none
+    for _ in range(500):
+        clock.now += 0.2
+        seen.append(strip.revision)
+    assert seen == sorted(seen)
+    assert len(set(seen[:6])) == 1
+    assert 55 <= len(set(seen)) <= 62
+    assert len(set(seen[-190:])) == 1
+    strip.add(0, np.array([101]) * SECOND, np.array([1.0]))
+    assert strip.revision != seen[-1]
+
+
+@given(sizes=st.lists(st.integers(1, 400), max_size=40), most=st.integers(1, 700))
+def test_the_newest_samples_are_kept_whatever_the_packets(sizes, most):
+    strip, sent = LiveStrip(1.0, most), 0
+    for size in sizes:
+        numbers = np.arange(sent, sent + size)
+        strip.add(0, numbers * 2_000_000, numbers.astype(float))  # 500 Hz
+        sent += size
+    kept = strip.strips(10_000)[0].values
+    assert kept.tolist() == list(range(max(0, sent - min(most, 501)), sent))
+
+
 def test_the_loop_is_stem_over_pressure():
     strip = LiveStrip(60.0)
     time = np.arange(0, 20, 0.01)

@@ -61,8 +61,8 @@ class Dashboard(PolledNode):
             with contextlib.suppress(ValueError):  # anybody can publish other bytes
                 for name, read in statuses_in(taken.message):
                     self.plant.hear(name, read, now)
-        self.signals.step(self)
         self.calls.step(self)
+        self.signals.step(self)
 
 
 class _Turning:

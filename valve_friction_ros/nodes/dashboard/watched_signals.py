@@ -17,6 +17,7 @@ from valve_friction_ros.nodes.plumbing.raw_samples import (
     pressures_in,
     readable,
 )
+from valve_friction_ros.outside_text import printable
 
 __all__ = ["WatchedSignals"]
 
@@ -45,20 +46,32 @@ class _Watch:
         """Subscribe to the topics of the valve, anew where they have changed."""
         if sources != self.sources:
             self.end(node)
-            self.sources = sources
+            self.sources, self.strip.trouble = sources, ""
             if sources.pressure_topic and sources.stem_topic:
-                self.streams = (
-                    PolledSubscription(
-                        node, FluidPressure, sources.pressure_topic, _quality(), raw=True
-                    ),
-                    PolledSubscription(node, JointState, sources.stem_topic, _quality(), raw=True),
-                )
+                self._begin(node)
+
+    def _begin(self, node: PolledNode) -> None:
+        """Subscribe to both topics or to none: their names come from outside."""
+        topics = (self.sources.pressure_topic, self.sources.stem_topic)
+        for kind, topic in zip((FluidPressure, JointState), topics, strict=True):
+            try:
+                made = PolledSubscription(node, kind, topic, _quality(), raw=True)
+            except Exception as error:  # noqa: BLE001 - rclpy's, where the name is none of a topic
+                self._destroy(node)
+                about = printable(str(error).partition("\n")[0], 200)
+                self.strip.trouble = f"{printable(topic, 100)!r} cannot be subscribed to: {about}"
+                return
+            self.streams += (made,)
+
+    def _destroy(self, node: PolledNode) -> None:
+        for stream in self.streams:
+            node.destroy_subscription(stream.subscription)
+        self.streams = ()
 
     def end(self, node: PolledNode) -> None:
         """End the subscriptions."""
-        for stream in self.streams:
-            node.destroy_subscription(stream.subscription)
-        self.streams, self.sources = (), Sources()
+        self._destroy(node)
+        self.sources = Sources()
 
     def take(self) -> None:
         """Hand over what has arrived; what is no such message is left out."""

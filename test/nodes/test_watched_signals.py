@@ -1,0 +1,55 @@
+"""Topics of a status, which anybody may publish, are subscribed to both or not at all."""
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.dashboard.valve_view import Sources
+from valve_friction_ros.nodes.dashboard import watched_signals
+from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
+
+
+class Node:
+    """Counts its subscriptions."""
+
+    def __init__(self):
+        self.open = []
+
+    def destroy_subscription(self, subscription):
+        self.open.remove(subscription)
+
+
+class Subscription:
+    """Refuses what rclpy refuses."""
+
+    def __init__(self, node, _kind, topic, _quality, **_):
+        if " " in topic:
+            raise ValueError("Invalid topic name: has a space:\n  a second line")
+        self.subscription = topic
+        node.open.append(topic)
+
+    def take(self):
+        return []
+
+
+@pytest.fixture(autouse=True)
+def subscriptions(monkeypatch):
+    monkeypatch.setattr(watched_signals, "PolledSubscription", Subscription)
+
+
+@pytest.mark.parametrize("topics", [("no topic", "/stem"), ("/pressure", "no topic")])
+def test_a_name_that_is_none_is_told_and_leaves_nothing_open(topics):
+    node, heard = Node(), {"/v/identifier": Sources(*topics, "stem")}
+    signals = WatchedSignals(heard.__getitem__)
+    strip = signals.watch("/v/identifier")
+    for _ in range(3):
+        signals.step(node)
+    assert node.open == []
+    assert strip.note() == "'no topic' cannot be subscribed to: Invalid topic name: has a space:"
+    heard["/v/identifier"] = Sources("/pressure", "/stem", "stem")
+    signals.step(node)
+    assert node.open == ["/pressure", "/stem"]
+    assert strip.trouble == ""
+    strip.add(0, np.array([1]), np.array([1.0]))
+    signals.unwatch("/v/identifier")
+    signals.step(node)
+    assert node.open == []
