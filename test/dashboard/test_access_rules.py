@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import shutil
 import subprocess
 
 import pytest
@@ -131,6 +132,31 @@ def test_names_that_an_open_dashboard_answers_to():
 )
 def test_origins(origin, is_own):
     assert is_own_origin(origin, "127.0.0.1:8080") == is_own
+
+
+@pytest.mark.parametrize(
+    ("origin", "is_own"),
+    [(None, True), ("https://valves.example", True), ("http://valves.example", False)],
+)
+def test_with_a_certificate_an_origin_is_https(origin, is_own):
+    assert is_own_origin(origin, "valves.example", is_encrypted=True) == is_own
+
+
+def test_other_schemes_are_no_origin():
+    assert not is_own_origin("ftp://127.0.0.1:8080", "127.0.0.1:8080")
+
+
+def test_sessions_go_on_in_memory_where_they_cannot_be_kept(tmp_path):
+    folder, lines = tmp_path / "full", []
+    folder.mkdir()
+    sessions = Sessions([ANNA], 60.0, Clock(), folder / "sessions.json", lines.append)
+    shutil.rmtree(folder)
+    token = sessions.begin(ANNA)
+    assert sessions.account_of(token) is ANNA
+    sessions.end(token)
+    assert sessions.account_of(token) is None
+    assert len(lines) == 2
+    assert "No such file or directory" in lines[0]
 
 
 WAYS_OUT = [

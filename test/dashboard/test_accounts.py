@@ -90,7 +90,7 @@ def test_accounts_of_a_file(tmp_path):
     assert accounts_from(None, {VARIABLE: " "}) == ()
 
 
-@pytest.mark.parametrize("mode", [0o644, 0o604, 0o660, 0o602])
+@pytest.mark.parametrize("mode", [0o644, 0o604, 0o660, 0o602, 0o640, 0o610])
 def test_a_file_that_others_can_read_is_refused(tmp_path, mode):
     file = write(tmp_path / "accounts", f"{quick_account()}\n", mode)
     with pytest.raises(ValueError, match=f"open to others: run `chmod 600 {file}`"):

@@ -390,6 +390,8 @@ def test_tls(encrypted):
     assert cookie.startswith(f"__Host-valve_friction_{client.base_url.port}=")
     assert "Secure" in cookie
     assert "Hello anna" in client.get("/").text
+    for path in ("/", "/login"):
+        assert client.get(path).headers["strict-transport-security"] == "max-age=86400"
     with pytest.raises(httpx.RemoteProtocolError):
         httpx.get(f"http://localhost:{client.base_url.port}/")
     kept = folder / "sessions"

@@ -1,7 +1,8 @@
 """The gate before all pages, files and WebSockets: own names, own origin, a session."""
 
 import asyncio
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from urllib.parse import parse_qs, urlencode
 
 from starlette.datastructures import MutableHeaders
@@ -11,7 +12,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from valve_friction_ros.dashboard.access.access import Access
 from valve_friction_ros.dashboard.access.accounts import Account
+from valve_friction_ros.dashboard.access.attempt_limit import AttemptLimit
 from valve_friction_ros.dashboard.access.headers import (
+    ENCRYPTED_ONLY,
     OF_LOG_IN,
     OF_PAGES,
     host_of,
@@ -31,6 +34,9 @@ STATE = "/login/state"
 """Path that answers 204 in a session and 401 out of it."""
 
 _LONGEST_FORM = 4096
+_LONGEST_NAME = 64
+_MOST_LINES = 60
+"""Refused log-ins that are logged in a minute."""
 _PATIENCE = 10.0
 """Time for a form to arrive, s."""
 
@@ -58,7 +64,7 @@ class Gate:
     sessions : Sessions
         Who has logged in.
     log : callable
-        Takes a line for each log-in and each wrong one.
+        Takes a line for each log-in and each refused one, of these 60 a minute at most.
     """
 
     def __init__(
@@ -66,6 +72,7 @@ class Gate:
     ) -> None:
         self._app, self._access, self._sessions, self._log = app, access, sessions, log
         self._log_in = LogIn(access, sessions)
+        self._lines = AttemptLimit(_MOST_LINES, 60.0, time.monotonic)
         self._page = page_environment(__package__).get_template("log_in.html")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -74,11 +81,13 @@ class Gate:
             await self._app(scope, receive, send)
             return
         asked = HTTPConnection(scope)
+        if scope["type"] == "http":
+            send = _with_headers(send, ENCRYPTED_ONLY if self._access.is_encrypted else {})
         response = self._refusal(asked)
         if response is None and self._access.accounts:
             response = await self._without_session(asked, receive)
         if response is None:
-            await self._let_through(asked, receive, send)
+            await self._let_through(asked, receive, _with_headers(send, OF_PAGES))
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
@@ -93,7 +102,8 @@ class Gate:
         if not self._access.answers_to(host_of(host), asked.scope["server"][0]):
             words = f"no such host here: {printable(host, 100)!r}; see host_names of the dashboard"
             return PlainTextResponse(words, 400, OF_LOG_IN)
-        if not is_own_origin(asked.headers.get("origin"), host):
+        origin = asked.headers.get("origin")
+        if not is_own_origin(origin, host, self._access.is_encrypted):
             return PlainTextResponse("refused: asked by another site", 403, OF_LOG_IN)
         return None
 
@@ -127,12 +137,12 @@ class Gate:
         name = fields.get("name", "")
         found = await self._log_in.attempt(name, fields.get("password", ""), address)
         if isinstance(found, Refusal):
+            self._tell_refused(name, address, found)
             if found.wait > 0:
                 minutes = -(-found.wait // 60)
                 page = self._form(there, f"Too many attempts: try again in {minutes} min.", 429)
                 page.headers["Retry-After"] = str(found.wait)
                 return page
-            self._log(f"a wrong log-in from {printable(address)}")
             return self._form(there, "Wrong name or password.", 401)
         self._log(f"{printable(name)} has logged in from {printable(address)}")
         self._sessions.end(token_of(request, self._access))  # of whoever sat there before
@@ -147,9 +157,18 @@ class Gate:
         )
         return response
 
+    def _tell_refused(self, name: str, address: str, refusal: Refusal) -> None:
+        """Log a refused log-in, within a bound: whoever tries may try without end."""
+        if self._lines.wait("") > 0:
+            return
+        self._lines.count("")
+        why = "too many attempts" if refusal.wait > 0 else "wrong name or password"
+        shown = printable(name, _LONGEST_NAME)
+        self._log(f"refused log-in of {shown!r} from {printable(address)}: {why}")
+
     async def _let_through(self, asked: HTTPConnection, receive: Receive, send: Send) -> None:
         if asked.scope["type"] == "http":
-            await self._app(asked.scope, receive, _with_headers(send))
+            await self._app(asked.scope, receive, send)
             return
 
         async def receive_in_session() -> Message:
@@ -162,11 +181,11 @@ class Gate:
         await self._app(asked.scope, receive_in_session, send)
 
 
-def _with_headers(send: Send) -> Send:
+def _with_headers(send: Send, more: Mapping[str, str]) -> Send:
     async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
-            for name, value in OF_PAGES.items():
+            for name, value in more.items():
                 headers.setdefault(name, value)
         await send(message)
 

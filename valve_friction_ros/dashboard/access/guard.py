@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nicegui import App, context, core, ui
@@ -79,7 +80,7 @@ def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
         If the file of sessions cannot be used.
     """
     sessions = Sessions(
-        access.accounts, access.session_hours * 3600.0, time.time, access.session_file
+        access.accounts, access.session_hours * 3600.0, time.time, access.session_file, log
     )
     build = app.build_middleware_stack
 
@@ -88,14 +89,14 @@ def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
         return Gate(build(), access, sessions, log)
 
     app.build_middleware_stack = build_behind_gate  # type: ignore[method-assign]
-    core.sio.eio.cors_allowed_origins = _is_own
+    core.sio.eio.cors_allowed_origins = partial(_is_own, is_encrypted=access.is_encrypted)
     if access.accounts:
         ui.add_head_html(_WATCH, shared=True)
     return Guard(access, sessions)
 
 
-def _is_own(origin: str | None, request: dict[str, Any]) -> bool:
-    return is_own_origin(origin, request.get("HTTP_HOST", ""))
+def _is_own(origin: str | None, request: dict[str, Any], is_encrypted: bool) -> bool:
+    return is_own_origin(origin, request.get("HTTP_HOST", ""), is_encrypted)
 
 
 def server_options(access: Access) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from urllib.parse import urlsplit
 
-__all__ = ["OF_LOG_IN", "OF_PAGES", "host_of", "is_own_origin", "own_path"]
+__all__ = ["ENCRYPTED_ONLY", "OF_LOG_IN", "OF_PAGES", "host_of", "is_own_origin", "own_path"]
 
 _BASE = {
     "X-Content-Type-Options": "nosniff",
@@ -27,6 +27,9 @@ OF_PAGES = {
 }
 """Of the pages and their files, where they have none of their own."""
 
+ENCRYPTED_ONLY = {"Strict-Transport-Security": "max-age=86400"}
+"""With a certificate: a browser that has been here comes by https alone for a day."""
+
 OF_LOG_IN = {
     **_BASE,
     "Content-Security-Policy": f"default-src 'none'; style-src 'unsafe-inline'; {_NO_FRAMES}",
@@ -42,15 +45,19 @@ def host_of(header: str) -> str:
         return ""
 
 
-def is_own_origin(origin: str | None, host: str) -> bool:
+def is_own_origin(origin: str | None, host: str, is_encrypted: bool = False) -> bool:
     """Tell whether a request comes from a page of the host that is asked.
 
-    A browser says the origin of each WebSocket and each form; what says none is no browser.
+    A browser says the origin of each WebSocket and each form; what says none is no browser. With a
+    certificate the page came by https; without one it may have too, from a proxy.
     """
     if origin is None:
         return True
     try:
-        return bool(host) and urlsplit(origin).netloc.lower() == host.lower()
+        asking = urlsplit(origin)
+        schemes = ("https",) if is_encrypted else ("http", "https")
+        is_here = bool(host) and asking.netloc.lower() == host.lower()
+        return is_here and asking.scheme in schemes
     except ValueError:
         return False
 

@@ -6,6 +6,6 @@ __all__ = ["require_private"]
 
 
 def require_private(file: Path) -> None:
-    """Raise ValueError if others can read a file, or anybody but its owner can write it."""
-    if file.stat().st_mode & 0o027:
+    """Raise ValueError if anybody but its owner can read or write a file."""
+    if file.stat().st_mode & 0o077:
         raise ValueError(f"{file} is open to others: run `chmod 600 {file}`")

@@ -41,6 +41,8 @@ class Sessions:
         Returns the time, s since 1970.
     file : Path or None
         Where sessions survive a restart. It is made with mode 600.
+    log : callable
+        Takes a line when the file can no longer be written.
 
     Raises
     ------
@@ -56,9 +58,11 @@ class Sessions:
         lifetime: float,
         clock: Callable[[], float],
         file: Path | None = None,
+        log: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._accounts = {_digest(str(one)): one for one in accounts}
         self._lifetime, self._clock, self._file = lifetime, clock, file
+        self._log = log
         self._sessions: dict[str, _Session] = {}
         if file is not None:
             self._read(file)
@@ -71,7 +75,7 @@ class Sessions:
         live = [item for item in self._sessions.items() if item[1].end > now][1 - _MOST :]
         session = _Session(_digest(str(account)), now + self._lifetime)
         self._sessions = {**dict(live), _digest(token): session}
-        self._keep()
+        self._keep_if_possible()
         return token
 
     def account_of(self, token: str | None) -> Account | None:
@@ -84,7 +88,7 @@ class Sessions:
     def end(self, token: str | None) -> None:
         """End a session, if it is one."""
         if token and self._sessions.pop(_digest(token), None) is not None:
-            self._keep()
+            self._keep_if_possible()
 
     def _read(self, file: Path) -> None:
         """Take over the sessions of the file; what is no session is left out."""
@@ -95,6 +99,16 @@ class Sessions:
                 self._sessions = {
                     key: _Session(str(account), float(end)) for key, (account, end) in kept.items()
                 }
+
+    def _keep_if_possible(self) -> None:
+        """Keep the sessions; go on in memory where the file cannot be written."""
+        try:
+            self._keep()
+        except OSError as error:
+            self._log(
+                f"the sessions cannot be kept in {self._file} ({error.strerror or error}): they go "
+                "on until the dashboard ends; free space, or name another session_file"
+            )
 
     def _keep(self) -> None:
         if self._file is None:
