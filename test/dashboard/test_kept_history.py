@@ -53,6 +53,22 @@ def test_it_is_read_again_when_it_has_changed(file):
     assert {one.name for one in kept.valves} == {VALVE.name, OTHER.name}
 
 
+def test_another_file_at_the_path_is_read_from_its_beginning(file, tmp_path):
+    kept = KeptHistory(file.path)
+    kept.refresh()
+    other = HistoryFile(tmp_path / "other.sqlite")
+    other.set_baseline(OTHER, KeptBaseline(BASELINE, START, START))
+    for day in range(3):
+        other.add(success(START + day * DAY, 150.0, baseline=BASELINE, valve=OTHER))
+    for ending in ("-wal", "-shm"):
+        file.path.with_name(file.path.name + ending).unlink(missing_ok=True)
+    other.path.replace(file.path)
+    assert kept.refresh()
+    assert kept.valves == (OTHER,)
+    assert kept.spark(OTHER.name) is not None
+    assert kept.spark(VALVE.name) is None
+
+
 def test_what_is_written_often_draws_nothing_anew(file):
     kept = KeptHistory(file.path)
     kept.refresh()
@@ -143,5 +159,9 @@ def test_what_one_side_lacks_is_open():
     mass, spring = compared(side_of_view(one), side_of_view(other))
     assert math.isnan(mass.ratio)
     assert math.isnan(spring.ratio)
+    friction = Quantity("coulomb_friction", 600.0, 900.0, "N", "not identifiable")
+    open_ = ValveView("/a/identifier", "A", parameters=(friction,))
+    (row,) = compared(side_of_view(open_), side_of_view(open_))
+    assert (row.ratio_words, row.verdict) == ("–", "")
     same = compared(side_of_view(one), side_of_view(one))[0]
     assert (same.ratio, same.verdict) == (1.0, "no difference seen")

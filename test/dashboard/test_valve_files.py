@@ -40,6 +40,12 @@ def test_the_files_of_a_valve(files):
     assert files.offered("/fv_102") == []
 
 
+def test_valves_whose_files_have_the_same_names_are_named():
+    others = ["/a/b", "/a_b", "/a_b/", "/a/c", "/", "/a_b"]
+    assert ValveFiles.sharing("/a/b", others) == ("/a_b", "/a_b/")
+    assert ValveFiles.sharing("/a/c", others) == ()
+
+
 @pytest.mark.parametrize(
     "path",
     [

@@ -57,6 +57,7 @@ class KeptHistory:
         self._seen: tuple[object, ...] = ()
         self._mark: HistoryMark | None = None
         self._row = 0
+        self._number = 0
         self._ratios: defaultdict[str, deque[KeptRatio]] = defaultdict(
             lambda: deque(maxlen=_MOST_RATIOS)
         )
@@ -81,6 +82,7 @@ class KeptHistory:
                 return False
             since = time.time_ns() - _SPARK_DAYS * _DAY
             self._seen = state
+            self._begin_anew_for_another_file()
             try:
                 mark = history_mark(self._file)
                 if mark == self._mark and self.problem is None:
@@ -101,6 +103,17 @@ class KeptHistory:
             self._histories.clear()
             self.revision += 1
             return True
+
+    def _begin_anew_for_another_file(self) -> None:
+        """Forget what was read where another file stands at the path: its rows count from 1."""
+        if self._file is None:
+            return
+        number = _stamp_of(self._file.path)[2]
+        if number and self._number and number != self._number:
+            self._mark, self._row = None, 0
+            self._ratios.clear()
+            self._sparks.clear()
+        self._number = number or self._number
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the picture of a valve's ratios, if there are some."""

@@ -1,7 +1,7 @@
 """Reports and bags of a valve, offered from the folders that the dashboard knows and no others."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +24,10 @@ class OfferedFile(NamedTuple):
     label: str
     size: int
     time: float
+
+
+def _stem(namespace: str) -> str:
+    return namespace.strip("/").replace("/", "_")
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class ValveFiles:
 
     def offered(self, namespace: str) -> list[OfferedFile]:
         """Return reports and bags of the valve of a namespace, the newest first."""
-        stem = namespace.strip("/").replace("/", "_")
+        stem = _stem(namespace)
         found: list[OfferedFile] = []
         for kind, folder in self.folders.items():
             start = f"alarm_{stem}_" if kind == "alarms" else f"{stem}_"
@@ -76,6 +80,13 @@ class ValveFiles:
             for place in mine[:_MOST]:
                 found += self._files(kind, folder, place)
         return sorted(found, key=lambda one: -one.time)[: 2 * _MOST]
+
+    @staticmethod
+    def sharing(namespace: str, others: Iterable[str]) -> tuple[str, ...]:
+        """Return the other namespaces whose files have the same names, as /a/b and /a_b have."""
+        stem = _stem(namespace)
+        found = {one for one in others if one != namespace and _stem(one) == stem}
+        return tuple(sorted(found))
 
     def _files(self, kind: str, folder: Path, place: Path) -> list[OfferedFile]:
         try:

@@ -51,8 +51,20 @@ class _ComparePage:
         await self._show()
         ui.timer(1.0, self._tick)
 
-    def _tick(self) -> None:
+    async def _tick(self) -> None:
         self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
+        if self._heard_now() != self._drawn:
+            await self._show()
+
+    def _heard_now(self) -> tuple[tuple[int, bool] | None, ...]:
+        """Return what tells the views of now apart; None for a side that the history holds."""
+        found = []
+        for side in _SIDES:
+            heard = None
+            if self._stamps[side] == _NOW:
+                heard = self._board.plant.valve(self._nodes[side], time.monotonic())
+            found.append(None if heard is None else (heard.revision, heard.is_silent))
+        return tuple(found)
 
     async def _draw_choice(self, side: str, valves: list[tuple[str, str]]) -> None:
         names = {node: f"{tag}   {node.rpartition('/')[0]}" for tag, node in valves}
@@ -96,6 +108,7 @@ class _ComparePage:
         return None if entry is None else side_of_entry(entry)
 
     async def _show(self) -> None:
+        self._drawn = self._heard_now()
         sides = [await self._side(side) for side in _SIDES]
         self._body.clear()
         with self._body:
@@ -111,7 +124,11 @@ class _ComparePage:
                                    ("", "")):  # fmt: skip
                     text("th", title, css)
             with element("tbody"):
+                heard = tuple(
+                    "–" if now is None else ("silent" if now[1] else "now") for now in self._drawn
+                )
                 for name, words in (
+                    ("heard", heard),
                     ("valve", (one.tag, other.tag)),
                     ("identified", tuple(moment(s.time, self._page.zone) for s in (one, other))),
                     ("method", (one.method, other.method)),

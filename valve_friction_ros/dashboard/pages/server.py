@@ -8,7 +8,7 @@ from fastapi import Request, Response
 from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse
 from nicegui import app, run, ui
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from valve_friction_ros.dashboard.access import Access
 from valve_friction_ros.dashboard.access.guard import Guard, guard, server_options
@@ -23,6 +23,8 @@ __all__ = ["guarded", "require_free", "serve"]
 
 _Draw = Callable[[Board, dict[str, str]], Awaitable[None] | None]
 
+_FILES = "/files/"
+"""Where the paths of reports and bags begin."""
 _GRACE = 1
 """Time, s, that open connections have at the end."""
 
@@ -80,14 +82,24 @@ def serve(board: Board, started: Callable[[], None]) -> None:
         tailwind=False,
         binding_refresh_interval=None,
         reconnect_timeout=5.0,
-        gzip_middleware_factory=_lightly_packed,
+        gzip_middleware_factory=LightlyPacked,
         timeout_graceful_shutdown=_GRACE,
     )
 
 
-def _lightly_packed(application: ASGIApp) -> GZipMiddleware:
-    """Compress what is sent, but little: at the usual level 9 a first visit takes a second."""
-    return GZipMiddleware(application, minimum_size=1000, compresslevel=1)
+class LightlyPacked(GZipMiddleware):
+    """Compresses what is sent, but little: at the usual level 9 a first visit takes a second.
+
+    Reports and bags go as they are: bags are large and hardly become smaller.
+    """
+
+    def __init__(self, application: ASGIApp) -> None:
+        super().__init__(application, minimum_size=1000, compresslevel=1)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        is_file = scope["type"] == "http" and scope["path"].startswith(_FILES)
+        await (self.app if is_file else super().__call__)(scope, receive, send)
 
 
 def _add_page(board: Board, path: str, draw: _Draw) -> None:
@@ -118,4 +130,4 @@ def _add_files(files: ValveFiles) -> None:
             headers=headers,
         )
 
-    app.add_api_route("/files/{kind}/{path:path}", offered, methods=["GET"])
+    app.add_api_route(_FILES + "{kind}/{path:path}", offered, methods=["GET"])

@@ -2,17 +2,18 @@
 
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from nicegui import ui
 
 from valve_friction_ros.dashboard.graph import Answer, Operator
 from valve_friction_ros.dashboard.pages.theme import element
+from valve_friction_ros.dashboard.plant_rows import quantity_texts
 from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.valve_view import ValveView
-from valve_friction_ros.identification import two_digits
 from valve_friction_ros.outside_text import printable
 
-__all__ = ["ValveActions"]
+__all__ = ["Question", "ValveActions", "question_of", "why_no_baseline"]
 
 _ACTIONS = {
     "identify": ("Identify", "identifying"),
@@ -24,12 +25,47 @@ _ACTIONS = {
 
 
 def _size(one: Quantity) -> str:
-    width = f" ± {two_digits(one.half_width)}" if one.half_width > 0 else ""
-    return f"{one.name.replace('_', ' ')} {one.value:.4g}{width} {one.unit}"
+    return " ".join(filter(None, (one.name.replace("_", " "), *quantity_texts(one), one.unit)))
 
 
 def _frictions(found: tuple[Quantity, ...]) -> str:
     return "; ".join(map(_size, found)) or "none"
+
+
+class Question(NamedTuple):
+    """What is asked before a baseline changes: of which valve and estimate, and from what to what.
+
+    `identified` is the time of the estimate that a baseline is set from, ns since 1970.
+    """
+
+    tag: str
+    identified: int | None
+    old: str
+    new: str
+
+
+def question_of(view: ValveView, new: str | None) -> Question:
+    """Return what to ask of a valve; `new` None: the baseline is set from the estimate."""
+    return Question(
+        view.tag,
+        view.identified if new is None else None,
+        _frictions(view.baseline),
+        _frictions(_estimate(view)) if new is None else new,
+    )
+
+
+def why_no_baseline(view: ValveView) -> str:
+    """Return why no baseline can be set; empty if it can."""
+    if _estimate(view):
+        return ""
+    return view.reason or "There is no estimate of the friction: identify the valve first."
+
+
+def _estimate(view: ValveView) -> tuple[Quantity, ...]:
+    found = (
+        view.parameter(name).if_determined for name in ("coulomb_friction", "sliding_friction")
+    )
+    return tuple(one for one in found if one.is_known)
 
 
 class ValveActions:
@@ -78,25 +114,35 @@ class ValveActions:
             await self._call(service)
 
         made = ui.button(title, on_click=act, color=None).props("no-caps unelevated dense")
+        if service == "set_baseline":
+            with made:
+                self._why = ui.tooltip("")
         return made.classes("vf-act" + (" vf-act-first" if service == "identify" else ""))
 
     async def _agreed(self, service: str) -> bool:
-        """Show the old and the new baseline, and ask."""
-        view = self._now()
+        """Show the old and the new baseline, and ask; again where they have changed meanwhile."""
+        shown, agreed = None, True
+        while agreed and shown != (question := self._question(service)):
+            agreed = await self._asked(service, question, is_again=shown is not None)
+            shown = question
+        return agreed
+
+    def _question(self, service: str) -> Question:
+        new = None if service == "set_baseline" else self._replaced()
+        return question_of(self._now(), new)
+
+    async def _asked(self, service: str, question: Question, is_again: bool) -> bool:
         is_set = service == "set_baseline"
-        frictions = tuple(
-            one
-            for one in map(view.parameter, ("coulomb_friction", "sliding_friction"))
-            if one.is_known
-        )
         with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
             dialog.props["aria-label"] = _ACTIONS[service][0]
-            ui.label(f"{'Set' if is_set else 'Restore'} the baseline of {view.tag}?").classes(
+            ui.label(f"{'Set' if is_set else 'Restore'} the baseline of {question.tag}?").classes(
                 "vf-dialog-title"
             )
+            if is_again:
+                ui.label("This has changed while you were asked:").classes("vf-reason")
             for name, words in (
-                ("in force now", _frictions(view.baseline)),
-                ("from then on", _frictions(frictions) if is_set else self._replaced()),
+                ("in force now", question.old),
+                ("from then on", question.new),
             ):
                 with element("div", "vf-pair"):
                     ui.label(name)
@@ -131,8 +177,7 @@ class ValveActions:
         except Exception as error:  # noqa: BLE001 - a bug shall not leave the buttons dead
             answer = Answer(False, f"the call has failed: {error}")
         self._busy = None
-        for button in self._buttons:
-            button.enable()
+        self._enable()
         title = _ACTIONS[service][0].rstrip(" …")
         words = printable(answer.message, 2000) or "done"
         self._say("ok" if answer.success else "error", f"{title}: {words}")
@@ -143,8 +188,19 @@ class ValveActions:
         self._says.set_visibility(True)
         self._says.set_text(words)
 
+    def _enable(self) -> None:
+        """Enable the buttons; not that which would set a baseline without an estimate."""
+        why = why_no_baseline(self._now())
+        for service, button in zip(_ACTIONS, self._buttons, strict=True):
+            is_possible = not (service == "set_baseline" and why)
+            button.set_enabled(is_possible)
+        self._why.set_text(why)
+        self._why.set_visibility(bool(why))
+
     def tick(self) -> None:
-        """Show for how long a call has been under way."""
+        """Show for how long a call has been under way, and which one is possible."""
+        if self._buttons and self._busy is None:
+            self._enable()
         if self._busy is not None:
             service, begin = self._busy
             self._says.set_text(f"{_ACTIONS[service][1]} … {time.monotonic() - begin:.0f} s")

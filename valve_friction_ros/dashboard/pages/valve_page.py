@@ -36,9 +36,10 @@ from valve_friction_ros.dashboard.plant_rows import (
 from valve_friction_ros.dashboard.selection import Selection, state_of
 from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.times import ago, moment
-from valve_friction_ros.dashboard.valve_files import ValveFiles
+from valve_friction_ros.dashboard.valve_files import OfferedFile, ValveFiles
 from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.history import HistoryError, KeptBaseline, ValveHistory, drift_text
+from valve_friction_ros.outside_text import printable
 
 __all__ = ["valve_page"]
 
@@ -59,7 +60,8 @@ class _ValvePage:
         self._shown: ValveView | None = None
         self._state = ""
         self._revision = -1
-        self._beat = 0
+        self._beat = self._looped = 0
+        self._drawn = (0, 0)
         self._history: ValveHistory | None = None
         self._strip = board.signals.watch(node)
         ui.context.client.on_delete(lambda: board.signals.unwatch(node))
@@ -235,13 +237,17 @@ class _ValvePage:
     # The signals
 
     def _show_signals(self) -> None:
-        pressure, stem = self._strip.strips(_COLUMNS)
-        is_there = bool(pressure.times.size or stem.times.size)
-        self._live_note.set_visibility(not is_there)
-        if not is_there:
+        note = self._strip.note()
+        _retitle(self._live_note, note)
+        self._live_note.set_visibility(bool(note))
+        revision = self._strip.revision
+        if revision == self._drawn:
             return
+        self._drawn = revision
+        pressure, stem = self._strip.strips(_COLUMNS)
         self._live.run_chart_method("setOption", {"series": live_data(pressure, stem)})
-        if self._beat % _SLOWER == 0 and hasattr(self, "_loop"):
+        if hasattr(self, "_loop") and self._looped + _SLOWER <= self._beat:
+            self._looped = self._beat
             loop = loop_data(self._strip.loop(_LOOP))
             self._loop.run_chart_method("setOption", {"series": [{}, {"data": loop}]})
 
@@ -264,12 +270,20 @@ class _ValvePage:
             (self._entries_body, lambda: draw_identifications(kept, zone, self._compare)),
             (self._baselines_body, lambda: draw_baselines(kept, zone)),
             (self._alarms_body, lambda: draw_alarms(kept, zone)),
-            (self._files_body, lambda: draw_files(files or [], zone)),
+            (self._files_body, lambda: self._draw_files(files or [])),
         )
         for body, draw in draws:
             body.clear()
             with body:
                 draw()
+
+    def _draw_files(self, files: list[OfferedFile]) -> None:
+        valves = self._board.plant.valves(time.monotonic())
+        sharing = ValveFiles.sharing(self._view().namespace, (one.view.namespace for one in valves))
+        if files and sharing:
+            names = printable(", ".join(sharing), 300)
+            text("p", f"Files of {names} have the same names: they stand here too.", "vf-none")
+        draw_files(files, self._page.zone)
 
     def _compare(self, stamp: int) -> str:
         return self._page.link("/compare", a=self._node, at=str(stamp), b=self._node)
@@ -293,6 +307,7 @@ class _ValvePage:
         record = None if healthy is None else healthy.record
         with self._loop_body:
             self._loop = ui.echart(loop_chart(record)).classes("vf-chart-loop")
+            self._drawn = (-1, 0)
             self._loop.props["aria-label"] = "Signature: stem over pressure"
             if record is None:
                 text("p", "The record of the baseline is not kept.", "vf-none")
@@ -312,8 +327,7 @@ class _ValvePage:
 
 def _selection_before() -> dict[str, str]:
     """Return search and filters of the plant, where the visitor has come from its page."""
-    request = ui.context.client.request
-    referrer = "" if request is None else request.headers.get("referer", "")
+    referrer = ui.context.client.request.headers.get("referer", "")
     return Selection.from_address(referrer).to_query()
 
 
