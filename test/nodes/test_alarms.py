@@ -23,6 +23,8 @@ from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 PATIENT = {"input_timeout": 600.0}
+TAKEN = " (by the identification of 2023-11-14 22:13 UTC)"
+"""What `~/set_baseline` says it took: the stamps of the tests begin at 1.7e9 s."""
 HEALTHY, TIGHT = quick_record(), quick_record(HIGH_FRICTION)
 OLD, NEW = (Baseline.of(identify(record, BENCH_VALVE)) for record in (HEALTHY, TIGHT))
 USAGE = (  # of which a kill may cost the last minute
@@ -185,7 +187,7 @@ def test_a_node_without_a_history_says_so(live):
     told = client.status_values()["history"]
     assert told == "none, as history_file is empty: diagnosis and baseline end with this node"
     client.identified(HEALTHY)
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none"
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none{TAKEN}"
     assert client.trigger("restore_baseline").message == f"baseline: none; before: {OLD}"
 
 
@@ -196,7 +198,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert not nothing.success
     assert nothing.message.startswith("there is no ~/set_baseline to undo")
     client.identified(HEALTHY)
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none"
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: none{TAKEN}"
     client.identified(TIGHT)
     for service in ("set_baseline", "restore_baseline"):
         refused = client.trigger(service)
@@ -209,7 +211,7 @@ def test_the_baseline_is_guarded_and_restored(live, history):
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful
     answer = client.trigger("set_baseline")
     assert answer.success
-    assert answer.message == f"baseline: {NEW}; before: {OLD}"
+    assert answer.message == f"baseline: {NEW}; before: {OLD}{TAKEN}"
     assert client.next_status().level == OK
     live.kill(node)
 
@@ -253,12 +255,15 @@ def test_a_baseline_of_the_parameter_is_replaced_and_comes_back(live, history):
     client = live.client
     client.identified(HEALTHY)
     given = Baseline(140.0)
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: {given}"
+    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: {given}{TAKEN}"
     assert client.set_together(NODE, {"baseline_coulomb_friction": 145.0}).successful
     refused = client.trigger("restore_baseline")
     assert not refused.success
     assert "is not in force any more: set baseline_coulomb_friction" in refused.message
-    assert client.trigger("set_baseline").message == f"baseline: {OLD}; before: {Baseline(145.0)}"
+    assert (
+        client.trigger("set_baseline").message
+        == f"baseline: {OLD}; before: {Baseline(145.0)}{TAKEN}"
+    )
     answer = client.trigger("restore_baseline").message
     assert answer == f"baseline: {Baseline(145.0)}; before: {OLD}"
     assert history.baseline(VALVE.name).baseline == Baseline(145.0)

@@ -46,7 +46,8 @@ def test_baseline_needs_an_estimate(healthy):
     assert "the valve has no result" in refused.message
     assert accepted.success
     result = identify(quick_record(), BENCH_VALVE)
-    assert accepted.message == f"baseline: {Baseline.of(result)}; before: none"
+    taken = "by the identification of 2023-11-14 22:13 UTC"
+    assert accepted.message == f"baseline: {Baseline.of(result)}; before: none ({taken})"
     healthy = result.parameters["coulomb_friction"]
     assert healthy.interval[0] < 152.7 < healthy.interval[1]
 

@@ -36,7 +36,9 @@ class Bench:
         monkeypatch.setattr(
             response_watch, "values_of", lambda _, specs: {s.name: values[s.name] for s in specs}
         )
-        self.watch = response_watch.ResponseWatch(node)
+        friction = SimpleNamespace(estimate=None)
+        history = SimpleNamespace(answers=lambda: (), valve=None, keep_soon=lambda *_: None)
+        self.watch = response_watch.ResponseWatch(node, friction, history)
 
     def _taken(self):
         taken, self.queue = self.queue, []
