@@ -71,6 +71,7 @@ _OTHER_NODES = (
     "valves",
     "position_noise",
     "noise_seed",
+    "time_jitter",
     "excitation",
     "low",
     "high",
