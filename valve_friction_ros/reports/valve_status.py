@@ -34,6 +34,8 @@ def valve_status(record: IdentifiedRecord) -> Status:
     worst = next(iter(record.findings), None)
     if worst is not None and worst.level > diagnosis.level:
         colour = Colour.RED if worst.level is Level.ERROR else Colour.AMBER
+        if record.is_scaled and worst.status_signal is StatusSignal.CHECK_FUNCTION:
+            return Status(colour, "Check the sensors' scales", "check function (NE 107: C)")
         return Status(colour, "The valve has changed", f"NE 107: {worst.status_signal.value}")
     if record.is_scaled:
         return Status(Colour.AMBER, "Check the sensors' scales", "check function (NE 107: C)")
