@@ -60,6 +60,7 @@ class Live:
         self.client.watched.clear()
         process.kill()
         self.nodes.remove(process)
+        self.client.drain()
         self.client.statuses.clear()
 
     def close(self):

@@ -181,6 +181,12 @@ class Client:
             self._executor.spin_once(timeout_sec=0.02)
         return met
 
+    def drain(self):
+        """Take what nodes that have ended have left under way."""
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.02)
+
     def call(self, kind, name, request):
         """Call a service and return its response.
 
