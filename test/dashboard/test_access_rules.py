@@ -6,6 +6,7 @@ import shutil
 import subprocess
 
 import pytest
+from local_server import certificate_pair
 from quick_accounts import PASSWORD, quick_account, quick_hash
 
 from valve_friction_ros.dashboard.access import (
@@ -53,15 +54,7 @@ def test_a_name_for_others_needs_accounts():
 
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("tls")
-    certificate, key = folder / "cert.pem", folder / "key.pem"
-    subprocess.run(
-        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256",
-         "-nodes", "-days", "2", "-subj", "/CN=localhost", "-keyout", key, "-out", certificate],
-        check=True, capture_output=True,
-    )  # fmt: skip
-    key.chmod(0o600)
-    return certificate, key
+    return certificate_pair(tmp_path_factory.mktemp("tls"))
 
 
 def test_tls_needs_a_pair(pair, tmp_path):

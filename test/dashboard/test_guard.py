@@ -15,6 +15,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from local_server import certificate_pair, free_port
 from quick_accounts import PASSWORD, quick_account
 
 from valve_friction_ros.dashboard.access import Role
@@ -27,12 +28,6 @@ PATIENCE = 60.0
 SCRIPT = Path(__file__).parents[1] / "support" / "guarded_page.py"
 ACCOUNTS = f"{quick_account('anna')};{quick_account('bo', Role.VIEW)}"
 POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
-
-
-def free_port():
-    with socket.socket() as tried:
-        tried.bind(("127.0.0.1", 0))
-        return tried.getsockname()[1]
 
 
 def is_open(port):
@@ -366,15 +361,7 @@ class TestWebSocket:
 def encrypted(tmp_path_factory):
     """A client of a page with a certificate, and the page's folder."""
     folder = tmp_path_factory.mktemp("encrypted")
-    certificate, key = folder / "cert.pem", folder / "key.pem"
-    subprocess.run(
-        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256",
-         "-nodes", "-days", "2", "-subj", "/CN=localhost",
-         "-addext", "subjectAltName=DNS:localhost",
-         "-keyout", key, "-out", certificate],
-        check=True, capture_output=True,
-    )  # fmt: skip
-    key.chmod(0o600)
+    certificate, key = certificate_pair(folder)
     words = ("--certificate", certificate, "--key", key, "--session_file", folder / "sessions")
     with served(folder, *words, accounts=ACCOUNTS) as port:
         trusted = ssl.create_default_context(cafile=certificate)

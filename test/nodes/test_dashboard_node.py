@@ -5,8 +5,8 @@ import subprocess
 import sys
 
 import pytest
-from browser import free_port
 from live_nodes import PROJECT
+from local_server import free_port
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 

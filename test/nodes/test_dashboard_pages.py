@@ -6,8 +6,9 @@ from pathlib import Path
 from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
-from browser import Tab, chromium, free_port
+from browser import Tab, chromium
 from live_nodes import NAMESPACE, SECOND, START, buffered
+from local_server import free_port
 from records import quick_record
 
 from valve_friction_ros.model import HIGH_FRICTION

@@ -2,13 +2,13 @@
 
 import asyncio
 import contextlib
-import socket
 import threading
 from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
 from live_nodes import PROJECT
+from local_server import free_port
 
 from valve_friction_ros.records import ReadingOptions, read_recordings, read_valve_file
 
@@ -23,9 +23,7 @@ class SimulatedServer:
     """A server with two variables, in a thread of its own."""
 
     def __init__(self):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.url = f"opc.tcp://127.0.0.1:{free.getsockname()[1]}/"
+        self.url = f"opc.tcp://127.0.0.1:{free_port()}/"
         self.loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self.loop.run_forever, daemon=True)
         self._thread.start()
@@ -75,6 +73,17 @@ def server():
     served.close()
 
 
+def heard(server, client, value):
+    """Serve a sample of the day before; return whether the next diagnostic tells of both signals.
+
+    Each has a stamp of its own: a server does not tell a sample again.
+    """
+    day_before = -86_400.0 + len(client.statuses)
+    server.do(server.serve([(day_before, *value)]))
+    values = client.status_values()
+    return int(values["buffered_pressures"]) and int(values["buffered_positions"])
+
+
 @pytest.mark.slow
 def test_a_record_of_a_server_is_identified(server, live):
     described = read_valve_file(EXAMPLES / "fv_101.yaml")
@@ -91,6 +100,8 @@ def test_a_record_of_a_server_is_identified(server, live):
     gateway = live.start("opc_ua_gateway", parameters, script=GATEWAY)
     live.client.wait_until(lambda: "ready" in gateway.errors + gateway.output, "the gateway")
     rows = np.column_stack((times, record.pressure / 1e5, 100 * record.position / travel))
+    # The first samples may come before the publishers know their subscriber.
+    live.client.wait_until(lambda: heard(server, live.client, rows[0, 1:]), "the first sample")
     server.do(server.serve(rows))
     live.client.wait_for_buffered(2 * len(rows))
     assert live.client.trigger("identify").success

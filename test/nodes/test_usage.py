@@ -8,7 +8,7 @@ from live_nodes import NAMESPACE, SECOND, START, values_of
 
 from valve_friction_ros.history import HistoryFile, read_usage
 from valve_friction_ros.model import BENCH_VALVE
-from valve_friction_ros.usage import DAY
+from valve_friction_ros.streams import DAY
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"

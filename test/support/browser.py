@@ -2,20 +2,12 @@
 
 import contextlib
 import shutil
-import socket
 from urllib.parse import urlsplit
 
 import pytest
 
 TIMEOUT = 40_000
 """Time for one thing to happen on a loaded machine, ms."""
-
-
-def free_port():
-    """A port of this machine that nobody listens at."""
-    with socket.socket() as tried:
-        tried.bind(("127.0.0.1", 0))
-        return tried.getsockname()[1]
 
 
 @contextlib.contextmanager

@@ -3,12 +3,10 @@
 import contextlib
 import http.server
 import json
-import shutil
 import ssl
-import subprocess
 import threading
 
-import pytest
+from local_server import certificate_pair
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -120,18 +118,7 @@ class Receiver:
 
 def self_signed(folder):
     """Make a certificate of `localhost` with its key, in one file."""
-    if shutil.which("openssl") is None:
-        pytest.skip("openssl, which makes the certificate, is not installed")
+    certificate, key = certificate_pair(folder)
     path = folder / "localhost.pem"
-    words = (
-        "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost "
-        "-addext subjectAltName=DNS:localhost -keyout key.pem -out certificate.pem"
-    )
-    subprocess.run(
-        words.split(),
-        cwd=folder,
-        check=True,
-        capture_output=True,
-    )
-    path.write_bytes((folder / "key.pem").read_bytes() + (folder / "certificate.pem").read_bytes())
+    path.write_bytes(key.read_bytes() + certificate.read_bytes())
     return path

@@ -14,8 +14,8 @@ from valve_friction_ros.model import (
     SineWave,
     simulate,
 )
-from valve_friction_ros.streams import Samples
-from valve_friction_ros.usage import BINS, DAY, Usage, UsageCounter
+from valve_friction_ros.streams import DAY, Samples
+from valve_friction_ros.usage import BINS, Usage, UsageCounter
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from valve_friction_ros.streams import DAY
 from valve_friction_ros.usage import (
     BINS,
-    DAY,
     Pace,
     Usage,
     UsageLimits,

@@ -2,11 +2,12 @@
 
 import hashlib
 import hmac
-import ipaddress
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from urllib.parse import urlsplit
+
+from valve_friction_ros.loopback import is_loopback
 
 __all__ = ["SIGNATURE", "Place", "Secrets", "Webhook", "signature"]
 
@@ -67,7 +68,7 @@ class Webhook:
                 f"{name} holds a name or a password, which everybody on the ROS graph can "
                 f"read: put a token into the environment variable {_TOKEN}"
             )
-        if parts.scheme == "http" and not _is_loopback(host):
+        if parts.scheme == "http" and not is_loopback(host):
             raise ValueError(
                 f"{name} is http to another machine, where everybody on the way can read and "
                 "change it: write https, or name a relay on this machine"
@@ -94,19 +95,12 @@ class Webhook:
     @property
     def is_here(self) -> bool:
         """Whether it is on this machine."""
-        return _is_loopback(self.host)
+        return is_loopback(self.host)
 
     def __str__(self) -> str:
         """Return scheme, host and port."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{self.scheme}://{host}:{self.port}"
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 @dataclass(frozen=True)

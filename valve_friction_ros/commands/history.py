@@ -24,8 +24,8 @@ from valve_friction_ros.history import (
     valve_histories,
 )
 from valve_friction_ros.records.data_folder import history_file
-from valve_friction_ros.streams import nanoseconds
-from valve_friction_ros.usage import DAY, ValveUsage
+from valve_friction_ros.streams import DAY, nanoseconds
+from valve_friction_ros.usage import ValveUsage
 
 __all__ = ["REFUSALS", "declare", "run"]
 

@@ -5,7 +5,7 @@ for UTC: it knows no other zones.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -126,7 +126,11 @@ def trend_chart(history: ValveHistory, zone: ZoneInfo, now: int) -> Options:
 
 
 def _plain(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(f"{value:.6g}")
+    return None if value is None or not math.isfinite(value) else _rounded(value)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}")
 
 
 def _dots(name: str, points: list[list[Any]], is_hollow: bool) -> Options:
@@ -215,7 +219,7 @@ def _marks(history: ValveHistory, zone: ZoneInfo, now: int) -> Options:
 
 def _points(strip: Strip, scale: float) -> list[list[float]]:
     return [
-        [round(t, 3), float(f"{v * scale:.6g}")]
+        [round(t, 3), _rounded(v * scale)]
         for t, v in zip(strip.times.tolist(), strip.values.tolist(), strict=True)
     ]
 
@@ -248,20 +252,19 @@ def live_chart(span: float) -> Options:
     }
 
 
-def loop_data(loop: Strip) -> list[Any]:
-    """Return the points of a signature: kPa and mm."""
+def loop_data(loop: Strip) -> list[list[float]]:
+    """Return the points of a signature, pressures (Pa) and positions (m), as kPa and mm."""
     return [
-        [float(f"{p * 1e-3:.6g}"), float(f"{x * 1e3:.6g}")]
+        [_rounded(p * 1e-3), _rounded(x * 1e3)]
         for p, x in zip(loop.times.tolist(), loop.values.tolist(), strict=True)
     ]
 
 
-def _recorded(record: Recording | None) -> Iterable[list[float]]:
+def _recorded(record: Recording | None) -> list[list[float]]:
     if record is None:
         return []
     step = max(1, len(record) // _MOST_POINTS)
-    pairs = zip(record.drive[::step].tolist(), record.position[::step].tolist(), strict=True)
-    return [[float(f"{p * 1e-3:.6g}"), float(f"{x * 1e3:.6g}")] for p, x in pairs]
+    return loop_data(Strip(record.drive[::step], record.position[::step]))
 
 
 def loop_chart(record: Recording | None) -> Options:
@@ -272,7 +275,7 @@ def loop_chart(record: Recording | None) -> Options:
         "xAxis": _axis("value", "pressure [kPa]", nameGap=26),
         "yAxis": _axis("value", "stem [mm]", nameGap=38),
         "series": [
-            _line("baseline", list(_recorded(record)), _GREY, width=1.4),
+            _line("baseline", _recorded(record), _GREY, width=1.4),
             _line("last minute", [], _ORANGE, width=1.4),
         ],
     }

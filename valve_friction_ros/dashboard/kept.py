@@ -17,14 +17,14 @@ from valve_friction_ros.history import (
     ratios_after,
     valve_histories,
 )
+from valve_friction_ros.streams import DAY
 
 __all__ = ["KeptHistory"]
 
-_DAY = 86_400_000_000_000
 _SPARK_DAYS = 400
 _MOST_RATIOS = 800
 """Ratios of a valve that its sparkline is drawn from."""
-_DEPTH = 1100 * _DAY
+_DEPTH = 1100 * DAY
 """Time, ns, of a valve's history that is read at most."""
 _CACHED = 8
 """Valves whose histories are kept in memory."""
@@ -80,7 +80,7 @@ class KeptHistory:
             state = self._state()
             if self._file is None or state == self._seen:
                 return False
-            since = time.time_ns() - _SPARK_DAYS * _DAY
+            since = time.time_ns() - _SPARK_DAYS * DAY
             self._seen = state
             self._begin_anew_for_another_file()
             try:

@@ -6,7 +6,10 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from valve_friction_ros.dashboard.access import Access
 
-__all__ = ["DashboardOptions", "zone_of"]
+__all__ = ["INSTALL", "DashboardOptions", "zone_of"]
+
+INSTALL = "pip install 'nicegui>=3.18,<4'"
+"""What installs the library of the pages, which rosdep does not know."""
 
 
 def zone_of(name: str) -> ZoneInfo:

@@ -5,14 +5,16 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from valve_friction_ros.dashboard.plant import Heard
-from valve_friction_ros.dashboard.selection import state_of
+from valve_friction_ros.dashboard.selection import STATES, state_of
 from valve_friction_ros.dashboard.sparkline import Sparkline
 from valve_friction_ros.dashboard.status_keys import Quantity
-from valve_friction_ros.dashboard.valve_view import Interval, ValveView
+from valve_friction_ros.dashboard.valve_view import Drift, Interval, ValveView
 
 __all__ = [
     "SIGNAL_WORDS",
+    "STATE_WORDS",
     "RowFeed",
+    "drift_number",
     "interval_text",
     "number_and_width",
     "quantity_texts",
@@ -26,6 +28,8 @@ _SAY = 240
 _LOWEST, _HIGHEST = 0.25, 4.0
 """Ends of the bar of a ratio, a logarithmic axis."""
 
+STATE_WORDS = {**{state: state for state in STATES}, "ok": "good", "unheard": "not heard"}
+
 SIGNAL_WORDS = {
     "F": "failure",
     "C": "check function",
@@ -34,7 +38,6 @@ SIGNAL_WORDS = {
     "": "good",
 }
 _SHORT = {"F": "failure", "C": "check", "S": "out of spec", "M": "maintenance"}
-_STATE_WORDS = {"silent": "silent", "unheard": "not heard", "ok": "good"}
 _FRICTIONS = {"coulomb_friction": "F_c", "sliding_friction": "sliding"}
 
 Row = dict[str, Any]
@@ -49,7 +52,7 @@ def state_words(valve: Heard) -> str:
         is_new = view.level is not None and view.friction.is_known and not view.baseline
         return "no baseline" if is_new else "unknown"
     if valve.is_silent or not valve.view.signal.value:
-        return _STATE_WORDS.get(state, state)
+        return STATE_WORDS[state]
     return _SHORT[valve.view.signal.value]
 
 
@@ -59,7 +62,7 @@ def summary(counts: Mapping[str, int]) -> str:
     if not total:
         return "No valve yet"
     others = [
-        f"{count} {_STATE_WORDS.get(state, state)}"
+        f"{count} {STATE_WORDS[state]}"
         for state, count in counts.items()
         if count and state != "ok"
     ]
@@ -117,14 +120,18 @@ def _ratio(ratio: Interval | None) -> Row:
     return {"ratio": ratio_text(ratio.value), "between": interval_text(ratio, "–"), "bar": bar}
 
 
+def drift_number(drift: Drift) -> str:
+    """Write a drift with its sign and half its interval."""
+    value, width = number_and_width(drift.value, drift.half_width)
+    return f"{'+' if drift.value > 0 else ''}{value} {width}".strip()
+
+
 def _drift(view: ValveView) -> Row:
     if view.drift is None:
         return {"drift": "–", "expected": ""}
-    value, width = number_and_width(view.drift.value, view.drift.half_width)
-    sign = "+" if view.drift.value > 0 else ""
     expected = view.drift.expected
     return {
-        "drift": f"{sign}{value} {width}".strip(),
+        "drift": drift_number(view.drift),
         "expected": f"limit {expected.date}" if expected else "",
     }
 

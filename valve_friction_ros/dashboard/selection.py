@@ -21,7 +21,9 @@ __all__ = [
 ]
 
 STATES = ("error", "silent", "warn", "unknown", "ok", "unheard")
-"""States of a valve, the worst first; ``unheard``: only the history knows it."""
+"""States of a valve, the worst first; ``unheard``: only the history knows it.
+
+A silent valve may be anything, and comes after an error."""
 
 SIGNALS = tuple(one.value for one in StatusSignal if one.value)
 _LONGEST_SEARCH = 200
@@ -40,15 +42,9 @@ def state_of(valve: Heard) -> str:
     return level.name.lower()
 
 
-def _severity(valve: Heard) -> float:
-    """Return how bad a valve is; a silent one may be anything, and comes after an error.
-
-    What was said last still orders the silent ones.
-    """
-    state = state_of(valve)
-    if state == "silent":
-        return 1.5 + 0.1 * (valve.view.level or 0)
-    return {"error": 2.0, "warn": 1.0, "unknown": 0.5, "ok": 0.0, "unheard": -1.0}[state]
+def _said_last(valve: Heard) -> int:
+    """Return the level that a silent valve has said last: it orders these."""
+    return (valve.view.level or 0) if state_of(valve) == "silent" else 0
 
 
 def _change(valve: Heard) -> float:
@@ -64,7 +60,8 @@ def _or(value: float | None, missing: float = -math.inf) -> float:
 def worst_first(valve: Heard) -> tuple[Any, ...]:
     """Return the key by which the valve that needs attention most comes first."""
     return (
-        -_severity(valve),
+        STATES.index(state_of(valve)),
+        -_said_last(valve),
         -_change(valve),
         -_or(valve.view.dead_band.if_determined.value),
         valve.view.tag,

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from statistics import fmean, median
 from typing import NamedTuple
 
+from valve_friction_ros.streams import DAY
+
 __all__ = ["Sparkline", "sparkline"]
 
 _POINTS = 40
 _TOP, _BOTTOM = 2.0, 22.0
-_DAY = 86_400_000_000_000
 
 
 class Sparkline(NamedTuple):
@@ -47,4 +48,4 @@ def sparkline(times: Sequence[int], ratios: Sequence[float]) -> Sparkline | None
         return round(_BOTTOM - (y - low) / (high - low) * (_BOTTOM - _TOP), 1)
 
     steps = [f"{100 * t / span:.1f} {at(y)}" for t, y in points]
-    return Sparkline(f"M{'L'.join(steps)}", f"M0 {at(0.0)}L100 {at(0.0)}", round(span / _DAY))
+    return Sparkline(f"M{'L'.join(steps)}", f"M0 {at(0.0)}L100 {at(0.0)}", round(span / DAY))

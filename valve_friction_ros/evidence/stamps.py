@@ -1,10 +1,10 @@
 """Whether the stamps of a move can be believed, before it joins those that are kept."""
 
 from valve_friction_ros.evidence.moves import Move
+from valve_friction_ros.streams import DAY
 
 __all__ = ["lies_behind_those_ahead", "stamp_problem"]
 
-_DAY = 86_400_000_000_000
 _MINUTE = 60_000_000_000
 _DELAY = 10 * _MINUTE
 """Longest delay, ns, of a move whose stamps agree with the node's clock."""
@@ -27,7 +27,7 @@ def stamp_problem(move: Move, last: int | None, now: int) -> str:
     """
     if last is not None and move.begin < last:
         return "before those that are kept"
-    if now > _CLOCK_IS_SET and move.end > max(now, last or 0) + _DAY:
+    if now > _CLOCK_IS_SET and move.end > max(now, last or 0) + DAY:
         return "more than a day ahead of the clock, and of those that are kept"
     return ""
 

@@ -5,7 +5,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
 from valve_friction_ros.figures.page import dress
-from valve_friction_ros.usage import BINS, DAY, ValveUsage
+from valve_friction_ros.streams import DAY
+from valve_friction_ros.usage import BINS, ValveUsage
 
 __all__ = ["usage_figure"]
 

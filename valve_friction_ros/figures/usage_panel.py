@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from valve_friction_ros.usage import DAY, UsedDay, ValveUsage
+from valve_friction_ros.streams import DAY
+from valve_friction_ros.usage import UsedDay, ValveUsage
 
 __all__ = ["draw_usage", "used_days"]
 

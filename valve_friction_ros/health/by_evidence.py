@@ -12,7 +12,7 @@ from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING, RefusalError
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import utc_minute
 
 __all__ = [
     "Reference",
@@ -128,7 +128,7 @@ def diagnosis_by_evidence(
         return _by_change(evidence, limits, effect)
     what = "no baseline" if baseline is None else "the baseline cannot be compared"
     healthy = (
-        f"what it was until {_date(reference.time)}, when the moves of this valve were first "
+        f"what it was until {utc_minute(reference.time)}, when the moves of this valve were first "
         f"combined ({what}: call ~/set_baseline while it is healthy)"
     )
     return against(found, limits, effect, healthy)
@@ -141,8 +141,8 @@ def _by_change(evidence: Evidence, limits: FrictionLimits, effect: str) -> Diagn
         return None
     ratio = Ratio(change.ratio, change.low, change.high, SLIDING, evidence.sliding_speed)
     healthy = (
-        f"what it was before it changed, between {_date(change.earliest)} and "
-        f"{_date(change.latest)} (no baseline and no first moves to compare with: call "
+        f"what it was before it changed, between {utc_minute(change.earliest)} and "
+        f"{utc_minute(change.latest)} (no baseline and no first moves to compare with: call "
         "~/set_baseline while it is healthy)"
     )
     found = against(ratio, limits, effect, healthy)
@@ -171,7 +171,7 @@ def why_not_compared(evidence: Evidence, baseline: Baseline | None) -> str:
 
 
 def _moves(evidence: Evidence) -> str:
-    return f"{evidence.moves} moves in service since {_date(evidence.since)}"
+    return f"{evidence.moves} moves in service since {utc_minute(evidence.since)}"
 
 
 def _effect(evidence: Evidence, valve: Valve) -> str:
@@ -181,7 +181,3 @@ def _effect(evidence: Evidence, valve: Valve) -> str:
         return ""
     width = two_digits(100 * valve.share_of_travel(band.half_width))
     return f"; the stem ignores reversals smaller than {100 * share:.3g} ± {width} % of its travel"
-
-
-def _date(time: int) -> str:
-    return f"{utc(time):%Y-%m-%d %H:%M} UTC"

@@ -12,7 +12,7 @@ from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import utc_minute
 
 __all__ = ["DatedNumber", "KnownNumbers"]
 
@@ -124,10 +124,7 @@ class KnownNumbers:
         times = {self.dated[name].time for name in finding.numbers if name in self.dated}
         if not times - {self.latest}:
             return finding
-        date = utc(min(times))
-        message = (
-            f"{finding.message} (measured {date:%Y-%m-%d %H:%M} UTC; no record since shows it)"
-        )
+        message = f"{finding.message} (measured {utc_minute(min(times))}; no record since shows it)"
         return replace(finding, message=message)
 
 

@@ -2,7 +2,7 @@
 
 from valve_friction_ros.health.diagnosis import DOUBT, Diagnosis, EarlierEstimate, FrictionLimits
 from valve_friction_ros.health.levels import Level, StatusSignal
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import utc_minute
 
 __all__ = ["is_standing", "standing", "without_standing"]
 
@@ -35,7 +35,7 @@ def standing(before: Diagnosis, time: int, latest: Diagnosis, limits: FrictionLi
         return latest
     message, stood, _ = before.message.partition(_LATEST)
     if not stood:
-        message += f" (identified {utc(time):%Y-%m-%d %H:%M} UTC)"
+        message += f" (identified {utc_minute(time)})"
     worst = max(before, latest, key=lambda one: one.level)
     return Diagnosis(worst.level, worst.status_signal, message + _LATEST + latest.message, None)
 

@@ -1,6 +1,5 @@
 """The recordings of alarms in the history."""
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,9 +7,9 @@ from typing import Any
 from valve_friction_ros.health.levels import Level
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.retention import forget_older
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
-from valve_friction_ros.usage import DAY
 
 __all__ = ["AlarmRecording", "alarm_recordings", "keep_alarm_recording"]
 
@@ -63,11 +62,7 @@ def keep_alarm_recording(
             "VALUES (?, ?, ?, ?, ?)",
             (row, one.time, int(one.level), str(one.path), one.message),
         )
-        if days > 0:
-            connection.execute(
-                "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns < ?",
-                (row, min(one.time, time.time_ns()) - round(days * DAY)),
-            )
+        forget_older(connection, "alarm_recording", "time_ns", row, one.time, days)
 
 
 def alarm_recordings(file: HistoryFile, valve: str) -> tuple[AlarmRecording, ...]:

@@ -2,18 +2,16 @@
 
 import math
 import sqlite3
-import time
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.retention import forget_beyond, forget_older
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
-from valve_friction_ros.history.service_tables import ANSWERS
 from valve_friction_ros.response import Move
-from valve_friction_ros.usage import DAY
 
 __all__ = ["forget_answers", "keep_answers", "read_answers"]
 
@@ -38,20 +36,13 @@ def keep_answers(
     names = ("valve_id", "travel", *_COLUMNS)
     marks = ", ".join("?" * len(names))
     with writing(file.path) as connection:
-        connection.execute(ANSWERS)  # a file of this schema may be older than its table
         row = valve_id(connection, valve)
         connection.executemany(
             f"INSERT OR REPLACE INTO answer ({', '.join(names)}) VALUES ({marks})",  # noqa: S608
             [(row, travel, *(getattr(one, name) for name in _COLUMNS)) for one in moves],
         )
-        if days > 0:
-            oldest = min(moves[-1].stamp, time.time_ns()) - round(days * DAY)
-            connection.execute("DELETE FROM answer WHERE valve_id = ? AND stamp < ?", (row, oldest))
-        connection.execute(
-            "DELETE FROM answer WHERE valve_id = ? AND id <= "
-            "(SELECT id FROM answer WHERE valve_id = ? ORDER BY id DESC LIMIT 1 OFFSET ?)",
-            (row, row, _MOST),
-        )
+        forget_older(connection, "answer", "stamp", row, moves[-1].stamp, days)
+        forget_beyond(connection, "answer", "id", row, _MOST)
 
 
 def read_answers(file: HistoryFile, valve: str, travel: float | None = None) -> tuple[Move, ...]:
@@ -79,8 +70,7 @@ def read_answers(file: HistoryFile, valve: str, travel: float | None = None) -> 
 
 def forget_answers(connection: sqlite3.Connection, row: int) -> None:
     """Drop the answers of the valve of this row: its packing was renewed."""
-    if has_table(connection, "answer"):
-        connection.execute("DELETE FROM answer WHERE valve_id = ?", (row,))
+    connection.execute("DELETE FROM answer WHERE valve_id = ?", (row,))
 
 
 def _move(row: Sequence[float | None]) -> Move:

@@ -2,15 +2,15 @@
 
 import math
 import sqlite3
-import time
 from collections.abc import Sequence
 from dataclasses import astuple
+from typing import Any
 
 from valve_friction_ros.evidence import MOST_MOVES, Change, Move
 from valve_friction_ros.health import Reference, SlidingFriction
 from valve_friction_ros.history.entry import KeptValve
-from valve_friction_ros.history.evidence_table import EVIDENCE_CHANGE
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.retention import forget_beyond, forget_older
 from valve_friction_ros.history.rows import valve_id
 from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
 from valve_friction_ros.model.valve import Valve
@@ -26,7 +26,6 @@ __all__ = [
     "read_reference",
 ]
 
-_DAY = 86_400_000_000_000
 _OF_MOVE = (
     "begin_ns",
     "end_ns",
@@ -60,14 +59,8 @@ def keep_moves(
             f"INSERT OR REPLACE INTO move ({', '.join(columns)}) VALUES ({marks})",  # noqa: S608
             [(row, built.diaphragm_area, built.pressure_reference, *_row(one)) for one in moves],
         )
-        if days > 0:
-            oldest = min(moves[-1].end, time.time_ns()) - round(days * _DAY)
-            connection.execute("DELETE FROM move WHERE valve_id = ? AND end_ns < ?", (row, oldest))
-        connection.execute(
-            "DELETE FROM move WHERE valve_id = ? AND end_ns <= "
-            "(SELECT end_ns FROM move WHERE valve_id = ? ORDER BY end_ns DESC LIMIT 1 OFFSET ?)",
-            (row, row, MOST_MOVES),
-        )
+        forget_older(connection, "move", "end_ns", row, moves[-1].end, days)
+        forget_beyond(connection, "move", "end_ns", row, MOST_MOVES)
 
 
 def forget_moves_after(file: HistoryFile, valve: KeptValve, time: int) -> None:
@@ -146,15 +139,8 @@ def read_reference(file: HistoryFile, valve: str, built: Valve) -> Reference | N
 
     Raises HistoryError if the file cannot be read; one of an older version holds none.
     """
-    with reading(file.path) as connection:
-        if not has_table(connection, "evidence_reference"):
-            return None
-        row = connection.execute(
-            "SELECT time_ns, sliding_friction, half_width, speed FROM evidence_reference "
-            "JOIN valve ON valve.id = valve_id "
-            "WHERE name = ? AND diaphragm_area IS ? AND pressure_reference = ?",
-            (valve, built.diaphragm_area, built.pressure_reference),
-        ).fetchone()
+    columns = ("time_ns", "sliding_friction", "half_width", "speed")
+    row = _row_of(file, "evidence_reference", columns, valve, built)
     return None if row is None else Reference(SlidingFriction(*row[1:]), row[0])
 
 
@@ -164,7 +150,6 @@ def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: Chang
     Raises HistoryError if it cannot be written.
     """
     with writing(file.path) as connection:
-        connection.execute(EVIDENCE_CHANGE)  # a file of this schema may be older than its table
         connection.execute(
             "INSERT OR REPLACE INTO evidence_change VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
             (
@@ -181,20 +166,28 @@ def read_change(file: HistoryFile, valve: str, built: Valve) -> Change | None:
 
     Raises HistoryError if the file cannot be read; an older one holds none.
     """
+    columns = ("earliest_ns", "latest_ns", "ratio", "low", "high")
+    row = _row_of(file, "evidence_change", columns, valve, built)
+    return None if row is None else Change(*row)
+
+
+def _row_of(
+    file: HistoryFile, table: str, columns: Sequence[str], valve: str, built: Valve
+) -> tuple[Any, ...] | None:
+    """Return the row of a table for the valve of this name, with this actuator, if it is there."""
     with reading(file.path) as connection:
-        if not has_table(connection, "evidence_change"):
+        if not has_table(connection, table):
             return None
-        row = connection.execute(
-            "SELECT earliest_ns, latest_ns, ratio, low, high FROM evidence_change "
+        found: tuple[Any, ...] | None = connection.execute(
+            f"SELECT {', '.join(columns)} FROM {table} "  # noqa: S608
             "JOIN valve ON valve.id = valve_id "
             "WHERE name = ? AND diaphragm_area IS ? AND pressure_reference = ?",
             (valve, built.diaphragm_area, built.pressure_reference),
         ).fetchone()
-    return None if row is None else Change(*row)
+    return found
 
 
 def forget_evidence(connection: sqlite3.Connection, row: int) -> None:
     """Drop moves, reference and change of the valve of this row: its packing was renewed."""
-    connection.execute(EVIDENCE_CHANGE)  # a file of this schema may be older than its table
     for table in ("move", "evidence_reference", "evidence_change"):
         connection.execute(f"DELETE FROM {table} WHERE valve_id = ?", (row,))  # noqa: S608

@@ -29,10 +29,10 @@ from valve_friction_ros.history.rows import (
 from valve_friction_ros.history.schema import HistoryError, is_current, reading, writing
 from valve_friction_ros.identification import FORMER_METHODS, SLIDING
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams import DAY
 
 __all__ = ["HistoryError", "HistoryFile"]
 
-_DAY = 86_400_000_000_000
 """Nanoseconds of a day."""
 
 _END_OF_TIME = 2**63 - 1
@@ -81,7 +81,7 @@ class HistoryFile:
             valve = valve_id(connection, entry.valve)
             insert_entry(connection, valve, entry)
             if days > 0:
-                _forget(connection, valve, entry.time - round(days * _DAY))
+                _forget(connection, valve, entry.time - round(days * DAY))
 
     def set_baseline(self, valve: KeptValve, kept: KeptBaseline) -> None:
         """Make this the baseline of a valve."""

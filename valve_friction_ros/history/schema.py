@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
-from valve_friction_ros.history.tables import SCHEMA_VERSION, statements_from
+from valve_friction_ros.history.tables import ADDED_LATE, SCHEMA_VERSION, statements_from
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -138,6 +138,8 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
         try:
             if _is_new(path, connection) or _pragma(connection, "user_version") < SCHEMA_VERSION:
                 _make_tables(connection)
+            for statement in ADDED_LATE:
+                connection.execute(statement)
             yield connection
             connection.execute("COMMIT")
         finally:

@@ -7,7 +7,7 @@ from valve_friction_ros.history.evidence_table import EVIDENCE_CHANGE, EVIDENCE_
 from valve_friction_ros.history.number_rows import NUMBER_TABLES
 from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, ANSWERS, TOLD_LEVEL, USAGE
 
-__all__ = ["SCHEMA_VERSION", "statements_from"]
+__all__ = ["ADDED_LATE", "SCHEMA_VERSION", "statements_from"]
 
 SCHEMA_VERSION = 6
 """The database's user_version.
@@ -155,6 +155,9 @@ _SERVICE = ";".join(
     )
 )
 """The tables of the valve in service."""
+
+ADDED_LATE = (EVIDENCE_CHANGE, ANSWERS)
+"""Tables that the first files of this version lack: each writing makes what is not there."""
 
 _ADDED = {
     "ratio_of": "TEXT",

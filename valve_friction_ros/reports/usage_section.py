@@ -6,7 +6,7 @@ from valve_friction_ros.figures.usage_figure import usage_figure
 from valve_friction_ros.health import percentage
 from valve_friction_ros.model import Valve
 from valve_friction_ros.reports.page import Column, Paragraph, Picture, Section, Table
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import utc, utc_day
 from valve_friction_ros.usage import LimitState, Usage, ValveUsage
 
 __all__ = ["usage_section"]
@@ -86,7 +86,7 @@ def _expected(state: LimitState) -> str:
         return "reached"
     if state.expected is None:
         return "not known before a day of watching"
-    return f"{utc(state.expected):%Y-%m-%d}"
+    return utc_day(state.expected)
 
 
 def _cells(usage: Usage, valve: Valve) -> dict[str, str]:

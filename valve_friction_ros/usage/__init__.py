@@ -3,11 +3,10 @@
 from valve_friction_ros.usage.counter import DEFAULT_BAND, UsageCounter
 from valve_friction_ros.usage.limits import LimitState, UsageLimits, limit_states, warned_limits
 from valve_friction_ros.usage.usage import BINS, Usage, total
-from valve_friction_ros.usage.valve_usage import DAY, Pace, UsedDay, ValveUsage
+from valve_friction_ros.usage.valve_usage import Pace, UsedDay, ValveUsage
 
 __all__ = [
     "BINS",
-    "DAY",
     "DEFAULT_BAND",
     "LimitState",
     "Pace",

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_positive
+from valve_friction_ros.streams import DAY
 from valve_friction_ros.streams.samples import Samples
 from valve_friction_ros.usage.breakaways import Breakaways
 from valve_friction_ros.usage.sensor_band import SensorBand
@@ -21,7 +22,6 @@ _BLOCK, _LARGEST_BLOCK = 256, 1024
 """Fewest and most samples that are counted together; between them a second is enough. Chosen: a
 block costs as much as its 250 samples."""
 _SECOND = 1_000_000_000
-_DAY = 86_400_000_000_000
 _LARGEST_GAP = 10
 """Sampling periods above which a pause is a gap, as in a record."""
 _LONG_GAP = 1_000_000_000
@@ -130,7 +130,7 @@ class UsageCounter:
         times = np.where((pauses > 0) & (pauses <= longest), pauses, 0)
         bins = np.concatenate(([place], position[:-1])) * (BINS / self._travel)
         bins = np.clip(bins, 0, BINS - 1).astype(np.int64)
-        days = stamps // _DAY
+        days = stamps // DAY
         is_unseen = (pauses < 0) | (pauses > max(longest, _LONG_GAP))
         begins = np.flatnonzero(is_unseen | (np.diff(days, prepend=days[0]) != 0))
         edges = np.unique(np.concatenate(([0], begins, [stamps.size]))).tolist()

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from valve_friction_ros.model.checks import require_non_negative
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import DAY, utc_day
 from valve_friction_ros.usage.usage import Usage
-from valve_friction_ros.usage.valve_usage import DAY, Pace, ValveUsage
+from valve_friction_ros.usage.valve_usage import Pace, ValveUsage
 
 __all__ = ["LEAD", "LimitState", "UsageLimits", "limit_states", "warned_limits"]
 
@@ -92,7 +92,7 @@ class LimitState(NamedTuple):
         if self.is_reached:
             state = ": reached"
         elif self.expected is not None:
-            state = f", expected on {utc(self.expected):%Y-%m-%d}"
+            state = f", expected on {utc_day(self.expected)}"
         return (
             f"packing life: {figures} of {self.limit:.6g} ({self.name}){state}: renew the packing, "
             "then call ~/reset_usage"

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from valve_friction_ros.streams import DAY
 from valve_friction_ros.usage.usage import Usage, total
 
 __all__ = ["DAY", "Pace", "UsedDay", "ValveUsage"]
 
-DAY = 86_400_000_000_000
 """Nanoseconds of a day."""
 
 _PACE_DAYS = 14

@@ -69,9 +69,10 @@ VALVES = (
 def require_dashboard() -> None:
     """Raise BenchError where NiceGUI is not installed."""
     if importlib.util.find_spec("nicegui") is None:
+        from valve_friction_ros.dashboard.options import INSTALL  # noqa: PLC0415 - rarely needed
+
         raise BenchError(
-            "the dashboard needs NiceGUI: run `pip install 'nicegui>=3.18,<4'`, or `make demo "
-            "DEMO_ARGS=--dashboard`"
+            f"the dashboard needs NiceGUI: run `{INSTALL}`, or `make demo DEMO_ARGS=--dashboard`"
         )
 
 

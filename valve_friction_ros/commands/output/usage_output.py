@@ -13,8 +13,8 @@ from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.outside_text import harmless, printable
 from valve_friction_ros.records.whole_file import write_whole
 from valve_friction_ros.response import ResponseSummary
-from valve_friction_ros.streams import utc
-from valve_friction_ros.usage import BINS, DAY, Usage, UsedDay, ValveUsage
+from valve_friction_ros.streams import DAY, utc_day, utc_second
+from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
 
 __all__ = [
     "alarms_as_json",
@@ -27,29 +27,21 @@ __all__ = [
 _HOUR = 3600e9
 
 
-def _date(time: int) -> str:
-    return f"{utc(time):%Y-%m-%d}"
-
-
-def _time(time: int) -> str:
-    return f"{utc(time):%Y-%m-%dT%H:%M:%SZ}"
-
-
 def usage_as_json(usage: ValveUsage) -> dict[str, Any] | None:
     """Return the usage as a mapping, with its times as text; None where nothing was counted."""
     if not usage.days and not usage.renewal:
         return None
     shown = usage.to_dict()
-    shown["renewal"] = _time(usage.renewal) if usage.renewal else None
+    shown["renewal"] = utc_second(usage.renewal) if usage.renewal else None
     for one in shown["days"]:
-        one["day"] = _date(one["day"])
-        one["renewal"] = _time(one["renewal"]) if one["renewal"] else None
+        one["day"] = utc_day(one["day"])
+        one["renewal"] = utc_second(one["renewal"]) if one["renewal"] else None
     return shown
 
 
 def alarms_as_json(alarms: Sequence[AlarmRecording]) -> list[dict[str, Any]]:
     """Return the recordings of alarms as mappings, with their times as text."""
-    return [{**one.to_dict(), "time": _time(one.time)} for one in alarms]
+    return [{**one.to_dict(), "time": utc_second(one.time)} for one in alarms]
 
 
 def service_lines(
@@ -60,7 +52,7 @@ def service_lines(
     """Return what stands below the list of a valve: its usage, its answers, its latest alarm."""
     lines = []
     if usage.days:
-        since = f"since {_date(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
+        since = f"since {utc_day(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
         lines.append(f"usage: {_words(usage.since_renewal)}, {since}")
         if usage.renewal:
             lines.append(f"usage: {_words(usage.total)}, in all")
@@ -69,8 +61,8 @@ def service_lines(
     if alarms:
         last = alarms[-1]
         lines.append(
-            f"alarm recordings: {len(alarms)}, the latest {_time(last.time)} {last.level.name}: "
-            f"{printable(str(last.path))}"
+            f"alarm recordings: {len(alarms)}, the latest {utc_second(last.time)} "
+            f"{last.level.name}: {printable(str(last.path))}"
         )
     return lines
 
@@ -118,18 +110,18 @@ def print_usage(valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool 
             column.justify = "right"
         for one in usage.days:
             table.add_row(
-                _date(one.day * DAY),
+                utc_day(one.day * DAY),
                 f"{one.usage.distance:.5g}",
                 str(one.usage.reversals),
                 str(one.usage.breakaways),
                 f"{one.usage.time_watched / _HOUR:.4g}",
                 f"{one.usage.time_near_seat() / _HOUR:.4g}",
                 f"{one.usage.time_near_seat(True) / _HOUR:.4g}",
-                _date(one.renewal) if one.renewal else "not known",
+                utc_day(one.renewal) if one.renewal else "not known",
             )
         console.print(table)
         if is_chosen:
-            first, last = (_date(usage.days[place].day * DAY) for place in (0, -1))
+            first, last = (utc_day(usage.days[place].day * DAY) for place in (0, -1))
             console.print(f"usage: {_words(usage.total)}, from {first} to {last}")
         else:
             for line in service_lines(usage):
@@ -164,10 +156,10 @@ def _row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
         for n, time in enumerate(one.usage.histogram)
     }
     return {
-        "day": _date(one.day * DAY),
+        "day": utc_day(one.day * DAY),
         "valve": valve.name,
         "tag": valve.tag,
-        "packing_renewed": _time(one.renewal) if one.renewal else None,
+        "packing_renewed": utc_second(one.renewal) if one.renewal else None,
         "distance_m": one.usage.distance,
         "reversals": one.usage.reversals,
         "breakaways": one.usage.breakaways,

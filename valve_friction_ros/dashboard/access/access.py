@@ -1,21 +1,14 @@
 """Where a dashboard listens, and whom it lets in."""
 
-import ipaddress
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
 from valve_friction_ros.dashboard.access.accounts import VARIABLE, Account
 from valve_friction_ros.dashboard.access.private_file import require_private
+from valve_friction_ros.loopback import is_loopback
 
 __all__ = ["Access"]
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 @dataclass(frozen=True)
@@ -58,7 +51,7 @@ class Access:
 
     def __post_init__(self) -> None:
         """Refuse what would let anybody in."""
-        if not self.accounts and (not _is_loopback(self.host) or self.host_names):
+        if not self.accounts and (not is_loopback(self.host) or self.host_names):
             raise ValueError(
                 f"host {self.host!r} lets others in, and there are no accounts: make one by "
                 "`valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and give the "
@@ -80,7 +73,7 @@ class Access:
     @property
     def warning(self) -> str:
         """What its operator should know; empty if nothing."""
-        if self.accounts and not self.is_encrypted and not _is_loopback(self.host):
+        if self.accounts and not self.is_encrypted and not is_loopback(self.host):
             return (
                 "no certificate: passwords and sessions can be read on the way; give "
                 "certificate_file and key_file"

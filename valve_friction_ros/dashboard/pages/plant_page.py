@@ -11,7 +11,7 @@ from valve_friction_ros.dashboard.board import Board
 from valve_friction_ros.dashboard.pages.plant_table import PlantTable
 from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
 from valve_friction_ros.dashboard.plant import Heard
-from valve_friction_ros.dashboard.plant_rows import SIGNAL_WORDS, RowFeed, summary
+from valve_friction_ros.dashboard.plant_rows import SIGNAL_WORDS, STATE_WORDS, RowFeed, summary
 from valve_friction_ros.dashboard.selection import (
     SIGNALS,
     STATES,
@@ -39,14 +39,6 @@ _COLUMNS = [
         ("heard", "Heard", "", ""),
     )
 ]
-_STATE_TEXT = {
-    "error": "error",
-    "silent": "silent",
-    "warn": "warn",
-    "unknown": "unknown",
-    "ok": "good",
-    "unheard": "not heard",
-}
 
 
 class _PlantPage:
@@ -55,7 +47,8 @@ class _PlantPage:
     def __init__(self, board: Board, selection: Selection) -> None:
         self._board = board
         self._selection = selection
-        self._chips: dict[str, tuple[ui.element, ui.label]] = {}
+        self._counts: dict[str, ui.label] = {}
+        self._views: dict[ui.element, bool] = {}
 
     def address(self, common: dict[str, str]) -> str:
         return self._selection.address(common)
@@ -75,7 +68,7 @@ class _PlantPage:
                 search.props["aria-label"] = "Search"
             with element("div", "vf-filters", role="group", aria_label="State"):
                 for state in STATES:
-                    self._chip("states", state, _STATE_TEXT[state], f"vf-{state}")
+                    self._chip("states", state, STATE_WORDS[state], f"vf-{state}")
             with element("div", "vf-filters", role="group", aria_label="NE 107"):
                 for letter in SIGNALS:
                     self._chip("signals", letter, letter, "vf-letter", SIGNAL_WORDS[letter])
@@ -83,7 +76,8 @@ class _PlantPage:
                 for text, tiled in (("Table", False), ("Tiles", True)):
                     self._view(text, tiled)
         heard = self._heard()
-        first = self._feed.news(selected(heard, self._selection), self._board.kept.spark, _wall())
+        shown = selected(heard, self._selection)
+        first = self._feed.news(shown, self._board.kept.spark, time.time())
         self._table = PlantTable({**first, **self._arrangement()}, _COLUMNS)
         self._table.on("sort", lambda event: self._sort(event.args))
         self._note = ui.label("").classes("vf-note")
@@ -101,14 +95,13 @@ class _PlantPage:
     def _show(self, more: dict[str, Any]) -> None:
         heard = self._heard()
         shown = selected(heard, self._selection)
-        self._table.send({**self._feed.news(shown, self._board.kept.spark, _wall()), **more})
+        self._table.send({**self._feed.news(shown, self._board.kept.spark, time.time()), **more})
         self._count(heard)
 
     def _count(self, heard: list[Heard]) -> None:
         counts = levels_in(heard)
-        for state, (_, label) in self._chips.items():
-            if state in counts:
-                label.set_text(str(counts[state]))
+        for state, label in self._counts.items():
+            label.set_text(str(counts[state]))
         self._title.set_text(summary(counts))
         self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
         self._note.set_text(self._board.kept.problem or "")
@@ -149,7 +142,7 @@ class _PlantPage:
             button.props["aria-label"] = f"NE 107 {one}: {title}"
         if kind == "states":
             with button:
-                self._chips[one] = (button, ui.label("0").classes("vf-count"))
+                self._counts[one] = ui.label("0").classes("vf-count")
 
     def _view(self, text: str, tiled: bool) -> None:
         def choose() -> None:
@@ -160,22 +153,12 @@ class _PlantPage:
         made = self._button(text, "vf-filter", self._selection.is_tiled == tiled, choose)
         self._views[made] = tiled
 
-    @property
-    def _views(self) -> dict[ui.element, bool]:
-        if not hasattr(self, "_view_buttons"):
-            self._view_buttons: dict[ui.element, bool] = {}
-        return self._view_buttons
-
     @staticmethod
     def _button(text: str, css: str, is_on: bool, click: Callable[[], None]) -> ui.element:
         with element("button", css, type="button", aria_pressed=str(is_on).lower()) as made:
             ui.label(text)
         made.on("click", click)
         return made
-
-
-def _wall() -> float:
-    return time.time()
 
 
 def plant_page(board: Board, query: dict[str, str]) -> None:

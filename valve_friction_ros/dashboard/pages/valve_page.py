@@ -25,10 +25,11 @@ from valve_friction_ros.dashboard.pages.valve_history import (
     draw_files,
     draw_identifications,
 )
+from valve_friction_ros.dashboard.pages.valve_parameters import draw_parameters
 from valve_friction_ros.dashboard.plant import Heard
 from valve_friction_ros.dashboard.plant_rows import (
+    drift_number,
     interval_text,
-    number_and_width,
     quantity_texts,
     ratio_text,
     state_words,
@@ -49,7 +50,6 @@ _SLOWER = 5
 _COLUMNS = 500
 _LOOP = 1200
 _UTC = ZoneInfo("UTC")
-_VERDICTS = {"identified": "ok", "weak": "warn", "not identifiable": "unknown", "fixed": "unknown"}
 
 
 class _ValvePage:
@@ -63,6 +63,8 @@ class _ValvePage:
         self._beat = self._looped = 0
         self._drawn = (0, 0)
         self._history: ValveHistory | None = None
+        self._loop: ui.echart | None = None
+        self._fact_labels: dict[str, ui.label] = {}
         self._strip = board.signals.watch(node)
         ui.context.client.on_delete(lambda: board.signals.unwatch(node))
 
@@ -169,7 +171,9 @@ class _ValvePage:
             or before.parameters != view.parameters
             or before.baseline != view.baseline
         ):
-            self._show_parameters(view)
+            self._parameters_body.clear()
+            with self._parameters_body:
+                draw_parameters(view)
         groups = view.groups()
         for key, entries in self._lists.items():
             entries.show(groups[key])
@@ -189,50 +193,11 @@ class _ValvePage:
             "identified": moment(made, self._page.zone) + age,
             "heard": "never" if silent is None else f"{ago(silent)} ago",
         }
-        if not self._facts.default_slot.children:
+        if not self._fact_labels:
             with self._facts:
                 self._fact_labels = {name: _fact(name) for name in facts}
         for name, words in facts.items():
             self._fact_labels[name].set_text(words)
-
-    def _show_parameters(self, view: ValveView) -> None:
-        self._parameters_body.clear()
-        baseline = {one.name: one for one in view.baseline}
-        with self._parameters_body:
-            if not view.parameters:
-                text("p", view.reason or "There is no estimate yet.", "vf-none")
-                return
-            with element("table", "vf-list vf-parameters"):
-                with element("thead"), element("tr"):
-                    for title, css in (("parameter", ""), ("value", "vf-n"), ("", "vf-width"),
-                                       ("", ""), ("verdict", "")):  # fmt: skip
-                        text("th", title, css)
-                with element("tbody"):
-                    for one in view.parameters:
-                        value, width = quantity_texts(one)
-                        with element("tr"):
-                            text("td", one.name.replace("_", " "))
-                            text("td", value, "vf-n")
-                            text("td", width, "vf-width")
-                            text("td", one.unit, "vf-unit")
-                            with element("td"):
-                                chip(_VERDICTS.get(one.verdict, "unknown"), one.verdict or "–")
-                                if one.reason:
-                                    text("small", one.reason, "vf-reason")
-                        if one.name in baseline:
-                            self._baseline_row(
-                                baseline[one.name].value, baseline[one.name].half_width
-                            )
-
-    @staticmethod
-    def _baseline_row(value: float, half_width: float) -> None:
-        shown, width = number_and_width(value, half_width)
-        with element("tr", "vf-sub"):
-            text("td", "baseline")
-            text("td", shown, "vf-n")
-            text("td", width, "vf-width")
-            text("td", "N", "vf-unit")
-            text("td", "")
 
     # The signals
 
@@ -246,7 +211,7 @@ class _ValvePage:
         self._drawn = revision
         pressure, stem = self._strip.strips(_COLUMNS)
         self._live.run_chart_method("setOption", {"series": live_data(pressure, stem)})
-        if hasattr(self, "_loop") and self._looped + _SLOWER <= self._beat:
+        if self._loop is not None and self._looped + _SLOWER <= self._beat:
             self._looped = self._beat
             loop = loop_data(self._strip.loop(_LOOP))
             self._loop.run_chart_method("setOption", {"series": [{}, {"data": loop}]})
@@ -350,10 +315,9 @@ def _with_unit(one: Quantity, unit: str) -> str:
 def _drift_words(view: ValveView) -> str:
     if view.drift is None:
         return "none that is significant" if view.friction.is_known else "–"
-    words = _with_unit(Quantity("", view.drift.value, view.drift.half_width), "N a month")
+    words = f"{drift_number(view.drift)} N a month"
     expected = view.drift.expected
-    sign = "+" if view.drift.value > 0 else ""
-    return f"{sign}{words}; limit {expected.date}" if expected else f"{sign}{words}"
+    return f"{words}; limit {expected.date}" if expected else words
 
 
 def _trend_words(kept: ValveHistory) -> str:

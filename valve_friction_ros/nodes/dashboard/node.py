@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.dashboard import Plant
+from valve_friction_ros.dashboard.options import INSTALL
 from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_from
 from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
@@ -30,10 +31,7 @@ _MALLOC = {-8: 2, -3: 131_072, -1: 131_072}
 """M_ARENA_MAX, M_MMAP_THRESHOLD (bytes) and M_TRIM_THRESHOLD (bytes) of malloc.h."""
 _PAUSE = 0.05
 """Time between two turns, s: for so long messages gather."""
-_MISSING = (
-    "cannot start: the dashboard needs NiceGUI, which is not installed: "
-    "run `pip install 'nicegui>=3.18,<4'`"
-)
+_MISSING = f"cannot start: the dashboard needs NiceGUI, which is not installed: run `{INSTALL}`"
 
 
 class Dashboard(PolledNode):

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.qos import watched
 from valve_friction_ros.nodes.plumbing.raw_samples import (
     positions_in,
     pressures_in,
@@ -23,16 +23,6 @@ __all__ = ["WatchedSignals"]
 
 _SPAN = 60.0
 """Seconds of signal that are shown."""
-
-
-def _quality() -> QoSProfile:
-    """Take what is published either way, without holding a publisher up."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=5000,
-        reliability=ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.VOLATILE,
-    )
 
 
 @dataclass
@@ -55,7 +45,7 @@ class _Watch:
         topics = (self.sources.pressure_topic, self.sources.stem_topic)
         for kind, topic in zip((FluidPressure, JointState), topics, strict=True):
             try:
-                made = PolledSubscription(node, kind, topic, _quality(), raw=True)
+                made = PolledSubscription(node, kind, topic, watched(), raw=True)
             except Exception as error:  # noqa: BLE001 - rclpy's, where the name is none of a topic
                 self._destroy(node)
                 about = printable(str(error).partition("\n")[0], 200)

@@ -36,7 +36,7 @@ from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_rep
 from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc
+from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc_second
 
 __all__ = ["AlarmRecorder"]
 
@@ -104,9 +104,8 @@ class AlarmRecorder:
         """Return the latest recording, and what hindered one since."""
         values: dict[str, str] = {}
         if self._latest is not None:
-            risen = utc(self._latest.time)
             values["alarm_recording"] = str(self._latest.path)
-            values["alarm_recording [time]"] = f"{risen:%Y-%m-%dT%H:%M:%SZ}"
+            values["alarm_recording [time]"] = utc_second(self._latest.time)
             values["alarm_recording level"] = self._latest.level.name
         if self._problem is not None:
             values["alarm_recording problem"] = self._problem

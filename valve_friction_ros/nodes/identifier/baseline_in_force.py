@@ -18,7 +18,7 @@ from valve_friction_ros.nodes.identifier.parameters import (
     baseline_from,
 )
 from valve_friction_ros.nodes.plumbing.parameters import values_of
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import utc_minute
 
 __all__ = ["BaselineInForce"]
 
@@ -29,12 +29,8 @@ def _value(baseline: Baseline | None) -> float | None:
     return None if baseline is None else baseline.coulomb_friction
 
 
-def _minute(time: int) -> str:
-    return f"{utc(time):%Y-%m-%d %H:%M} UTC"
-
-
 def _described_with_date(kept: KeptBaseline) -> str:
-    return f"baseline {kept.baseline}, set {_minute(kept.time)}"
+    return f"baseline {kept.baseline}, set {utc_minute(kept.time)}"
 
 
 class BaselineInForce:
@@ -87,10 +83,11 @@ class BaselineInForce:
         seen = self._monitor.seen_until
         source = self._evidence.source
         if seen is not None:
-            identified = f"the identification of {_minute(seen)}"
+            identified = f"the identification of {utc_minute(seen)}"
             source = f"{source}, newer than {identified}" if by_evidence else f"by {identified}"
-        answer = await self._change(self._history.kept_now(baseline, self._level(), since))
-        return f"{answer} ({source})"
+        return await self._change(
+            self._history.kept_now(baseline, self._level(), since), f" ({source})"
+        )
 
     async def _newest(self) -> tuple[Baseline, bool]:
         """Return what is healthy now, and whether it is of the moves in service."""
@@ -137,12 +134,12 @@ class BaselineInForce:
                 f"{BASELINE_IN_ALARM.name} to true if the valve is healthy, and call again"
             )
 
-    async def _change(self, kept: KeptBaseline) -> str:
+    async def _change(self, kept: KeptBaseline, source: str = "") -> str:
         self._put_in_force(kept.in_force)
         await self._history.keep_baseline(kept)
         answer = (
             f"baseline: {kept.in_force or 'none'}; before: {kept.replaced or 'none'}"
-            f"{self._history.reservation}"
+            f"{self._history.reservation}{source}"
         )
         self._node.get_logger().info(answer)
         return answer

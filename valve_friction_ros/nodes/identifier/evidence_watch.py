@@ -28,7 +28,7 @@ from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
 from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
-from valve_friction_ros.streams import Arrivals, utc
+from valve_friction_ros.streams import Arrivals, utc_second
 
 __all__ = ["EvidenceWatch"]
 
@@ -36,10 +36,6 @@ _COMBINE_EVERY = 300_000_000_000
 """Nanoseconds of stamps from one combination to the next: thousands of moves take 0.05 s."""
 
 _SHOWN = ("sliding_friction", "static_friction", "spring_constant", "spring_preload")
-
-
-def _date(stamp: int) -> str:
-    return f"{utc(stamp):%Y-%m-%dT%H:%M:%SZ}"
 
 
 class EvidenceWatch:
@@ -71,7 +67,9 @@ class EvidenceWatch:
     @property
     def source(self) -> str:
         """What the evidence is of, in words."""
-        return f"by {self._evidence.moves} moves in service since {_date(self._evidence.since)}"
+        return (
+            f"by {self._evidence.moves} moves in service since {utc_second(self._evidence.since)}"
+        )
 
     @property
     def problems(self) -> list[str]:
@@ -135,7 +133,7 @@ class EvidenceWatch:
             return ()
         message, leads = diagnosis.message, self._leads(diagnosis)
         if not leads:
-            message += f" (until {_date(self._evidence.until)}, before that identification)"
+            message += f" (until {utc_second(self._evidence.until)}, before that identification)"
         ratio = math.nan if diagnosis.ratio is None else diagnosis.ratio.value
         return (
             Finding(
@@ -164,8 +162,8 @@ class EvidenceWatch:
         if self._ledger.left_out:
             values["evidence left_out"] = str(self._ledger.left_out)
         if found.moves:
-            values["evidence since [time]"] = _date(found.since)
-            values["evidence until [time]"] = _date(found.until)
+            values["evidence since [time]"] = utc_second(found.since)
+            values["evidence until [time]"] = utc_second(found.until)
         if not found.is_known:
             values["evidence reason"] = found.parameters["sliding_friction"].reason
         else:
@@ -175,13 +173,13 @@ class EvidenceWatch:
         if (reference := self._ledger.reference) is not None:
             values["evidence reference [N]"] = number_text(reference.sliding.value)
             values["evidence reference half width [N]"] = number_text(reference.sliding.half_width)
-            values["evidence reference [time]"] = _date(reference.time)
+            values["evidence reference [time]"] = utc_second(reference.time)
         if (change := self._ledger.change) is not None:
             values["evidence change_ratio"] = number_text(change.ratio)
             values["evidence change_ratio low"] = number_text(change.low)
             values["evidence change_ratio high"] = number_text(change.high)
-            values["evidence change earliest [time]"] = _date(change.earliest)
-            values["evidence change latest [time]"] = _date(change.latest)
+            values["evidence change earliest [time]"] = utc_second(change.earliest)
+            values["evidence change latest [time]"] = utc_second(change.latest)
         diagnosis = self._diagnosis()
         ratio = None if diagnosis is None else diagnosis.ratio
         return values | ratio_values(ratio, "evidence ")

@@ -29,7 +29,7 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscrip
 from valve_friction_ros.nodes.plumbing.qos import stream
 from valve_friction_ros.nodes.plumbing.raw_samples import positions_in, readable
 from valve_friction_ros.response import SIZES, Move, ResponseMonitor, ResponseSummary, found
-from valve_friction_ros.streams import Arrivals, Kind, Samples, utc
+from valve_friction_ros.streams import Arrivals, Kind, Samples, utc_second
 
 __all__ = ["ResponseWatch"]
 
@@ -250,7 +250,7 @@ def _move_values(summary: ResponseSummary, left_out: int) -> dict[str, str]:
     values = {"moves": str(len(summary.moves))}
     if summary.moves:
         for name, one in (("since", summary.moves[0]), ("until", summary.moves[-1])):
-            values[f"moves {name} [time]"] = f"{utc(one.stamp):%Y-%m-%dT%H:%M:%SZ}"
+            values[f"moves {name} [time]"] = utc_second(one.stamp)
     values |= {
         "moves ignored": str(len(summary.ignored)),
         "changes left out": str(left_out),

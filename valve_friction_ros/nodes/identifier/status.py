@@ -19,7 +19,7 @@ from valve_friction_ros.health import (
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
-from valve_friction_ros.streams import utc
+from valve_friction_ros.streams import utc, utc_day, utc_minute
 
 __all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
 
@@ -73,14 +73,6 @@ def _baseline_values(baseline: Baseline | None) -> dict[str, str]:
     return values
 
 
-def _date(time: int) -> str:
-    return f"{utc(time):%Y-%m-%d}"
-
-
-def _minute(time: int) -> str:
-    return f"{utc(time):%Y-%m-%d %H:%M} UTC"
-
-
 def _time(time: int) -> str:
     """Write a time, ns since 1970, by ISO 8601, as UTC."""
     return f"{utc(time):%Y-%m-%dT%H:%M:%S.%fZ}"
@@ -97,9 +89,9 @@ def trend_values(trend: Trend | None) -> dict[str, str]:
     }
     if trend.crossing is not None:
         values["limit_expected"] = trend.crossing.limit.value
-        values["limit_expected [date]"] = _date(trend.crossing.time)
-        values["limit_expected earliest [date]"] = _date(trend.crossing.earliest)
-        values["limit_expected latest [date]"] = _date(trend.crossing.latest)
+        values["limit_expected [date]"] = utc_day(trend.crossing.time)
+        values["limit_expected earliest [date]"] = utc_day(trend.crossing.earliest)
+        values["limit_expected latest [date]"] = utc_day(trend.crossing.latest)
     return values
 
 
@@ -153,7 +145,7 @@ def _sentences(
     leading = [one.message for one in findings if one.leads]
     told = diagnosis.message
     if leading and monitor.seen_until is not None:
-        told += f" (identified {_minute(monitor.seen_until)}, before the latest of these moves)"
+        told += f" (identified {utc_minute(monitor.seen_until)}, before the latest of these moves)"
     return [*leading, told, *(one.message for one in findings if not one.leads)]
 
 

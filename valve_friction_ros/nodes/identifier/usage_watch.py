@@ -19,7 +19,7 @@ from valve_friction_ros.nodes.identifier.service_parameters import (
     TRAVEL_LIMIT,
 )
 from valve_friction_ros.nodes.identifier.value_texts import number_text
-from valve_friction_ros.streams import Arrivals, Kind, utc
+from valve_friction_ros.streams import Arrivals, Kind, utc_day
 from valve_friction_ros.usage import (
     LimitState,
     Pace,
@@ -38,10 +38,6 @@ _WRITE_EVERY = 60.0
 """Time between two writings, s: of the stamps, or of silence. A killed node loses so much."""
 _MOST_DAYS = 62
 """Days of this run that are held one by one."""
-
-
-def _date(stamp: int) -> str:
-    return f"{utc(stamp):%Y-%m-%d}"
 
 
 class UsageWatch:
@@ -116,7 +112,7 @@ class UsageWatch:
         used, everything, travel = self._since_renewal, self._total, self._travel
         at_travel = self._node.get_parameter(AIR_TO.name).value == "close"
         values = {
-            "packing_renewed [date]": _date(self._renewal) if self._renewal else "not known",
+            "packing_renewed [date]": utc_day(self._renewal) if self._renewal else "not known",
             "travelled_distance [m]": number_text(used.distance),
             "travelled_distance in all [m]": number_text(everything.distance),
             "reversals": str(used.reversals),
@@ -140,7 +136,7 @@ class UsageWatch:
             values["reversals pace [1/day]"] = number_text(self._pace.reversals)
         for state in self.limits():
             if state.expected is not None:
-                values[f"{state.name}_expected [date]"] = _date(state.expected)
+                values[f"{state.name}_expected [date]"] = utc_day(state.expected)
         return values
 
     def usage(self) -> ValveUsage:
@@ -163,8 +159,8 @@ class UsageWatch:
 
         await self._history.keep_change(renew)
         answer = (
-            f"the packing counts from {_date(now)} on; the one before, "
-            f"{f'of {_date(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
+            f"the packing counts from {utc_day(now)} on; the one before, "
+            f"{f'of {utc_day(since)}' if since else 'of unknown age'}: {used.distance:.6g} m of "
             f"travel, {used.reversals} reversals, {used.breakaways} breakaways in "
             f"{used.time_watched / 3600e9:.3g} h of watching; its moves count no more as evidence"
             f"{self._history.reservation}"

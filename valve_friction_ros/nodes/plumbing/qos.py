@@ -3,22 +3,26 @@
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-__all__ = ["LATCHED", "REQUESTS", "blocks", "qos_overrides", "stream"]
+__all__ = ["LATCHED", "REQUESTS", "blocks", "qos_overrides", "stream", "watched"]
 
 
-def _reliable(depth: int, durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
+def _kept_last(
+    depth: int,
+    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
+    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
+) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE,
+        reliability=reliability,
         durability=durability,
     )
 
 
-LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = _kept_last(1, DurabilityPolicy.TRANSIENT_LOCAL)
 """Results: a late subscriber receives the last one."""
 
-REQUESTS = _reliable(100)
+REQUESTS = _kept_last(100)
 """Requests to a service, ten times as many as usual: they wait for the executor's next turn."""
 
 
@@ -28,12 +32,20 @@ def stream() -> QoSProfile:
     Deep enough for 20 s at 1 kHz while the receiver is busy. Every topic needs a profile of its
     own, because rclpy writes a topic's overrides into the profile that it is given.
     """
-    return _reliable(20_000)
+    return _kept_last(20_000)
 
 
 def blocks() -> QoSProfile:
     """Return the quality of service of a stream of blocks: deep enough for 100 s at 10 Hz."""
-    return _reliable(1_000)
+    return _kept_last(1_000)
+
+
+def watched() -> QoSProfile:
+    """Return the quality of service of a stream that somebody looks at.
+
+    It takes what is published either way, and holds no publisher up.
+    """
+    return _kept_last(5_000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def qos_overrides() -> QoSOverridingOptions:

@@ -1,0 +1,30 @@
+"""What a server on this machine needs: a free port, and a certificate."""
+
+import shutil
+import socket
+import subprocess
+
+import pytest
+
+
+def free_port():
+    """A port of this machine that nobody listens at."""
+    with socket.socket() as tried:
+        tried.bind(("127.0.0.1", 0))
+        return tried.getsockname()[1]
+
+
+def certificate_pair(folder):
+    """Make a certificate of `localhost` and its key, which its owner alone can read; the paths."""
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl, which makes the certificate, is not installed")
+    certificate, key = folder / "certificate.pem", folder / "key.pem"
+    words = (
+        "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 "
+        "-subj /CN=localhost -addext subjectAltName=DNS:localhost"
+    )
+    subprocess.run(
+        [*words.split(), "-keyout", key, "-out", certificate], check=True, capture_output=True
+    )
+    key.chmod(0o600)
+    return certificate, key
