@@ -24,6 +24,7 @@ _WRITERS = {
     "identifier/evidence_watch.py": ("values", "_numbers"),
     "identifier/usage_watch.py": ("values",),
     "identifier/response_watch.py": ("values", "_deviation_values", "_move_values"),
+    "identifier/standstill_watch.py": ("values",),
     "identifier/whole_valve.py": ("values",),
     "identifier/alarm_recorder.py": ("values",),
     "identifier/alerts.py": ("_mark",),

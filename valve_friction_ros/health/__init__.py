@@ -37,6 +37,11 @@ from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_se
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError
 from valve_friction_ros.health.standing_alarm import is_standing
+from valve_friction_ros.health.standstill import (
+    Standstill,
+    StandstillCounter,
+    standstill_finding,
+)
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_diagnosis import (
     ValveDiagnosis,
@@ -66,6 +71,8 @@ __all__ = [
     "Reference",
     "RefusedRecordError",
     "SlidingFriction",
+    "Standstill",
+    "StandstillCounter",
     "StatusSignal",
     "ValveDiagnosis",
     "ValveLimits",
@@ -89,6 +96,7 @@ __all__ = [
     "percentage",
     "qualified",
     "reference_by_evidence",
+    "standstill_finding",
     "valve_changes",
     "valve_numbers",
     "why_not_compared",

@@ -9,8 +9,6 @@ from valve_friction_ros.usage.usage import Usage, total
 
 __all__ = ["DAY", "Pace", "UsedDay", "ValveUsage"]
 
-"""Nanoseconds of a day."""
-
 _PACE_DAYS = 14
 """Last days with samples from which the pace is taken. Chosen: two weeks of work and rest."""
 _KEPT_DAYS = 31

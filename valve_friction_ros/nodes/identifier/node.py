@@ -40,6 +40,7 @@ from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
+from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     estimate_status,
     friction_status,
@@ -133,6 +134,7 @@ class Identifier(PolledNode):
         )
         self._watches: tuple[Watch, ...] = (
             WholeValve(self._monitor),
+            StandstillWatch(self._monitor),
             self._evidence,
             self._usage,
             self._response,

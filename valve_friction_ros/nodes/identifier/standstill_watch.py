@@ -1,0 +1,68 @@
+"""A stem that stands still while its pressure changes, watched in service."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from valve_friction_ros.health import (
+    Finding,
+    FrictionMonitor,
+    Standstill,
+    StandstillCounter,
+    standstill_finding,
+)
+from valve_friction_ros.nodes.identifier.value_texts import number_text
+from valve_friction_ros.streams import Arrivals, Kind, Samples, utc_second
+
+__all__ = ["StandstillWatch"]
+
+
+class StandstillWatch:
+    """Finds a seized stem without a ``stem_command``; satisfies `Watch`."""
+
+    def __init__(self, monitor: FrictionMonitor) -> None:
+        self._monitor = monitor
+        self._travel = math.nan
+        self._counter: StandstillCounter | None = None
+
+    def take(self, arrivals: Arrivals) -> None:
+        """Follow pressure and stem, where the travel is known."""
+        valve = self._monitor.settings.valve
+        if valve.travel != self._travel:
+            self._travel = valve.travel
+            self._counter = StandstillCounter(valve.travel) if math.isfinite(valve.travel) else None
+        if self._counter is None:
+            return
+        pressure, position = arrivals.samples(Kind.PRESSURE), arrivals.samples(Kind.POSITION)
+        in_range = np.isfinite(pressure.values) & valve.sensor_reads(pressure.values)
+        known = np.isfinite(position.values)
+        self._counter.add(
+            Samples(pressure.stamps[in_range], pressure.values[in_range]),
+            Samples(position.stamps[known], position.values[known]),
+        )
+
+    def findings(self) -> Sequence[Finding]:
+        """Return that the stem is held, if it is."""
+        still, baseline = self._standstill(), self._monitor.baseline
+        if still is None or baseline is None:
+            return []
+        settings = self._monitor.settings
+        factor = settings.limits.error_ratio
+        found = standstill_finding(still, settings.valve, baseline, factor)
+        return [] if found is None else [found]
+
+    def values(self) -> Mapping[str, str]:
+        """Return since when the stem rests, and the static friction that this needs."""
+        still = self._standstill()
+        if still is None:
+            return {}
+        return {
+            "standstill since [time]": utc_second(still.since),
+            "standstill static_friction at least [N]": number_text(
+                still.least_friction(self._monitor.settings.valve)
+            ),
+        }
+
+    def _standstill(self) -> Standstill | None:
+        return None if self._counter is None else self._counter.standstill
