@@ -120,6 +120,10 @@ bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep
 churn: venv  ## nodes under clients that come and go for an hour; CHURN_ARGS="--minutes 5" for less
 	@"$(VENV)/bin/python" -m benchmark.churn $(CHURN_ARGS)
 
+.PHONY: soak
+soak: venv  ## a month of a plant in an hour, each sample accounted for; SOAK_ARGS="--minutes 5" for less
+	@"$(VENV)/bin/python" -m benchmark.soak $(SOAK_ARGS)
+
 .PHONY: mutants
 mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some
 	@"$(VENV)/bin/python" -m pip install -q --no-deps --disable-pip-version-check -r requirements/mutants.txt

@@ -2,24 +2,23 @@
 
 import argparse
 import contextlib
-import os
 import random
 import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 
 from benchmark.churn.crowd import Crowd
+from benchmark.churn.domain import quiet_domain
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import nodes, process_of
 from benchmark.churn.processes import FROZEN, NodeProcess, Usage
 from benchmark.churn.summary import hung_services, rows
 from benchmark.speed.table import machine_shape, rows_table
-from valve_friction_ros.commands.demo.bench_processes import free_domain
 
 __all__ = ["main"]
 
@@ -48,18 +47,6 @@ def _shared_memory() -> tuple[int, float]:
         with contextlib.suppress(FileNotFoundError):
             sizes.append(file.stat().st_blocks * 512)
     return len(sizes), sum(sizes) / 1e6
-
-
-@contextlib.contextmanager
-def _environment() -> Iterator[int]:
-    """Provide a domain of this machine that nobody else uses."""
-    with free_domain() as domain:
-        os.environ |= {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "RCUTILS_COLORIZED_OUTPUT": "0",
-        }
-        yield domain
 
 
 def _run(folder: Path, seconds: float, crowd: Crowd, ledger: Ledger) -> None:
@@ -135,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
     console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
-    with _environment() as domain:
+    with quiet_domain() as domain:
         console.print(f"seed {seed}, domain {domain}, ledger and logs in {folder}", soft_wrap=True)
         ledger = Ledger(folder / "ledger.jsonl")
         _run(folder, 60 * options.minutes, Crowd(ledger, seed, options.at_once), ledger)

@@ -71,6 +71,15 @@ class NodeProcess:
         """Return the exit code; None while it runs."""
         return self._process.poll()
 
+    def send(self, request: signal.Signals) -> None:
+        """Send a signal, and wait for nothing."""
+        self._process.send_signal(request)
+
+    def kill(self) -> None:
+        """Kill it, and see it gone."""
+        self._process.kill()
+        self._process.wait()
+
     def end(self, request: signal.Signals) -> float | None:
         """Send a signal; return the time to the end of the process, s.
 

@@ -7,7 +7,7 @@ import pytest
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
-from valve_friction_ros.streams import RecordBuffer
+from valve_friction_ros.streams import RecordBuffer, rows_arrived
 
 MILLISECOND = 1_000_000
 START = 1_700_000_000_000_000_000
@@ -195,3 +195,17 @@ def test_rejections_are_bounded():
         stamp(step) for step in range(500, 10_500)
     ]
     assert "actuator_pressure is not finite (10000 samples)" in refused(buffer)
+
+
+def test_each_sample_is_counted_as_taken_or_by_the_cause_of_its_rejection(buffer):
+    fill(buffer, 2500)
+    for late in (1.0, 2.0):
+        buffer.add_pressure(stamp(2500) + round(late), 1e9)
+    buffer.add_arrivals(rows_arrived([[0.0, 1e5, 1e-3], [1.0, math.nan, 1e-3], [1.0, 1e5, 1e-3]]))
+    assert buffer.taken == 5000 + 3
+    assert buffer.rejected == {
+        RANGE: 2,
+        "actuator_pressure went back in time": 1,
+        "actuator_pressure is not finite": 1,
+        "stem_state repeats a stamp": 1,
+    }

@@ -2,6 +2,8 @@
 
 import math
 from collections import Counter, deque
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -90,6 +92,8 @@ class RecordBuffer:
         self._rejections: deque[Rejection] = deque(maxlen=_REJECTIONS_KEPT)
         self._first_stamp: int | None = None
         self._cleared_because: str | None = None
+        self._taken = 0
+        self._rejected: Counter[str] = Counter()
 
     def __len__(self) -> int:
         """Count the samples of both signals."""
@@ -99,6 +103,16 @@ class RecordBuffer:
     def counts(self) -> tuple[int, int]:
         """Numbers of pressures and of positions."""
         return len(self._pressure), len(self._position)
+
+    @property
+    def taken(self) -> int:
+        """Samples of both signals that were taken in all, also those that have left the window."""
+        return self._taken
+
+    @property
+    def rejected(self) -> Mapping[str, int]:
+        """Samples that were rejected in all, by their cause."""
+        return MappingProxyType(self._rejected)
 
     @property
     def nbytes(self) -> int:
@@ -145,6 +159,7 @@ class RecordBuffer:
             return self._add_one_by_one(arrivals)
         self._pressure.extend(pressure)
         self._position.extend(position)
+        self._taken += arrivals.stamps.size
         if self._first_stamp is None and arrivals.stamps.size:
             self._first_stamp = int(arrivals.stamps[0])
         return Complaints()
@@ -170,6 +185,7 @@ class RecordBuffer:
         if last is not None and stamp < last:
             cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
             self.clear(cause)
+            self._rejected[f"{name} went back in time"] += 1
             return cause + _CLEARED
         if last is not None and stamp == last:
             cause = f"{name} repeats a stamp"
@@ -178,11 +194,13 @@ class RecordBuffer:
         if cause is not None:
             return self._reject(stamp, cause)
         buffer.append(stamp, value)
+        self._taken += 1
         self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
         return None
 
     def _reject(self, stamp: int, cause: str) -> str:
         self._rejections.append(Rejection(stamp, cause))
+        self._rejected[cause] += 1
         return cause
 
     def clear(self, cause: str) -> None:

@@ -176,6 +176,12 @@ def friction_status(
     values["buffered_samples"] = str(pressures + positions)
     values["buffered_pressures"] = str(pressures)
     values["buffered_positions"] = str(positions)
+    values["samples_taken"] = str(monitor.buffer.taken)
+    rejected = monitor.buffer.rejected
+    values["samples_rejected"] = str(sum(rejected.values()))
+    if rejected:
+        causes = (f"{cause} ({count})" for cause, count in sorted(rejected.items()))
+        values["samples_rejected causes"] = "; ".join(causes)
     message = estimate.message
     if monitor.earlier is not None:
         known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message

@@ -1,0 +1,213 @@
+"""A month of a plant in an hour: python -m benchmark.soak, or `make soak`."""
+
+import argparse
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmark.churn.domain import quiet_domain
+from benchmark.churn.ledger import Ledger
+from benchmark.churn.places import Node
+from benchmark.soak.disk import small_disk
+from benchmark.soak.faults import FAULTS, Site, settled
+from benchmark.soak.feed import Feed, Piece
+from benchmark.soak.plant import Plant, Process
+from benchmark.soak.summary import rows
+from benchmark.speed.table import machine_shape, rows_table
+from valve_friction_ros.history import HistoryFile
+
+__all__ = ["main"]
+
+_MONTH = 30 * 86_400 * 10**9
+_BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
+_GROWTH = {"/fv_101": 1.0, "/fv_102": 1.6, "/fv_201": 1.0, "/fv_202": 2.5}
+_WIDTH_OF_A_FILE = 120
+_TURN = 0.02
+_PAUSE = 3.0
+"""Mean time between two records of a valve, s."""
+_CALM = 6.0
+"""Mean time between two faults, s."""
+_ASKED, _OTHERS = 0.6, ("set_baseline", "save", "report")
+_OTHER = 0.03
+_START_LIMIT = 120.0
+_SETTLED = 0.1
+"""Share of the month after which the memory is looked at first."""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="soak", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0, help="how long (%(default)g)")
+    parser.add_argument("--seed", type=int, help="of all chance; default: drawn, and printed")
+    parser.add_argument("--folder", type=Path, help="of ledger and logs; default: a new one")
+    return parser
+
+
+def _processes(folder: Path, disk: Path) -> tuple[Process, ...]:
+    """Start two identifiers of one valve each, and a process of two that lives through all."""
+    common = ["--params-file", str(_BENCH)]
+    for name, value in {
+        "history_file": disk / "history.sqlite",
+        "save_folder": folder / "saved",
+        "report_folder": folder / "reports",
+        "window": 10.0,
+        "input_timeout": 8.0,
+        "alarm_recordings": 3,
+    }.items():
+        common += ["-p", f"{name}:={value}"]
+    *single, first, second = _GROWTH
+    found = [
+        Process(
+            valve.strip("/"),
+            Node("identifier", ["-r", f"__ns:={valve}", *common]),
+            (valve,),
+            folder / f"{valve.strip('/')}.log",
+        )
+        for valve in single
+    ]
+    many = Node("identifiers", [*common, "-p", f"valves:=[{first},{second}]"])
+    return (*found, Process("identifiers", many, (first, second), folder / "identifiers.log"))
+
+
+class _Month:
+    """The month under way."""
+
+    def __init__(self, site: Site, seconds: float) -> None:
+        self._site, self._seconds = site, seconds
+        self._begin, self._month_begin = time.monotonic(), time.time_ns() - _MONTH
+        self._under_way: dict[str, Iterator[Piece]] = {}
+        self._next = dict.fromkeys(site.plant.valves, 0.0)
+        self._faults: list[Iterator[None]] = []
+        self._next_fault = time.monotonic() + _CALM
+
+    @property
+    def share(self) -> float:
+        """Share of the month that is over."""
+        return (time.monotonic() - self._begin) / self._seconds
+
+    def turn(self) -> None:
+        """Send a piece to each valve that works, and let faults go on."""
+        for valve in self._site.plant.valves:
+            self._feed(valve)
+        self._faults = [one for one in self._faults if next(one, self) is None]
+        if time.monotonic() > self._next_fault:
+            self._next_fault = time.monotonic() + self._site.chance.expovariate(1 / _CALM)
+            names, weights = list(FAULTS), [weight for _, weight in FAULTS.values()]
+            (name,) = self._site.chance.choices(names, weights)
+            self._site.plant.ledger.add("fault", name=name, share=self.share)
+            self._faults.append(FAULTS[name][0](self._site))
+        self._site.plant.turn(_TURN)
+        self._look()
+
+    def _feed(self, valve: str) -> None:
+        site, plant = self._site, self._site.plant
+        if not plant.is_ready(valve):
+            self._under_way.pop(valve, None)
+            return
+        if valve not in self._under_way:
+            if time.monotonic() < self._next[valve] or valve in site.silent:
+                return
+            self._next[valve] = time.monotonic() + site.chance.expovariate(1 / _PAUSE)
+            now = self._month_begin + round(self.share * _MONTH / 1e6) * 10**6
+            self._under_way[valve] = site.feeds[valve].record(self.share, now)
+        piece = next(self._under_way[valve], None)
+        if piece is not None:
+            plant.send(valve, piece)
+            return
+        del self._under_way[valve]
+        if site.chance.random() < _ASKED:
+            plant.ask(valve, "identify")
+        if site.chance.random() < _OTHER:
+            plant.ask(valve, site.chance.choice(_OTHERS))
+
+    def _look(self) -> None:
+        for process in self._site.plant.processes:
+            code = process.life.process.exit_code()
+            if code is not None and not process.is_held:
+                plant = self._site.plant
+                plant.ledger.add("died", name=process.name, code=code)
+                plant.give_up_calls(process, "died")
+                plant.note_life(process, "died")
+                process.begin_again()
+
+    def finish(self) -> None:
+        """Let each fault end, and let everything that was sent be accounted for."""
+        plant = self._site.plant
+        deadline = time.monotonic() + _START_LIMIT
+        while self._faults and time.monotonic() < deadline:
+            self._faults = [one for one in self._faults if next(one, self) is None]
+            plant.turn(_TURN)
+        for process in plant.processes:
+            for _ in settled(process):
+                plant.turn(_TURN)
+
+
+def _stored(path: Path, valves: Sequence[str]) -> Mapping[str, int]:
+    """Count the identifications in the history."""
+    file = HistoryFile(path)
+    return {valve: len(file.entries([f"{valve}/identifier"], 0, 2**63 - 1)) for valve in valves}
+
+
+def _run(folder: Path, seconds: float, chance: random.Random, ledger: Ledger) -> Mapping[str, int]:
+    """Run the plant for some seconds; return what is in its history then."""
+    disk = folder / "disk"
+    with small_disk(disk) as is_small:
+        if not is_small:
+            ledger.add("left out", what="full disk: no rights to mount one")
+        plant = Plant(ledger, _processes(folder, disk))
+        try:
+            feeds = {valve: Feed(growth) for valve, growth in _GROWTH.items()}
+            site = Site(plant, feeds, disk if is_small else None, chance)
+            if not plant.wait(lambda: all(map(plant.is_ready, plant.valves)), _START_LIMIT):
+                raise RuntimeError(f"the plant is not ready: see the logs in {folder}")
+            _live(_Month(site, seconds), plant)
+            return _stored(disk / "history.sqlite", plant.valves)
+        finally:
+            for process in plant.processes:
+                if process.life.process.exit_code() is None:
+                    process.life.process.kill()
+            plant.close()
+
+
+def _live(month: _Month, plant: Plant) -> None:
+    """Let the month go by; then end all processes, and note what they held."""
+    lasting = plant.processes[-1]
+    first = None
+    while month.share < 1.0:
+        month.turn()
+        if first is None and month.share > _SETTLED:
+            first = plant.usage(lasting).memory
+    month.finish()
+    memory = plant.usage(lasting).memory
+    plant.ledger.add("memory", name=lasting.name, begin=first, end=memory)
+    for process in plant.processes:
+        plant.end_life(process, signal.SIGINT)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the soak; return 1 if a goal is missed."""
+    options = _parser().parse_args(arguments)
+    seed = random.SystemRandom().randrange(2**31) if options.seed is None else options.seed
+    folder = options.folder or Path(tempfile.mkdtemp(prefix="soak_"))
+    folder.mkdir(parents=True, exist_ok=True)
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
+    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
+    with quiet_domain() as domain:
+        console.print(f"seed {seed}, domain {domain}, ledger and logs in {folder}", soft_wrap=True)
+        ledger = Ledger(folder / "ledger.jsonl")
+        stored = _run(folder, 60 * options.minutes, random.Random(seed), ledger)
+    found = list(rows(list(ledger.events()), stored))
+    console.print(rows_table(f"a month in {options.minutes:g} minutes", found))
+    missed = [row for row in found if row.met is False]
+    for row in missed:
+        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

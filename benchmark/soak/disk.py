@@ -1,0 +1,40 @@
+"""A small disk of its own, so that it can be full."""
+
+import contextlib
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+__all__ = ["filled", "small_disk"]
+
+_SIZE = "64m"
+_FILLER = "filler"
+_CHUNK = 2**16
+
+
+@contextlib.contextmanager
+def small_disk(folder: Path) -> Iterator[bool]:
+    """Mount a file system of 64 MB in memory on a folder; tell whether that was allowed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    command = ["mount", "-t", "tmpfs", "-o", f"size={_SIZE}", "tmpfs", str(folder)]
+    is_mounted = False
+    with contextlib.suppress(FileNotFoundError):
+        is_mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
+    try:
+        yield is_mounted
+    finally:
+        if is_mounted:
+            subprocess.run(["umount", "-l", str(folder)], check=False)
+
+
+@contextlib.contextmanager
+def filled(folder: Path) -> Iterator[None]:
+    """Leave no room on the disk of a folder."""
+    filler = folder / _FILLER
+    with contextlib.suppress(OSError), filler.open("wb", buffering=0) as stream:
+        while True:
+            stream.write(bytes(_CHUNK))
+    try:
+        yield
+    finally:
+        filler.unlink()

@@ -1,0 +1,161 @@
+"""What happens to a plant: each fault goes on by a step whenever it is asked to."""
+
+import random
+import signal
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from benchmark.soak.disk import filled
+from benchmark.soak.feed import Feed
+from benchmark.soak.plant import Plant, Process
+
+__all__ = ["FAULTS", "Site", "bad_samples", "settled"]
+
+_PATIENCE = 60.0
+"""Time, s, in which what was sent must be accounted for."""
+_HOUR = 3600 * 10**9
+
+
+class Site:
+    """What faults act on.
+
+    Parameters
+    ----------
+    plant : Plant
+        The processes.
+    feeds : mapping of str to Feed
+        Feed of each valve.
+    disk : Path or None
+        Folder of the history, if its disk is small.
+    chance : Random
+        Of all that is drawn.
+    """
+
+    def __init__(
+        self, plant: Plant, feeds: Mapping[str, Feed], disk: Path | None, chance: random.Random
+    ) -> None:
+        self.plant, self.feeds, self.disk, self.chance = plant, feeds, disk, chance
+        self.silent: set[str] = set()
+        """Valves whose sensors say nothing."""
+
+    def mortal(self) -> Process:
+        """Choose a process that may be ended: the last one lives through the month."""
+        return self.chance.choice(self.plant.processes[:-1])
+
+
+def _for(seconds: float) -> Iterator[None]:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        yield
+
+
+def _until(met: Callable[[], bool], seconds: float = _PATIENCE) -> Iterator[None]:
+    end = time.monotonic() + seconds
+    while not met() and time.monotonic() < end:
+        yield
+
+
+def settled(process: Process) -> Iterator[None]:
+    """Send nothing, until all that was sent is accounted for and all calls are answered."""
+    process.is_held = True
+    yield from _until(lambda: process.life.is_settled and not process.life.calls)
+
+
+def restart(site: Site) -> Iterator[None]:
+    """End a process as launch and systemd do, and start it again."""
+    process = site.mortal()
+    if process.is_held:
+        return
+    yield from settled(process)
+    site.plant.end_life(process, site.chance.choice((signal.SIGINT, signal.SIGTERM)))
+    process.begin_again()
+    process.is_held = False
+
+
+def kill(site: Site) -> Iterator[None]:
+    """Kill a process at a random instant, in the midst of samples and calls."""
+    yield from _for(site.chance.uniform(0.0, 2.0))
+    process = site.mortal()
+    if process.is_held:
+        return
+    site.plant.end_life(process, signal.SIGKILL)
+    process.is_held = True
+    yield from _for(site.chance.uniform(0.0, 5.0))
+    process.begin_again()
+    process.is_held = False
+
+
+def clock_step(site: Site) -> Iterator[None]:
+    """Let the clock of a valve's sensors be wrong by up to two hours, and be set right again."""
+    feed = site.feeds[site.chance.choice(site.plant.valves)]
+    feed.clock_error = round(site.chance.uniform(-2.0, 2.0) * _HOUR)
+    yield from _for(site.chance.uniform(5.0, 20.0))
+    feed.clock_error = 0
+
+
+def silent_sensor(site: Site) -> Iterator[None]:
+    """Let the sensors of a valve be silent until the node says so."""
+    valve = site.chance.choice(site.plant.valves)
+    process = site.plant.process_of(valve)
+    if valve in site.silent or process.is_held:
+        return
+    site.silent.add(valve)
+    life, begin = process.life, time.monotonic()
+    yield from _until(lambda: "no data on" in life.messages.get(valve, ""))
+    if process.life is life:
+        told = "no data on" in life.messages.get(valve, "")
+        site.plant.ledger.add("silence", seconds=time.monotonic() - begin, told=told)
+    site.silent.discard(valve)
+
+
+def bad_samples(site: Site) -> Iterator[None]:
+    """Let a pressure sensor say what is no number."""
+    site.feeds[site.chance.choice(site.plant.valves)].bad_rows = site.chance.randint(1, 40)
+    yield
+
+
+def frozen(site: Site) -> Iterator[None]:
+    """Stop a process for some seconds, as a machine that swaps does."""
+    process = site.plant.processes[-1]
+    if process.is_held:
+        return
+    process.is_held = True
+    process.life.process.send(signal.SIGSTOP)
+    yield from _for(site.chance.uniform(1.0, 6.0))
+    process.life.process.send(signal.SIGCONT)
+    process.is_held = False
+
+
+def full_disk(site: Site) -> Iterator[None]:
+    """Fill the disk of the history until a node says so; then there is room again."""
+    if site.disk is None:
+        return
+    told: set[str] = set()
+
+    def is_told() -> bool:
+        for process in site.plant.processes:
+            told.update(
+                valve
+                for valve, message in process.life.messages.items()
+                if "the history is not written" in message
+            )
+        return bool(told)
+
+    begin = time.monotonic()
+    with filled(site.disk):
+        yield from _until(is_told)
+        yield from _for(site.chance.uniform(0.0, 10.0))
+    site.plant.ledger.add("full disk", seconds=time.monotonic() - begin, told=bool(told))
+
+
+FAULTS: Mapping[str, tuple[Callable[[Site], Iterator[None]], float]] = {
+    "restart": (restart, 3.0),
+    "kill": (kill, 3.0),
+    "clock step": (clock_step, 2.0),
+    "silent sensor": (silent_sensor, 2.0),
+    "bad samples": (bad_samples, 3.0),
+    "frozen": (frozen, 1.0),
+    "full disk": (full_disk, 1.0),
+}
+"""Faults by their names, each with its weight when the next one is drawn."""

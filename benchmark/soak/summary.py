@@ -1,0 +1,112 @@
+"""The ledger as rows with their goals."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from benchmark.speed.rows import Row
+
+__all__ = ["rows"]
+
+_Events = Sequence[Mapping[str, Any]]
+_KILLED = "SIGKILL"
+_BUSY = "already running"
+"""Words of a refusal that looks at no record, so that nothing is stored."""
+_GROWTH = 1.1
+"""Memory at the end over that after the first tenth, of the process that lives through all."""
+
+
+def _none(item: str, value: int) -> Row:
+    return Row(item, value, "", goal="none", met=value == 0)
+
+
+def _samples(lives: _Events) -> Iterator[Row]:
+    sent, taken, rejected = (
+        sum(one[name] for one in lives) for name in ("sent", "taken", "rejected")
+    )
+    yield Row("samples sent", sent, "", goal="some", met=sent > 0)
+    yield Row("samples taken", taken, "")
+    yield Row("samples rejected with a cause", rejected, "")
+    open_ = [(one["end"], one["sent"] - one["taken"] - one["rejected"]) for one in lives]
+    killed = sum(count for end, count in open_ if end == _KILLED)
+    yield Row("sent in the last second before a kill, or never told", killed, "")
+    yield _none("samples unexplained", sum(abs(count) for end, count in open_ if end != _KILLED))
+
+
+def _identifications(calls: _Events, lives: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
+    everything = [one for one in calls if one["service"] == "identify"]
+    asked = [one for one in everything if _BUSY not in (one.get("message") or "")]
+    answered = [one for one in asked if one["seconds"] is not None]
+    cut = [one for one in asked if one.get("ended")]
+    yield Row("identifications asked", len(everything), "", goal="some", met=bool(asked))
+    yield Row("refused, as another one ran", len(everything) - len(asked), "")
+    yield Row("answered with a result", sum(bool(one["success"]) for one in answered), "")
+    yield Row("answered with a refusal", sum(not one["success"] for one in answered), "")
+    yield Row("under way when the process ended", len(cut), "")
+    yield _none("never answered", len(asked) - len(answered) - len(cut))
+    kept = sum(stored.values())
+    yield Row("stored in the history", kept, "")
+    ended = sum(one["unsaved"] for one in lives if one["end"] == _KILLED)
+    yield Row("waiting for a full disk at a kill", ended, "")
+    waiting = Counter(
+        {valve: sum(one["unsaved"] for one in lives if one["valve"] == valve) for valve in stored}
+    )
+    lost = extra = 0
+    for valve, count in stored.items():
+        mine = sum(one["valve"] == valve for one in answered)
+        unanswered = sum(one["valve"] == valve for one in asked) - mine
+        lost += max(mine - waiting[valve] - count, 0)
+        extra += max(count - mine - unanswered, 0)
+    yield _none("answered, and not in the history", lost)
+    yield _none("in the history, and never asked", extra)
+    if answered:
+        yield Row("longest answer", max(one["seconds"] for one in answered), "s")
+
+
+def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
+    """Account for all that happened.
+
+    Parameters
+    ----------
+    events : sequence of mapping
+        The ledger.
+    stored : mapping of str to int
+        Identifications in the history at the end, by valve.
+
+    Yields
+    ------
+    Row
+        An item of the account.
+    """
+
+    def of(kind: str) -> _Events:
+        return [one for one in events if one["kind"] == kind]
+
+    faults = Counter(one["name"] for one in of("fault"))
+    for name, count in sorted(faults.items()):
+        yield Row(f"fault: {name}", count, "")
+    lives = of("life")
+    yield from _samples(lives)
+    yield from _identifications(of("call"), lives, stored)
+    others = [one for one in of("call") if one["service"] != "identify"]
+    yield Row("other calls", len(others), "")
+    never = sum(one["seconds"] is None and not one.get("ended") for one in others)
+    yield _none("other calls never answered", never)
+    yield _none("silent sensors that nobody told", sum(not one["told"] for one in of("silence")))
+    yield _none("full disks that nobody told", sum(not one["told"] for one in of("full disk")))
+    for end in of("ending"):
+        if end["code"] != 0:
+            yield Row(f"{end['name']} ended with code", end["code"] or -1, "", goal="0", met=False)
+    yield _none("processes that ended by themselves", len(of("died")))
+    for one in of("memory"):
+        grown, first = one["end"], one["begin"]
+        goal = f"under {_GROWTH:g} times"
+        yield Row(
+            f"{one['name']}: memory",
+            grown,
+            "MB",
+            first,
+            "at the begin",
+            goal,
+            grown < _GROWTH * first,
+        )

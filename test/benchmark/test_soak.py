@@ -1,0 +1,81 @@
+"""What the soak sends, and how it accounts for it."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from benchmark.soak.feed import PIECE, Feed
+from benchmark.soak.summary import rows
+
+NOW = 1_700_000_000_000_000_000
+
+
+def life(end="SIGINT", sent=100, taken=98, rejected=2, unsaved=0):
+    known = {"sent": sent, "taken": taken, "rejected": rejected, "unsaved": unsaved}
+    return {"kind": "life", "valve": "/fv_1", "end": end, **known}
+
+
+def call(seconds=0.1, success=True, message="", service="identify", **more):
+    known = {"seconds": seconds, "success": success, "message": message}
+    return {"kind": "call", "valve": "/fv_1", "service": service, **known, **more}
+
+
+def missed(events, stored=1):
+    return {one.item for one in rows(events, {"/fv_1": stored}) if one.met is False}
+
+
+GOOD = [life(), call()]
+
+
+def test_what_adds_up_misses_nothing():
+    killed = life("SIGKILL", 50, 20, 0, unsaved=1)
+    refused = call(success=False, message="the record is too short")
+    busy = call(success=False, message="an identification is already running: wait for it")
+    cut = call(None, None, ended="SIGKILL")
+    kept_late = call()  # it waited for a full disk as its process was killed
+    assert missed([*GOOD, killed, refused, busy, cut, kept_late], stored=2) == set()
+    assert missed([*GOOD, cut], stored=2) == set()  # stored, and killed before the answer
+
+
+@pytest.mark.parametrize(
+    ("events", "stored", "item"),
+    [
+        ([life(taken=97), call()], 1, "samples unexplained"),
+        ([life(taken=99), call()], 1, "samples unexplained"),
+        ([life(), call(), call()], 1, "answered, and not in the history"),
+        (GOOD, 2, "in the history, and never asked"),
+        ([*GOOD, call(None, None)], 1, "never answered"),
+        ([*GOOD, call(None, None, service="save")], 1, "other calls never answered"),
+        ([*GOOD, {"kind": "silence", "told": False}], 1, "silent sensors that nobody told"),
+        ([*GOOD, {"kind": "full disk", "told": False}], 1, "full disks that nobody told"),
+        ([*GOOD, {"kind": "died"}], 1, "processes that ended by themselves"),
+        ([*GOOD, {"kind": "ending", "name": "a", "code": None}], 1, "a ended with code"),
+        ([*GOOD, {"kind": "memory", "name": "a", "begin": 100, "end": 111}], 1, "a: memory"),
+        ([call()], 1, "samples sent"),
+        ([life()], 0, "identifications asked"),
+    ],
+)
+def test_each_failure_misses_its_goal(events, stored, item):
+    assert missed(events, stored) == {item}
+
+
+def test_a_record_is_whole_and_shows_the_faults_of_its_sensors():
+    feed = Feed(2.0)
+    feed.clock_error, feed.bad_rows = -(10**9), 3
+    pieces = list(feed.record(0.5, NOW))
+    stamps, pressure, _ = (np.concatenate(part) for part in zip(*pieces, strict=True))
+    assert {len(one.stamps) for one in pieces} == {PIECE}
+    assert stamps[0] == NOW - 10**9
+    assert set(np.diff(stamps)) == {10**7}
+    assert np.flatnonzero(np.isnan(pressure)).tolist() == [0, 1, 2]
+    again = itertools.chain.from_iterable(one.pressure for one in feed.record(0.5, NOW))
+    assert np.isfinite(list(again)).all()
+
+
+def test_the_friction_grows_over_the_month():
+    swings = [
+        np.ptp(np.concatenate([one.position for one in Feed(3.0).record(share, NOW)]))
+        for share in (0.0, 1.0)
+    ]
+    assert swings[1] < swings[0]
