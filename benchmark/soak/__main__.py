@@ -1,6 +1,7 @@
 """A month of a plant in an hour: python -m benchmark.soak, or `make soak`."""
 
 import argparse
+import math
 import random
 import signal
 import sys
@@ -36,8 +37,8 @@ _CALM = 6.0
 _ASKED, _OTHERS = 0.6, ("set_baseline", "save", "report")
 _OTHER = 0.03
 _START_LIMIT = 120.0
-_SETTLED = 0.1
-"""Share of the month after which the memory is looked at first."""
+_LOOKS = (0.1, 0.25, 0.5, 0.75)
+"""Shares of the month at which the memory is looked at, besides its end."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -177,14 +178,17 @@ def _run(folder: Path, seconds: float, chance: random.Random, ledger: Ledger) ->
 def _live(month: _Month, plant: Plant) -> None:
     """Let the month go by; then end all processes, and note what they held."""
     lasting = plant.processes[-1]
-    first = None
+    looks = iter(_LOOKS)
+    look = next(looks)
     while month.share < 1.0:
         month.turn()
-        if first is None and month.share > _SETTLED:
-            first = plant.usage(lasting).memory
+        if month.share > look:
+            memory = plant.usage(lasting).memory
+            plant.ledger.add("memory", name=lasting.name, share=look, megabytes=memory)
+            look = next(looks, math.inf)
     month.finish()
     memory = plant.usage(lasting).memory
-    plant.ledger.add("memory", name=lasting.name, begin=first, end=memory)
+    plant.ledger.add("memory", name=lasting.name, share=1.0, megabytes=memory)
     for process in plant.processes:
         plant.end_life(process, signal.SIGINT)
 

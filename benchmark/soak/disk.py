@@ -2,13 +2,13 @@
 
 import contextlib
 import subprocess
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
 __all__ = ["filled", "small_disk"]
 
 _SIZE = "64m"
-_FILLER = "filler"
 _CHUNK = 2**16
 
 
@@ -30,7 +30,7 @@ def small_disk(folder: Path) -> Iterator[bool]:
 @contextlib.contextmanager
 def filled(folder: Path) -> Iterator[None]:
     """Leave no room on the disk of a folder."""
-    filler = folder / _FILLER
+    filler = folder / f"filler_{uuid.uuid4().hex}"  # two faults may fill it at once
     with contextlib.suppress(OSError), filler.open("wb", buffering=0) as stream:
         while True:
             stream.write(bytes(_CHUNK))

@@ -12,8 +12,8 @@ _Events = Sequence[Mapping[str, Any]]
 _KILLED = "SIGKILL"
 _BUSY = "already running"
 """Words of a refusal that looks at no record, so that nothing is stored."""
-_GROWTH = 1.1
-"""Memory at the end over that after the first tenth, of the process that lives through all."""
+_MIDDLE, _GROWTH = 0.5, 1.05
+"""Memory at the end over that in the middle, of the process that lives through the month."""
 
 
 def _none(item: str, value: int) -> Row:
@@ -63,6 +63,18 @@ def _identifications(calls: _Events, lives: _Events, stored: Mapping[str, int]) 
         yield Row("longest answer", max(one["seconds"] for one in answered), "s")
 
 
+def _memory(looks: _Events) -> Iterator[Row]:
+    """Compare the end with the middle, when each part of the package has been used once."""
+    by_share = {one["share"]: one["megabytes"] for one in looks}
+    for share, size in by_share.items():
+        item = f"memory after {100 * share:.0f} % of the month"
+        if share == 1.0 and _MIDDLE in by_share:
+            goal, middle = f"under {_GROWTH:g} times", by_share[_MIDDLE]
+            yield Row(item, size, "MB", middle, "in the middle", goal, size < _GROWTH * middle)
+        else:
+            yield Row(item, size, "MB")
+
+
 def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
     """Account for all that happened.
 
@@ -98,15 +110,4 @@ def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
         if end["code"] != 0:
             yield Row(f"{end['name']} ended with code", end["code"] or -1, "", goal="0", met=False)
     yield _none("processes that ended by themselves", len(of("died")))
-    for one in of("memory"):
-        grown, first = one["end"], one["begin"]
-        goal = f"under {_GROWTH:g} times"
-        yield Row(
-            f"{one['name']}: memory",
-            grown,
-            "MB",
-            first,
-            "at the begin",
-            goal,
-            grown < _GROWTH * first,
-        )
+    yield from _memory(of("memory"))

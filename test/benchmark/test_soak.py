@@ -25,6 +25,10 @@ def missed(events, stored=1):
     return {one.item for one in rows(events, {"/fv_1": stored}) if one.met is False}
 
 
+def memory(share, megabytes):
+    return {"kind": "memory", "share": share, "megabytes": megabytes}
+
+
 GOOD = [life(), call()]
 
 
@@ -35,6 +39,7 @@ def test_what_adds_up_misses_nothing():
     cut = call(None, None, ended="SIGKILL")
     kept_late = call()  # it waited for a full disk as its process was killed
     assert missed([*GOOD, killed, refused, busy, cut, kept_late], stored=2) == set()
+    assert missed([*GOOD, memory(0.1, 50), memory(0.5, 100), memory(1.0, 104)]) == set()
     assert missed([*GOOD, cut], stored=2) == set()  # stored, and killed before the answer
 
 
@@ -51,7 +56,7 @@ def test_what_adds_up_misses_nothing():
         ([*GOOD, {"kind": "full disk", "told": False}], 1, "full disks that nobody told"),
         ([*GOOD, {"kind": "died"}], 1, "processes that ended by themselves"),
         ([*GOOD, {"kind": "ending", "name": "a", "code": None}], 1, "a ended with code"),
-        ([*GOOD, {"kind": "memory", "name": "a", "begin": 100, "end": 111}], 1, "a: memory"),
+        ([*GOOD, memory(0.5, 100), memory(1.0, 106)], 1, "memory after 100 % of the month"),
         ([call()], 1, "samples sent"),
         ([life()], 0, "identifications asked"),
     ],
