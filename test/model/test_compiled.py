@@ -57,6 +57,26 @@ def test_a_change_of_a_kernel_that_another_one_calls(kernels):
     assert run(kernels) == (2, True)
 
 
+def test_a_first_compilation_is_logged_once(kernels):
+    """Two kernels are compiled: one line. What comes out of the cache is none."""
+    (kernels / "logged.py").write_text(
+        "import logging, sys\n"
+        "logging.basicConfig(level=logging.INFO, stream=sys.stdout, format='told: %(message)s')\n"
+        "import outer\n"
+    )
+    told = [
+        subprocess.run(
+            [sys.executable, "-B", "logged.py"],
+            cwd=kernels,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.count("told: numeric code is compiled")
+        for _ in range(2)
+    ]
+    assert told == [1, 0]
+
+
 def test_nowhere_to_cache(kernels):
     """As of a read-only installation, used by somebody without a home."""
     (kernels / "__pycache__").write_text("a file, so that no folder can be made")

@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import importlib
+import logging
 import os
 import signal
 import sys
@@ -119,6 +120,9 @@ def main() -> int:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started the process
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+    if sys.stderr.isatty():  # somebody may wonder why nothing happens
+        logging.basicConfig(format=f"{PROGRAM}: %(message)s")
+        logging.getLogger("valve_friction_ros.model.compiled").setLevel(logging.INFO)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)
     try:

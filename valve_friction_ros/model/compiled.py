@@ -10,6 +10,7 @@ the sources nor at home, each process compiles anew. The environment variable
 
 import contextlib
 import hashlib
+import logging
 import os
 from collections.abc import Callable
 from functools import cache
@@ -21,7 +22,27 @@ __all__ = ["compiled", "compiled_products", "compiled_reductions", "kernels_are_
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
+_LOG = logging.getLogger(__name__)
 _without_cache: set[str] = set()
+
+
+@cache
+def _tell_compilation() -> None:
+    """Log the first kernel that this process compiles; one out of the cache is not compiled."""
+    from numba.core import event  # noqa: PLC0415
+
+    class FirstCompilation(event.Listener):  # type: ignore[misc]
+        has_told = False
+
+        def on_start(self, _: object) -> None:
+            if not self.has_told:
+                self.has_told = True
+                _LOG.info("numeric code is compiled, once after an installation: about a minute")
+
+        def on_end(self, _: object) -> None:
+            """Nothing is told."""
+
+    event.register("numba:compile", FirstCompilation())
 
 
 @cache
@@ -39,6 +60,7 @@ def _kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
         return function
     import numba  # noqa: PLC0415
 
+    _tell_compilation()
     kernel: Any
     try:
         kernel = numba.njit(cache=True, nogil=True, **options)(function)

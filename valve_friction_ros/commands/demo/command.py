@@ -26,6 +26,7 @@ from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.figures import friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification.preparation import compile_methods
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SquareWave
 from valve_friction_ros.streams import RecordBuffer
 
@@ -156,6 +157,8 @@ def run(options: argparse.Namespace) -> int:
         require_dashboard()
     else:
         require_picture_file(options.output)
+    with console.status("preparing"):  # beside each other, several nodes would compile the same
+        compile_methods()
     os.environ.update(quick_discovery())
     with free_domain() as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)

@@ -1,0 +1,121 @@
+"""A gateway from Modbus TCP: two values of a device become the inputs of a valve's identifier.
+
+``python examples/modbus_gateway.py --ros-args -r __ns:=/fv_101 -p host:=plc ...``; Ctrl-C ends it.
+It needs pymodbus (``pip install pymodbus``). Copy it, and change what differs.
+"""
+
+import contextlib
+import logging
+import math
+import time
+from typing import Any
+
+import rclpy
+from pymodbus.client import ModbusTcpClient
+from pymodbus.exceptions import ModbusException
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import FluidPressure, JointState
+
+LOST = (OSError, ModbusException)
+"""What a device that is away, or refuses, raises."""
+PARAMETERS = {
+    "host": "localhost",
+    "port": 502,
+    "device": 1,  # the unit at this address
+    "kind": "input",  # registers: input (function 4, 30001 and on) or holding (3, 40001 and on)
+    "pressure_register": 0,  # the first of the value, counted from 0: 30001 is 0
+    "position_register": 2,  # within 120 of the other: one request reads both
+    "format": "float32",  # of both values: int16, uint16, int32, uint32, float32 or float64
+    "word_order": "big",  # little where the low word of a value comes first
+    "pressure_scale": 1e5,  # Pa in a unit of the device: bar
+    "position_scale": 0.0,  # m in a unit of the device: for percent the travel over 100
+    "position_at_zero": 0.0,  # m where the device says 0; the travel, and a scale below 0, where
+    # it says the opening of an air-to-close valve
+    "rate": 50.0,  # requests a second
+    "longest": 0.1,  # s from request to answer; a later one is left out, as its time is not known
+}
+
+
+class ModbusGateway(Node):
+    """Publishes the two values of each answer, with one stamp."""
+
+    def __init__(self) -> None:
+        super().__init__("modbus_gateway")
+        for name, default in PARAMETERS.items():
+            self.declare_parameter(name, default)
+        if not self.value("position_scale"):
+            raise SystemExit("modbus_gateway: set position_scale, m in a unit of the device")
+        self._format = ModbusTcpClient.DATATYPE[self.value("format").upper()]
+        self._client = ModbusTcpClient(
+            self.value("host"), port=self.value("port"), timeout=1.0, retries=0
+        )
+        self._is_lost = True
+        self._pressures = self.create_publisher(FluidPressure, "actuator_pressure", 1000)
+        self._stems = self.create_publisher(JointState, "stem_state", 1000)
+        self.create_timer(1 / self.value("rate"), self._follow)
+
+    def value(self, name: str) -> Any:
+        """Return a parameter."""
+        return self.get_parameter(name).value
+
+    def _follow(self) -> None:
+        """Ask once, and publish the answer; a device that is lost is asked again."""
+        where = f"{self.value('host')}:{self.value('port')}"
+        try:
+            asked = self.get_clock().now()
+            pressure, position = self._read()
+            answered = self.get_clock().now()
+        except LOST as error:
+            self._is_lost = True
+            self._client.close()
+            self.get_logger().warning(f"{where} is lost, tried again: {error}")
+            time.sleep(1.0)
+            return
+        if self._is_lost:
+            self._is_lost = False
+            self.get_logger().info(f"ready: follows {where}")
+        took = (answered - asked).nanoseconds
+        has_values = math.isfinite(pressure) and math.isfinite(position)
+        if has_values and took <= 1e9 * self.value("longest"):
+            between = Time(nanoseconds=asked.nanoseconds + took // 2)
+            self._publish(between, pressure, position)
+
+    def _read(self) -> tuple[float, float]:
+        """Return both values, of one request: two would be a lag between the signals."""
+        client, width = self._client, self._format.value[1]
+        if not client.connected and not client.connect():
+            raise ConnectionError("no connection")
+        places = [self.value("pressure_register"), self.value("position_register")]
+        first = min(places)
+        ask = client.read_input_registers
+        if self.value("kind") == "holding":
+            ask = client.read_holding_registers
+        answer = ask(first, count=max(places) + width - first, device_id=self.value("device"))
+        if answer.isError():
+            raise ModbusException(str(answer))
+        pressure, position = (
+            client.convert_from_registers(
+                answer.registers[place - first :][:width], self._format, self.value("word_order")
+            )
+            for place in places
+        )
+        return pressure, position
+
+    def _publish(self, when: Time, pressure: float, position: float) -> None:
+        """Publish a sample in Pa and m."""
+        message = FluidPressure(fluid_pressure=pressure * self.value("pressure_scale"))
+        message.header.stamp = when.to_msg()
+        self._pressures.publish(message)
+        place = self.value("position_at_zero") + position * self.value("position_scale")
+        stem = JointState(name=["stem"], position=[place])
+        stem.header.stamp = message.header.stamp
+        self._stems.publish(stem)
+
+
+if __name__ == "__main__":
+    logging.disable()  # pymodbus says again what this node says
+    rclpy.init()
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(ModbusGateway())
