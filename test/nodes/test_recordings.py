@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 import yaml
 from disk_trouble_identifier import FINISH, FULL, SCRIPT, SLOW
-from live_nodes import NAMESPACE, PROJECT, STREAM, stamps_of
+from live_nodes import NAMESPACE, PROJECT, SECOND, STREAM, stamps_of, time_of
+from rclpy.duration import Duration
 from records import quick_record
 from rosbags.rosbag2 import Reader
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_srvs.srv import Trigger
 
@@ -27,6 +29,7 @@ from valve_friction_ros.streams import RecordBuffer
 
 WINDOW = 4.0
 IDENTIFIER = f"{NAMESPACE}/identifier"
+DAY = 86_400 * SECOND
 
 
 class Run(NamedTuple):
@@ -123,6 +126,34 @@ def test_a_recorded_run_gives_the_numbers_of_the_node(run):
     assert numbers_of(answer) == run.numbers
     whole = identified(run.recorded, "--valve", valve)
     assert numbers_of(whole) != run.numbers  # its first second changes the numbers
+
+
+def test_a_played_bag_gives_the_numbers_of_the_live_run(run, live):
+    """Its messages come on the topics, and a time of the day before on /clock."""
+    live.start("identifier", {"window": WINDOW, "use_sim_time": True, "input_timeout": 600.0})
+    client = live.client
+    client.connect()
+    clock = client.node.create_publisher(Clock, "/clock", STREAM)
+    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+    topics = {"actuator_pressure": client._pressure, "stem_state": client._stem}
+    shown = []
+
+    def tick(time):
+        shown.append(time)
+        clock.publish(Clock(clock=time_of(time)))
+
+    with Reader(run.recorded) as bag:
+        for count, (connection, received, data) in enumerate(bag.messages()):
+            if count % 100 == 0:
+                tick(received - DAY)
+                for publisher in topics.values():
+                    assert publisher.wait_for_all_acked(Duration(seconds=60.0))
+            topics[connection.topic.rpartition("/")[2]].publish(bytes(data))
+    client.node.create_timer(0.05, lambda: tick(shown[-1] + SECOND // 20))
+    client.identified_whole(held(quick_record()))
+    assert told_by(client) == run.numbers
+    stamp = client.statuses[-1][0]
+    assert shown[0] <= stamp.sec * SECOND + stamp.nanosec <= shown[-1]
 
 
 def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
