@@ -18,6 +18,7 @@ from unittest.mock import MagicMock
 
 import pytest
 import rclpy
+import yaml
 from documentation import TEXT
 
 PROJECT = Path(__file__).resolve().parents[1]
@@ -158,6 +159,23 @@ def test_the_dashboard_is_an_extra():
         assert command in TEXT
 
 
+def test_containers_install_the_extras():
+    """What compose.yaml adds to the image has the limits of setup.py; its commands name what there is."""
+    plant = yaml.safe_load((PROJECT / "compose.yaml").read_text())
+    extras = requirements("extras_require")
+    added = plant["x-ros"]["build"]["args"]["EXTRAS"].split()
+    assert set(added) >= {*extras["bags"], *extras["dashboard"]}
+    share = f"/ws/install/share/{NAME}/"
+    for service in plant["services"].values():
+        words = service.get("command", "").split()
+        assert (
+            not words or words[1] == "run" and words[3] in EXECUTABLES or words[3] in LAUNCH_FILES
+        )
+        for word in words:
+            if share in word:
+                assert (PROJECT / word.partition(share)[2]).is_file(), word
+
+
 def test_the_oldest_versions_are_those_that_are_tested():
     minima = dict(map(parted, requirements("install_requires")))
     assert minima.pop("setuptools") == ""
@@ -206,15 +224,42 @@ def test_launch_file(name):
 
 
 @pytest.fixture
-def monitor(monkeypatch):
-    """The launch file of a plant, with stand-ins for launch, which comes with ROS only."""
+def launch_file(monkeypatch):
+    """Function of a name: a launch file, with stand-ins for launch, which comes with ROS only."""
     for name in ("launch", "launch.actions", "launch.substitutions", "launch_ros",
                  "launch_ros.actions", "launch_ros.parameter_descriptions",
                  "launch_ros.substitutions"):  # fmt: skip
         monkeypatch.setitem(sys.modules, name, MagicMock())
-    namespace = {"__name__": "monitor"}
-    exec((PROJECT / "launch" / "monitor.launch.py").read_text(), namespace)
-    return SimpleNamespace(**namespace)
+
+    def load(name):
+        namespace = {"__name__": name}
+        exec((PROJECT / "launch" / f"{name}.launch.py").read_text(), namespace)
+        return SimpleNamespace(**namespace)
+
+    return load
+
+
+@pytest.fixture
+def monitor(launch_file):
+    """The launch file of a plant."""
+    return launch_file("monitor")
+
+
+@pytest.mark.parametrize("with_identifier", ["true", "false"])
+def test_a_bench_with_its_identifier_and_without(launch_file, with_identifier):
+    """The tag is that of the namespace, unless the parameter file, which comes later, has one."""
+    names = launch_file("bench").nodes.__globals__
+    config = str(PROJECT / "config" / "bench_low.yaml")
+    given = {"valve": "/area/fv_102", "config": config, "identifier": with_identifier}
+    names["LaunchConfiguration"] = lambda name: SimpleNamespace(perform=lambda _: given[name])
+    names["Node"] = lambda **settings: settings
+    nodes = {node["name"]: node for node in names["nodes"](None)}
+    wanted = {"pressure_source", "simulator"}
+    assert set(nodes) == wanted | ({"identifier"} if with_identifier == "true" else set())
+    assert {node["namespace"] for node in nodes.values()} == {"/area/fv_102"}
+    assert nodes["simulator"]["parameters"] == [config]
+    if with_identifier == "true":
+        assert nodes["identifier"]["parameters"] == [{"valve_tag": "FV-102"}, config]
 
 
 USUAL = {"pressure_topic": "/plant/{valve}/pressure", "stem_topic": "stem"}
