@@ -160,7 +160,7 @@ def test_the_dashboard_is_an_extra():
 
 
 def test_containers_install_the_extras():
-    """What compose.yaml adds to the image has the limits of setup.py; its commands name what there is."""
+    """What is added to the image has the limits of setup.py; the commands name what there is."""
     plant = yaml.safe_load((PROJECT / "compose.yaml").read_text())
     extras = requirements("extras_require")
     added = plant["x-ros"]["build"]["args"]["EXTRAS"].split()
@@ -168,9 +168,8 @@ def test_containers_install_the_extras():
     share = f"/ws/install/share/{NAME}/"
     for service in plant["services"].values():
         words = service.get("command", "").split()
-        assert (
-            not words or words[1] == "run" and words[3] in EXECUTABLES or words[3] in LAUNCH_FILES
-        )
+        if words:
+            assert words[3] in (EXECUTABLES if words[1] == "run" else LAUNCH_FILES)
         for word in words:
             if share in word:
                 assert (PROJECT / word.partition(share)[2]).is_file(), word
