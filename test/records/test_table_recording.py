@@ -334,6 +334,14 @@ class TestColumns:
             '--decimal , (decimal: "," in a valve file)'
         )
 
+    @pytest.mark.parametrize("date", ["01.07.2026 14:00:00,010", "7/1/2026 2:00 PM"])
+    def test_a_date_of_another_form(self, write, date):
+        path = write(["time_s;position_m;pressure_pa", f"{date};0;1e5"])
+        assert refused(path, form=Columns(delimiter=";")) == (
+            f"row 2, column 'time_s': {date!r} is not a number: name the form of its dates, "
+            "--time-format '%d.%m.%Y %H:%M:%S.%f'"
+        )
+
     def test_missing_under_its_other_name(self, write):
         message = refused(write([HEADER, *GOOD]), form=Columns(time_column="t"))
         assert message.startswith("no column 't' among time_s, ")

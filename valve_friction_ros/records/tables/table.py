@@ -36,6 +36,7 @@ _LONGEST_QUOTE = 40
 _MOST_NAMES = 20
 
 _DECIMAL_COMMA = re.compile(r"\s*-?\d+,\d+\s*", re.ASCII)
+_DATE = re.compile(r"\s*\d+[./-]\d+[./-]\d+\D+\d+:\d\d.*", re.ASCII)
 
 
 def _quoted(text: str) -> str:
@@ -175,6 +176,8 @@ class OpenTable:
                     remedy = "correct it or delete the row"
                     if _DECIMAL_COMMA.fullmatch(row[place]) and self.form.delimiter != ",":
                         remedy = 'name its decimal mark, --decimal , (decimal: "," in a valve file)'
+                    if name == self.form.time_column and _DATE.fullmatch(row[place]):
+                        remedy = "name the form of its dates, --time-format '%d.%m.%Y %H:%M:%S.%f'"
                     cause = f"{_quoted(row[place])} is not a number: {remedy}"
                     return ValueError(f"{self.path}: row {number}, column {name!r}: {cause}")
         return ValueError(f"{self.path}: the table cannot be read")
