@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 ENDLESS = 600.0
 
@@ -11,16 +12,14 @@ ENDLESS = 600.0
 def answer(task):
     """Do what the task says: tell the process, raise, wait, be killed always or the first time."""
     word, _, place = task.partition(" ")
-    if word == "kill" or (word == "once" and not os.path.exists(place)):
+    if word == "kill" or (word == "once" and not Path(place).exists()):
         if place:
-            with open(place, "w"):
-                pass
+            Path(place).touch()
         os.kill(os.getpid(), signal.SIGKILL)
     if word == "raise":
         raise RuntimeError("of two\nlines")
     if word == "wait":
-        with open(place, "w"):
-            pass
+        Path(place).touch()
         time.sleep(ENDLESS)
     return os.getpid(), os.environ["OPENBLAS_NUM_THREADS"]
 
@@ -40,7 +39,7 @@ def local_cluster(workers=1, threads=1, allowed_failures=0, **options):
         LocalCluster(
             n_workers=workers,
             threads_per_worker=threads,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             silence_logs=50,
             **options,
         ) as cluster,
