@@ -1,11 +1,9 @@
 """The sub-command `identify-folder` on the workers of a Dask cluster."""
 
-import contextlib
 import csv
 import os
 import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -14,6 +12,7 @@ from pathlib import Path
 import pytest
 from dask_workers import identify, local_cluster
 from documentation import PROJECT
+from kept_rows import kept
 from local_server import certificate_pair
 
 from valve_friction_ros.commands.folder import sharing
@@ -108,16 +107,7 @@ def test_interrupted_and_resumed(address, folder, arguments, command):
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
     )
 
-    def done():
-        copy = output.with_name("copy.sqlite")
-        try:  # the file itself is locked
-            shutil.copy(output.with_suffix(".sqlite"), copy)
-            with contextlib.closing(sqlite3.connect(copy)) as database:
-                return database.execute("SELECT count(*) FROM result").fetchone()[0]
-        except (OSError, sqlite3.Error):
-            return 0
-
-    wait_until(lambda: done() == 2)
+    wait_until(lambda: kept(output) == 2)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (130, "")

@@ -4,7 +4,7 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from valve_friction_ros.records.stores import state_of, walk
+from valve_friction_ros.records.stores import explained, state_of, walk
 
 __all__ = ["Findings", "FoundRecording", "find_recordings", "is_valve_file"]
 
@@ -113,26 +113,29 @@ def find_recordings(folder: Path, *left_out: Path) -> Findings:
 
     Raises ValueError if the folder is none, or cannot be read.
     """
+    with explained(folder):
+        return _findings(folder, {path.resolve() for path in left_out})
+
+
+def _findings(folder: Path, own: set[Path]) -> Findings:
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder")
     recordings, skipped = [], []
-    own = {path.resolve() for path in left_out}
     for here, folders, files in walk(folder):
-        below = here.relative_to(folder)
         if _is_bag_folder(here, files):
             recordings.append(here)
             folders.clear()
             continue
         folders[:] = [name for name in folders if (here / name).resolve() not in own]
         closed = {name for name in folders if name.startswith(".") or (here / name).is_symlink()}
-        skipped += [f"{(below / name).as_posix()}/" for name in closed]
+        skipped += [f"{(here / name).relative_to(folder).as_posix()}/" for name in closed]
         folders[:] = sorted(set(folders) - closed)
         for name in files:
             path = here / name
             if path.resolve() in own or is_valve_file(name):
                 continue
             if name.startswith(_HIDDEN) or not _is_recording(name) or not path.is_file():
-                skipped.append((below / name).as_posix())
+                skipped.append(path.relative_to(folder).as_posix())
             else:
                 recordings.append(path)
     found = [FoundRecording(path, path.relative_to(folder).as_posix()) for path in recordings]

@@ -14,9 +14,9 @@ from typing import Any, cast
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.records.unreadable import cause_of
 
-__all__ = ["is_stored", "on_disk", "place", "state_of", "walk"]
+__all__ = ["explained", "on_disk", "place", "state_of", "walk"]
 
-_REMEDY = "run `pip install 'universal_pathlib>=0.3.10,<0.4' s3fs` (the extra `stores`)"
+_REMEDY = "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `stores`)"
 _LONGEST_CAUSE = 200
 _MARKS = ("ETag", "etag", "md5Hash", "mtime", "LastModified", "last_modified", "created")
 """What stores say of a file that changes with its content; the first that is there counts."""
@@ -37,20 +37,30 @@ def place(name: str) -> Path:
         path = UPath(name)
         path.fs  # noqa: B018 - its library is imported when it is first asked for
     except ImportError as error:
-        raise ValueError(f"{name}: object stores need libraries ({error}): {_REMEDY}") from None
-    except Exception as error:  # noqa: BLE001 - the libraries of stores raise what they like
-        raise _unreadable(name, error) from None
+        raise ValueError(
+            f"{name}: a library of this store is missing ({error}): {_REMEDY}"
+        ) from None
+    except ValueError as error:
+        raise ValueError(f"{name}: no such store: {error}") from None
     return cast(Path, path)
 
 
-def is_stored(path: object) -> bool:
-    """Return whether a path is in a store, or is to be treated so."""
+def _is_stored(path: object) -> bool:
     return not isinstance(path, Path)
 
 
-def _unreadable(path: object, error: Exception) -> ValueError:
-    cause = " ".join(str(cause_of(error)).split())[:_LONGEST_CAUSE] or type(error).__name__
-    return ValueError(f"{path}: cannot be read: {cause}")
+@contextlib.contextmanager
+def explained(path: object) -> Iterator[None]:
+    """Make what the library of a store raises about a path a ValueError of one line."""
+    try:
+        yield
+    except (ValueError, RefusalError):
+        raise
+    except Exception as error:
+        if not _is_stored(path):
+            raise
+        cause = " ".join(cause_of(error).split())[:_LONGEST_CAUSE] or type(error).__name__
+        raise ValueError(f"{path}: cannot be read: {cause}") from None
 
 
 def _below(folder: Any) -> Iterator[tuple[Path, list[str], list[str]]]:
@@ -66,11 +76,8 @@ def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
 
     Raises ValueError if a folder cannot be read.
     """
-    if is_stored(folder):
-        try:
-            yield from _below(folder)
-        except Exception as error:  # noqa: BLE001 - the libraries of stores raise what they like
-            raise _unreadable(folder, error) from None
+    if _is_stored(folder):
+        yield from _below(folder)
         return
 
     def refuse(error: OSError) -> None:
@@ -85,7 +92,7 @@ def state_of(file: Path) -> str:
 
     Raises OSError if it cannot be looked at.
     """
-    if not is_stored(file):
+    if not _is_stored(file):
         state = file.stat()
         return f"{state.st_size}\0{state.st_mtime_ns}"
     stored = cast(Any, file)
@@ -113,15 +120,13 @@ def on_disk(path: Path) -> Iterator[Path]:
     The copy has the same name; an error that leaves the block names the original. Raises ValueError
     if it cannot be fetched.
     """
-    if not is_stored(path):
+    if not _is_stored(path):
         yield path
         return
     with TemporaryDirectory(prefix="valve_friction_") as folder:
         copy = Path(folder, path.name)
-        try:
+        with explained(path):
             _fetch(path, copy)
-        except Exception as error:  # noqa: BLE001 - the libraries of stores raise what they like
-            raise _unreadable(path, error) from None
         try:
             yield copy
         except (RefusalError, ValueError) as error:

@@ -21,6 +21,7 @@ from valve_friction_ros.fleet import (
     ResultsFile,
 )
 from valve_friction_ros.records.recordings import ReadingOptions
+from valve_friction_ros.records.stores import explained, on_disk
 from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["Plan", "forget_stale", "make_plan"]
@@ -60,18 +61,20 @@ def make_plan(
 
     @cache
     def described_by(valve_file: Path) -> tuple[ValveFile, ReadingOptions]:
-        return described(valve_file, valve_file, options)
+        with on_disk(valve_file) as file:
+            return described(file, file, options)
 
     def plan(found: FoundRecording) -> Plan:
         content = ""
         try:
-            content = found.content()
-            valve_file = _valve_file(found, options.valve)
-            description, reading = (
-                described(found.path, None, options)
-                if valve_file is None
-                else described_by(valve_file)
-            )
+            with explained(found.path):
+                content = found.content()
+                valve_file = _valve_file(found, options.valve)
+                description, reading = (
+                    described(found.path, None, options)
+                    if valve_file is None
+                    else described_by(valve_file)
+                )
             wanted = Options(
                 description.valve,
                 reading,
