@@ -35,7 +35,7 @@ def folder(tmp_path, quick_record):
     columns = np.c_[np.arange(1000) / 100, quick_record.pressure, quick_record.position]
     np.savetxt(plant / "force.csv", columns, "%.9g", ",", header="time_s,force_n,position_m",
                comments="")  # fmt: skip
-    (plant / "broken.csv").write_text("nonsense")
+    (plant / "broken.csv").write_text("time_s,force_n,position_m\n0,abc,1\n")
     (plant / ".hidden.csv").write_text("")
     (plant / "notes.txt").write_text("about the plant")
     return plant

@@ -6,11 +6,11 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-ENDLESS = 600.0
+LOOK = 0.05  # s
 
 
 def answer(task):
-    """Do what the task says: tell the process, raise, wait, be killed always or the first time."""
+    """Do what the task says: tell the process, raise, be killed always or at first, wait for a removal."""
     word, _, place = task.partition(" ")
     if word == "kill" or (word == "once" and not Path(place).exists()):
         if place:
@@ -20,7 +20,8 @@ def answer(task):
         raise RuntimeError("of two\nlines")
     if word == "wait":
         Path(place).touch()
-        time.sleep(ENDLESS)
+        while Path(place).exists():
+            time.sleep(LOOK)
     return os.getpid(), os.environ["OPENBLAS_NUM_THREADS"]
 
 
@@ -48,11 +49,12 @@ def local_cluster(workers=1, threads=1, allowed_failures=0, **options):
 
 
 def identify(job):
-    """Identify a recording, or do what its name says: be killed, or wait."""
+    """Identify a recording, or do what its name says: be killed, or wait for ``go`` beside it."""
     from valve_friction_ros.fleet import identify_job_elsewhere
 
     if job.path.name.startswith("deadly"):
         os.kill(os.getpid(), signal.SIGKILL)
     if job.path.name.startswith("endless"):
-        time.sleep(ENDLESS)
+        while not job.path.with_name("go").exists():
+            time.sleep(LOOK)
     return identify_job_elsewhere(job)
