@@ -10,7 +10,7 @@ LOOK = 0.05  # s
 
 
 def answer(task):
-    """Do what the task says: tell the process, raise, be killed always or at first, wait for a removal."""
+    """Do what the task says: tell the process, raise, be killed always or at first, wait."""
     word, _, place = task.partition(" ")
     if word == "kill" or (word == "once" and not Path(place).exists()):
         if place:
