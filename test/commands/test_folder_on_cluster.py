@@ -21,6 +21,7 @@ from valve_friction_ros.fleet.sharing import cluster
 distributed = pytest.importorskip("distributed", reason="run `make venv-cluster`")
 dask = pytest.importorskip("dask")
 
+pytestmark = pytest.mark.timeout(300)  # processes start, die and come back
 PATIENCE = 100.0  # s, for one thing to happen on a loaded machine
 FAULTY = Path(__file__).with_name("faulty_cluster.py")
 SHORT = (PROJECT / "examples" / "five_seconds.csv").read_text()
@@ -64,7 +65,7 @@ def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monke
         (tmp_path / name).mkdir()
         output = tmp_path / name / "friction.csv"
         outputs = ("--output", output, "--output", output.with_suffix(".html"))
-        valve = ("--valve", "examples/fv_101.yaml")
+        valve = ("--valve", "examples/fv_101.yaml", "--method", "refined")
         code, out, err = command("identify-folder", "examples", *outputs, *valve, *how)
         assert code == 0, err
         reports = sorted((tmp_path / name / "friction_reports").iterdir())

@@ -11,6 +11,8 @@ from valve_friction_ros.fleet.sharing import batches, cluster, remote_calls
 
 pytest.importorskip("distributed", reason="run `make venv-cluster`")
 
+pytestmark = pytest.mark.timeout(300)  # processes start, die and come back
+
 
 @pytest.fixture(scope="module")
 def address():
