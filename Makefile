@@ -79,6 +79,11 @@ venv-dashboard:  ## the same, with what the dashboard needs
 	@$(python-found)
 	@$(INSTALL) dashboard
 
+.PHONY: venv-cluster
+venv-cluster:  ## the same, with what Dask clusters and object stores need
+	@$(python-found)
+	@$(INSTALL) cluster
+
 .PHONY: venv-test
 venv-test:  ## the same, with what checks it
 	@$(python-found)

@@ -48,6 +48,7 @@ INNER = {
     "identification.robust": {"trust", "published"},
     "identification.refined": {"trust", "published"},
     "identification.signature": {"trust", "published", "steps"},
+    "fleet.sharing": set(),
     "records.bags": set(),
     "records.tables": set(),
     "reproduction.checks": set(),
@@ -59,7 +60,7 @@ INNER = {
     "nodes.identifier": {"plumbing"},
     "commands.arguments": set(),
     "commands.output": {"arguments"},
-    "commands.folder": {"arguments"},
+    "commands.folder": {"arguments", "output"},
     "commands.demo": {"output"},
 }
 ROS_ROOMS = ("nodes", "commands/demo")

@@ -83,6 +83,8 @@ LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
 BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
 DASHBOARD_LIBRARIES = {"fastapi", "nicegui", "starlette"}  # NiceGUI is built on the others
 
+CLUSTER_LIBRARIES = {"dask", "distributed"}
+
 
 def exec_depends():
     root = ET.parse(PROJECT / "package.xml").getroot()
@@ -111,6 +113,10 @@ def test_manifest_names_every_message_package_and_library():
             assert path.parent == PROJECT / NAME / "records" / "bags"
         elif module in DASHBOARD_LIBRARIES:
             assert path.is_relative_to(PROJECT / NAME / "dashboard")
+        elif module in CLUSTER_LIBRARIES:
+            assert path.is_relative_to(PROJECT / NAME / "fleet" / "sharing")
+        elif module == "upath":
+            assert path == PROJECT / NAME / "records" / "stores.py"
         else:
             assert LIBRARIES.get(module, (module,))[0] in declared, f"{path.name}: {module}"
 
@@ -173,6 +179,20 @@ def test_containers_install_the_extras():
         for word in words:
             if share in word:
                 assert (PROJECT / word.partition(share)[2]).is_file(), word
+
+
+def test_clusters_and_stores_are_extras():
+    """Their limits hold for what is pinned; pages and refusals say how they are installed."""
+    pinned, extras = pins("cluster.txt"), requirements("extras_require")
+    sources = "".join(path.read_text() for path in (PROJECT / NAME).rglob("*.py"))
+    for needed in (*extras["cluster"], *extras["stores"]):
+        name, limits = parted(needed)
+        if lowest := re.match(r">=([\d.]+)", limits):
+            assert f"{pinned[name]}.".startswith(f"{lowest[1]}.")
+        word = f"'{needed}'" if limits else needed
+        for text in (TEXT, sources):
+            assert re.search(rf"pip install [^`#]*{re.escape(word)}", text), word
+    assert "make venv-cluster" in TEXT
 
 
 def test_the_oldest_versions_are_those_that_are_tested():

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 
-from valve_friction_ros.commands import identify_folder
+from valve_friction_ros.commands.folder import sharing
 from valve_friction_ros.commands.main import main
 from valve_friction_ros.fleet import identify_job
 
@@ -22,5 +22,5 @@ def identify(job):
 
 
 if __name__ == "__main__":
-    identify_folder.identify_job = identify
+    sharing.identify_job = identify
     sys.exit(main())

@@ -1,6 +1,5 @@
 """The sub-command `identify-folder`: many recordings, interrupted and resumed."""
 
-import contextlib
 import csv
 import gzip
 import json
@@ -8,7 +7,6 @@ import os
 import re
 import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -18,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bags import messages_of, write_bag
+from kept_rows import kept
 
 from valve_friction_ros.commands.main import run as run_here
 from valve_friction_ros.identification import IdentificationSettings, identify_refined
@@ -123,21 +122,6 @@ def is_alive(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
-
-
-def kept(output):
-    """Number of rows that are on the disk, whatever a running or killed process does with it."""
-    copy = output.parent / "copy"
-    shutil.rmtree(copy, ignore_errors=True)
-    copy.mkdir()
-    for file in output.parent.glob(f"{output.stem}.sqlite*"):
-        with contextlib.suppress(FileNotFoundError):  # a journal is there for a moment only
-            shutil.copy(file, copy)
-    try:
-        with contextlib.closing(sqlite3.connect(copy / f"{output.stem}.sqlite")) as database:
-            return database.execute("SELECT count(*) FROM result").fetchone()[0]
-    except sqlite3.Error:
-        return 0
 
 
 @pytest.fixture

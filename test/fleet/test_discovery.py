@@ -15,6 +15,9 @@ def plant(tmp_path):
         "a/d.mcap",
         "a/e.db3.zstd",
         "a/old.bag",
+        "a/t.XLSX",
+        "a/u.parquet",
+        "a/~$t.XLSX",
         "bag/metadata.yaml",
         "bag/bag_0.mcap",
         "bag/bag_1.mcap",
@@ -41,13 +44,22 @@ def test_what_counts(plant):
         "a/d.mcap",
         "a/e.db3.zstd",
         "a/old.bag",
+        "a/t.XLSX",
+        "a/u.parquet",
         "b.csv",
         "bag",
         "lost/x_0.db3",
         "lost/x_1.db3",
     ]
-    assert findings.skipped == (".git/", "a/.hidden.csv", "other/metadata.yaml", "readme.md")
-    assert [found.stem for found in findings.recordings][:5] == ["c", "d", "e", "old", "b"]
+    assert findings.skipped == (
+        ".git/",
+        "a/.hidden.csv",
+        "a/~$t.XLSX",
+        "other/metadata.yaml",
+        "readme.md",
+    )
+    stems = [found.stem for found in findings.recordings]
+    assert stems[:7] == ["c", "d", "e", "old", "t", "u", "b"]
 
 
 def test_a_bag_that_lost_its_storage_is_a_recording_to_complain_of(tmp_path):

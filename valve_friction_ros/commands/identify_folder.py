@@ -2,11 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
 from valve_friction_ros.commands.arguments.identification import (
@@ -15,50 +14,46 @@ from valve_friction_ros.commands.arguments.identification import (
 )
 from valve_friction_ros.commands.arguments.recording import add_reading_arguments, reading_options
 from valve_friction_ros.commands.folder.plan import Plan, forget_stale, make_plan
+from valve_friction_ros.commands.folder.sharing import (
+    ShareOut,
+    add_sharing_arguments,
+    finished,
+    workers,
+)
 from valve_friction_ros.commands.folder.stop_signals import StopSignals
+from valve_friction_ros.commands.folder.summary import print_alarms, print_tally
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.fleet import (
     REFUSED,
     Baselines,
-    DeadWorker,
     Job,
     ResultsFile,
-    Tally,
     database_of,
-    error_cells,
     find_recordings,
-    identify_job,
-    in_processes,
     is_page,
     key_cells,
-    ranked,
-    reaches,
     read_baselines,
     reports_of,
     tally,
-    usable_cores,
     writer_of,
 )
-from valve_friction_ros.fleet.row import Cell
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.records.stores import place
 from valve_friction_ros.records.valve_file import read_valve_file
 
 __all__ = ["REFUSALS", "declare", "run"]
 
 REFUSALS = ()
 _SHOWN_SKIPPED = 10
-_SHOWN_REASONS = 10
-_SHOWN_ALARMS = 10
-
-_Rows = list[Mapping[str, Cell]]
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments, and what the help says around them."""
     parser.description = (
-        "Identify all recordings in a folder and in the folders below it, on all cores. The "
+        "Identify all recordings in a folder and in the folders below it, on all cores or on the "
+        "workers of a Dask cluster. The "
         "results are a table with a row for each valve, and a page that ranks the valves. After an "
         "interruption the same command goes on."
     )
@@ -66,7 +61,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "Exit code 0: all were identified; 1: some were refused; 2: all recordings or an option "
         "were refused; 3: a diagnosis reached --fail-on; 130, 143: interrupted."
     )
-    parser.add_argument("folder", type=Path, metavar="DIR", help="where the recordings are")
+    parser.add_argument(
+        "folder",
+        metavar="DIR",
+        help="where the recordings are: a folder, or s3://bucket/folder and other stores by "
+        "fsspec's names (the extra `stores`)",
+    )
     parser.add_argument(
         "--output",
         type=Path,
@@ -99,13 +99,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="valve of the recordings that have neither NAME.valve.yaml beside them nor valve.yaml "
         "in their bag or beside them",
     )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=usable_cores(),
-        metavar="N",
-        help="recordings identified at the same time, each by its own process (%(default)s)",
-    )
+    add_sharing_arguments(parser)
     parser.add_argument(
         "--retry-failed", action="store_true", help="identify again what was refused before"
     )
@@ -118,7 +112,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def _require_sense(options: argparse.Namespace) -> None:
     """Refuse at once what would be refused of every recording."""
-    if options.jobs < 1:
+    if options.jobs is not None and options.scheduler is not None:
+        raise ValueError("--jobs is of this machine: with --scheduler the cluster has its workers")
+    if options.jobs is not None and options.jobs < 1:
         raise ValueError(f"--jobs must be at least 1, got {options.jobs}")
     for output in options.output:
         writer_of(output)
@@ -149,38 +145,26 @@ def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
 
 def _planned(options: argparse.Namespace) -> dict[str, Plan]:
     database, reports = database_of(options.output[0]), reports_of(options.output[0])
-    findings = find_recordings(options.folder, *options.output, database, reports)
+    folder = place(options.folder)
+    if options.scheduler is not None:
+        folder = folder.absolute()
+    findings = find_recordings(folder, *options.output, database, reports)
     if findings.skipped:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
         more = len(findings.skipped) - _SHOWN_SKIPPED
         rest = f" and {more} more" if more > 0 else ""
         print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
-        raise ValueError(f"{options.folder}: there are no CSV files and no bags in it")
+        raise ValueError(f"{options.folder}: there are no tables and no bags in it")
     baselines = _baselines(options, [found.name for found in findings.recordings])
     wanted = any(map(is_page, options.output)) and not options.no_reports
     plans = make_plan(findings, options, baselines, reports if wanted else None)
     return {plan.name: plan for plan in plans}
 
 
-def _finished(plans: Sequence[Plan], jobs: int, stop: StopSignals) -> Iterator[tuple[Plan, _Rows]]:
-    """Yield each recording with its rows as it finishes."""
-    by_job: dict[Path, Plan] = {}
-    possible: list[Job] = []
-    for plan in plans:
-        if isinstance(plan.job, Job):
-            by_job[plan.job.path] = plan
-            possible.append(plan.job)
-        else:
-            yield plan, [error_cells("", plan.job, Path(plan.name))]
-    for job, answer in in_processes(identify_job, possible, jobs, stop.wanted):
-        if isinstance(answer, DeadWorker):
-            yield by_job[job.path], [error_cells("", str(answer), job.path)]
-        else:
-            yield by_job[job.path], answer
-
-
-def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: StopSignals) -> None:
+def _identify(
+    plans: Sequence[Plan], results: ResultsFile, share_out: ShareOut, stop: StopSignals
+) -> None:
     """Identify the recordings, write their rows, and show the progress."""
     console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
     columns = (
@@ -193,7 +177,7 @@ def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: Stop
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as progress:
         task = progress.add_task("", total=len(plans))
-        for plan, rows in _finished(plans, jobs, stop):
+        for plan, rows in finished(plans, share_out, stop):
             keys = key_cells(plan.name, plan.content, plan.settings, len(rows))
             results.append([{**row, **keys} for row in rows])
             progress.advance(task)
@@ -203,38 +187,14 @@ def _identify(plans: Sequence[Plan], results: ResultsFile, jobs: int, stop: Stop
                     console.print(f"{label}: {row['error']}")
 
 
-def _print_tally(counted: Tally) -> None:
-    console = OutputConsole(highlight=False, markup=False)
-    table = Table("Coulomb friction", "valves", box=None, header_style="bold")
-    table.columns[1].justify = "right"
-    for outcome, count in sorted(counted.outcomes.items(), key=lambda one: one[0] == REFUSED):
-        table.add_row(outcome, str(count))
-    console.print(table)
-    reasons = counted.reasons()
-    for reason in reasons[:_SHOWN_REASONS]:
-        console.print(
-            f"{reason.count:>6} refused: {reason.text} (for example {reason.example})",
-            soft_wrap=True,
-        )
-    if len(reasons) > _SHOWN_REASONS:
-        console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
-
-
-def _print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
-    """Print the valves that need attention, the first of them first."""
-    console = OutputConsole(highlight=False, markup=False)
-    alarms = [row for row in ranked(rows) if reaches(row, Level.WARN)]
-    for row in alarms[:_SHOWN_ALARMS]:
-        name = " ".join(filter(None, (str(row["recording"]), str(row["valve"]))))
-        console.print(f"{row['level']:>6} {name}: {row['message']}", soft_wrap=True)
-    if len(alarms) > _SHOWN_ALARMS:
-        console.print(f"       and {len(alarms) - _SHOWN_ALARMS} more")
-
-
 def run(options: argparse.Namespace) -> int:
     """Identify what is left to do, and print a tally."""
     _require_sense(options)
-    plans = _planned(options)
+    with workers(options) as share_out:
+        return _run(options, _planned(options), share_out)
+
+
+def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: ShareOut) -> int:
     with StopSignals() as stop, ResultsFile(*options.output) as results:
         left, dropped = forget_stale(results, plans, options)
         print(
@@ -245,7 +205,7 @@ def run(options: argparse.Namespace) -> int:
         for plan in left[:1]:
             if isinstance(plan.job, Job) and plan.job.reports is not None:
                 plan.job.reports.mkdir(exist_ok=True)
-        _identify(left, results, options.jobs, stop)
+        _identify(left, results, share_out, stop)
         mine = [entry for entry in results.entries() if entry.recording in plans]
         if stop.wanted():
             complain(
@@ -255,8 +215,8 @@ def run(options: argparse.Namespace) -> int:
             )
             return stop.exit_code
     counted, rows = tally(mine), [row for entry in mine for row in entry.rows]
-    _print_tally(counted)
-    _print_alarms(rows)
+    print_tally(counted)
+    print_alarms(rows)
     refused = counted.outcomes[REFUSED]
     if refused == counted.outcomes.total():
         return ExitCode.REFUSED

@@ -1,9 +1,10 @@
 """Which files and folders below a folder are recordings."""
 
 import hashlib
-import os
 from dataclasses import dataclass
 from pathlib import Path
+
+from valve_friction_ros.records.stores import explained, state_of, walk
 
 __all__ = ["Findings", "FoundRecording", "find_recordings", "is_valve_file"]
 
@@ -12,8 +13,11 @@ _BAG_KEY = b"rosbag2_bagfile_information"
 _VALVE_ENDING = "valve.yaml"
 _PACKED = (".gz", ".zstd")
 _STORAGE = (".mcap", ".db3")
-_ENDINGS = (".csv", ".tsv", ".bag", *_STORAGE)
+_TABLES = (".csv", ".tsv", ".xlsx", ".xlsm", ".parquet")
+_ENDINGS = (*_TABLES, ".bag", *_STORAGE)
 """Endings of recordings; a bag of ROS 1 is one, so that its refusal says how to convert it."""
+_HIDDEN = (".", "~$")
+"""Beginnings of names not meant for people; ``~$a.xlsx`` is there while Excel has a.xlsx open."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +45,8 @@ class FoundRecording:
         digest = hashlib.blake2b(digest_size=8)
         for file in files:
             if not is_valve_file(file.name):
-                state = file.stat()
                 name = file.name if folder else ""
-                digest.update(f"{name}\0{state.st_size}\0{state.st_mtime_ns}\n".encode())
+                digest.update(f"{name}\0{state_of(file)}\n".encode())
         return digest.hexdigest()
 
 
@@ -101,43 +104,40 @@ def _can_be_written(name: str) -> bool:
 
 
 def find_recordings(folder: Path, *left_out: Path) -> Findings:
-    """Find the recordings in a folder and in those below it.
+    """Find the recordings in a folder and in those below it, on this machine or in a store.
 
     A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
-    each CSV or TSV file, gzipped or not, and each storage file of a bag is one, found by its
-    ending. Hidden files and folders and links to folders are skipped; so is a name that cannot
-    be written on a line. Files and folders of `left_out`, such as the output, are neither
-    recordings nor skipped.
+    each table, gzipped or not, and each storage file of a bag is one, found by its ending. Hidden
+    files and folders and links to folders are skipped; so is a name that cannot be written on a
+    line. Files and folders of `left_out`, such as the output, are neither recordings nor skipped.
 
     Raises ValueError if the folder is none, or cannot be read.
     """
+    with explained(folder):
+        return _findings(folder, {path.resolve() for path in left_out})
+
+
+def _findings(folder: Path, own: set[Path]) -> Findings:
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder")
-    unreadable: list[OSError] = []
     recordings, skipped = [], []
-    own = {path.resolve() for path in left_out}
-    for place, folders, files in os.walk(folder, onerror=unreadable.append):
-        here = Path(place)
-        below = here.relative_to(folder)
+    for here, folders, files in walk(folder):
         if _is_bag_folder(here, files):
             recordings.append(here)
             folders.clear()
             continue
         folders[:] = [name for name in folders if (here / name).resolve() not in own]
         closed = {name for name in folders if name.startswith(".") or (here / name).is_symlink()}
-        skipped += [f"{(below / name).as_posix()}/" for name in closed]
+        skipped += [f"{(here / name).relative_to(folder).as_posix()}/" for name in closed]
         folders[:] = sorted(set(folders) - closed)
         for name in files:
             path = here / name
             if path.resolve() in own or is_valve_file(name):
                 continue
-            if name.startswith(".") or not _is_recording(name) or not path.is_file():
-                skipped.append((below / name).as_posix())
+            if name.startswith(_HIDDEN) or not _is_recording(name) or not path.is_file():
+                skipped.append(path.relative_to(folder).as_posix())
             else:
                 recordings.append(path)
-    if unreadable:
-        error = unreadable[0]
-        raise ValueError(f"{error.filename}: cannot be read: {error.strerror}")
     found = [FoundRecording(path, path.relative_to(folder).as_posix()) for path in recordings]
     strange = [one for one in found if not _can_be_written(one.name)]
     skipped += [one.name for one in strange]

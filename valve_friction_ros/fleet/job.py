@@ -1,12 +1,13 @@
 """One recording to identify, and the rows of its results."""
 
 import hashlib
-import re
+import socket
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from valve_friction_ros import __version__
+from valve_friction_ros.fleet.report_files import PAGE, report_name
 from valve_friction_ros.fleet.row import Cell, error_cells, result_cells
 from valve_friction_ros.health import Baseline, diagnose_valve
 from valve_friction_ros.identification import (
@@ -18,12 +19,9 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.model import Valve
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
+from valve_friction_ros.records.stores import on_disk
 
-__all__ = ["Job", "Options", "identify_job"]
-
-_STRANGE = re.compile(r"[^A-Za-z0-9.-]+")
-_LONGEST = 100
-"""Characters of a report's name before its digest."""
+__all__ = ["Job", "Options", "identify_job", "identify_job_elsewhere"]
 
 
 @dataclass(frozen=True)
@@ -57,10 +55,10 @@ class Options:
 
 @dataclass(frozen=True)
 class Job:
-    """A recording and how to identify it, to be handed to another process.
+    """A recording and how to identify it, to be handed to another process, here or elsewhere.
 
-    `name` is that of the recording in its folder; `reports` is where its reports go, if they are
-    wanted.
+    `name` is that of the recording in its folder; `reports` is where its reports will be written,
+    if they are wanted.
     """
 
     path: Path
@@ -69,23 +67,15 @@ class Job:
     reports: Path | None = None
 
 
-def _report_name(job: Job, valve: str) -> str:
-    """Return the name of a report: readable, and no other valve's."""
-    name = f"{job.name} {valve}".strip()
-    digest = hashlib.blake2b(name.encode(), digest_size=4).hexdigest()
-    return f"{_STRANGE.sub('_', name).strip('_')[:_LONGEST]}_{digest}.html"
-
-
 def _report(
     job: Job, recorded: RecordedValve, result: Result, baseline: Baseline | None
 ) -> Mapping[str, Cell]:
-    """Write the report of a valve; a failure is a warning, as the numbers are there."""
+    """Make the report of a valve; it is written where the results are."""
     if job.reports is None:
         return {}
 
     from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
 
-    name = _report_name(job, recorded.name)
     record = reports.IdentifiedRecord(
         name=" ".join(filter(None, (job.name, recorded.name))),
         source=recorded.label,
@@ -93,11 +83,10 @@ def _report(
         baseline=baseline,
         notes=recorded.notes,
     )
-    try:
-        reports.write_report(reports.identification_report(record), job.reports / name)
-    except OSError as error:
-        return {"warnings": f"no report: {error.filename}: {error.strerror}"}
-    return {"report": f"{job.reports.name}/{name}"}
+    return {
+        "report": f"{job.reports.name}/{report_name(job.name, recorded.name)}",
+        PAGE: reports.render(reports.identification_report(record)),
+    }
 
 
 def _cells(job: Job, recorded: RecordedValve) -> Mapping[str, Cell]:
@@ -118,12 +107,28 @@ def identify_job(job: Job) -> list[Mapping[str, Cell]]:
     """Read and identify a recording.
 
     Returns the cells of a row for each valve, at least one, in the order of the file; a refusal has
-    its reason under ``error``.
+    its reason under ``error``. A page of a report goes with its row.
     """
     try:
-        recorded = read_recordings(job.path, job.options.valve, job.options.reading)
-        return [_cells(job, each) for each in recorded]
+        with on_disk(job.path) as path:
+            recorded = read_recordings(path, job.options.valve, job.options.reading)
+            return [_cells(job, replace(each, path=job.path)) for each in recorded]
     except (ValueError, RefusalError, OSError) as error:
         return [error_cells("", str(error), job.path)]
     except Exception as error:  # noqa: BLE001 - one bad recording must not end the others
         return [error_cells("", f"unexpected {type(error).__name__}: {error}", job.path)]
+
+
+def identify_job_elsewhere(job: Job) -> list[Mapping[str, Cell]]:
+    """Do the same on another machine, which may not see the recording at all."""
+    try:
+        is_there = job.path.exists()
+    except Exception:  # noqa: BLE001 - whoever reads it says what is the matter
+        is_there = True
+    if is_there:
+        return identify_job(job)
+    reason = (
+        f"{job.path} is not there on {socket.gethostname()}: give all workers the folder under "
+        "this path, or put it into an object store"
+    )
+    return [error_cells("", reason, job.path)]

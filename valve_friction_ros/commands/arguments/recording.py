@@ -12,6 +12,7 @@ from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import ReadingOptions, holds_force, read_recordings
+from valve_friction_ros.records.stores import on_disk
 from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 
@@ -140,7 +141,9 @@ def described(
         description = read_valve_file(valve_file, arguments.valve_name)
         return description, reading_options(arguments, description.columns)
     reading = reading_options(arguments)
-    if not holds_force(recording, reading):
+    with on_disk(recording) as path:
+        has_force = holds_force(path, reading)
+    if not has_force:
         raise ValueError(
             "pressure needs the diaphragm_area: give a valve file by --valve; "
             "`valve_friction describe-valve` writes one"

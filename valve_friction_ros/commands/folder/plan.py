@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from valve_friction_ros.commands.arguments.identification import (
@@ -19,6 +20,9 @@ from valve_friction_ros.fleet import (
     Options,
     ResultsFile,
 )
+from valve_friction_ros.records.recordings import ReadingOptions
+from valve_friction_ros.records.stores import explained, on_disk
+from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["Plan", "forget_stale", "make_plan"]
 
@@ -55,12 +59,22 @@ def make_plan(
 ) -> Iterator[Plan]:
     """Plan each recording, in the order of their names; `reports` is the folder of the reports."""
 
+    @cache
+    def described_by(valve_file: Path) -> tuple[ValveFile, ReadingOptions]:
+        with on_disk(valve_file) as file:
+            return described(file, file, options)
+
     def plan(found: FoundRecording) -> Plan:
         content = ""
         try:
-            content = found.content()
-            valve_file = _valve_file(found, options.valve)
-            description, reading = described(found.path, valve_file, options)
+            with explained(found.path):
+                content = found.content()
+                valve_file = _valve_file(found, options.valve)
+                description, reading = (
+                    described(found.path, None, options)
+                    if valve_file is None
+                    else described_by(valve_file)
+                )
             wanted = Options(
                 description.valve,
                 reading,

@@ -34,18 +34,23 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class DeadWorker:
-    """In place of an answer: the exit code of its process, negative: the signal that ended it."""
+    """In place of an answer: how the process ended that was to give it."""
 
-    exit_code: int
+    cause: str
 
     def __str__(self) -> str:
-        """Describe the end of the process."""
-        if self.exit_code >= 0:
-            return f"its process ended with exit code {self.exit_code}"
-        number = -self.exit_code
-        name = signal.Signals(number).name if number in set(signal.Signals) else str(number)
-        hint = ", as a system does that runs out of memory" if number == signal.SIGKILL else ""
-        return f"its process was killed by {name}{hint}"
+        """Return the cause."""
+        return self.cause
+
+
+def _end_of_process(exit_code: int) -> str:
+    """Describe the end of a process; a negative exit code is the signal that ended it."""
+    if exit_code >= 0:
+        return f"its process ended with exit code {exit_code}"
+    number = -exit_code
+    name = signal.Signals(number).name if number in set(signal.Signals) else str(number)
+    hint = ", as a system does that runs out of memory" if number == signal.SIGKILL else ""
+    return f"its process was killed by {name}{hint}"
 
 
 def usable_cores() -> int:
@@ -111,7 +116,7 @@ class _Worker(Generic[_Task, _Answer]):
             answer: _Answer = self.pipe.recv()
         except (EOFError, OSError):
             self.process.join()
-            return DeadWorker(self.process.exitcode or 0)
+            return DeadWorker(_end_of_process(self.process.exitcode or 0))
         return answer
 
     def end(self) -> None:

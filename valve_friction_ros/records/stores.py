@@ -1,0 +1,134 @@
+"""Folders and files in object stores, named as fsspec names them: ``s3://bucket/folder``.
+
+Keys and addresses of the stores are fsspec's own business: its variables of the environment, and
+its files of configuration.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, cast
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.records.unreadable import cause_of
+
+__all__ = ["explained", "on_disk", "place", "state_of", "walk"]
+
+_REMEDY = "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `stores`)"
+_LONGEST_CAUSE = 200
+_MARKS = ("ETag", "etag", "md5Hash", "mtime", "LastModified", "last_modified", "created")
+"""What stores say of a file that changes with its content; the first that is there counts."""
+
+
+def place(name: str) -> Path:
+    """Return the path of a file or folder on this machine, or in a store where the name has ://.
+
+    The latter is a ``UPath`` of universal_pathlib, which does for these rooms what a `Path` does.
+
+    Raises ValueError if the store is not known, or its library is not installed.
+    """
+    if "://" not in name:
+        return Path(name)
+    try:
+        from upath import UPath  # noqa: PLC0415 - an extra, and slow to import
+
+        path = UPath(name)
+        path.fs  # noqa: B018 - its library is imported when it is first asked for
+    except ImportError as error:
+        raise ValueError(
+            f"{name}: a library of this store is missing ({error}): {_REMEDY}"
+        ) from None
+    except ValueError as error:
+        raise ValueError(f"{name}: no such store: {error}") from None
+    return cast(Path, path)
+
+
+def _is_stored(path: object) -> bool:
+    return not isinstance(path, Path)
+
+
+@contextlib.contextmanager
+def explained(path: object) -> Iterator[None]:
+    """Make what the library of a store raises about a path a ValueError of one line."""
+    try:
+        yield
+    except (ValueError, RefusalError):
+        raise
+    except Exception as error:
+        if not _is_stored(path):
+            raise
+        cause = " ".join(cause_of(error).split())[:_LONGEST_CAUSE] or type(error).__name__
+        raise ValueError(f"{path}: cannot be read: {cause}") from None
+
+
+def _below(folder: Any) -> Iterator[tuple[Path, list[str], list[str]]]:
+    root = folder.path.rstrip("/")
+    for where, folders, files in folder.fs.walk(folder.path, on_error="raise"):
+        inner = where.rstrip("/")[len(root) :].strip("/")
+        files[:] = [name for name in files if name]  # stores hold a folder as a file without a name
+        yield folder / inner if inner else folder, folders, files
+
+
+def walk(folder: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
+    """Go through a folder and those below it, as `os.walk` does; what leaves the list is left out.
+
+    Raises ValueError if a folder cannot be read.
+    """
+    if _is_stored(folder):
+        yield from _below(folder)
+        return
+
+    def refuse(error: OSError) -> None:
+        raise ValueError(f"{error.filename}: cannot be read: {error.strerror}")
+
+    for where, folders, files in os.walk(folder, onerror=refuse):
+        yield Path(where), folders, files
+
+
+def state_of(file: Path) -> str:
+    """Return the size of a file, and a mark that changes with its content.
+
+    Raises OSError if it cannot be looked at.
+    """
+    if not _is_stored(file):
+        state = file.stat()
+        return f"{state.st_size}\0{state.st_mtime_ns}"
+    stored = cast(Any, file)
+    told = stored.fs.info(stored.path)
+    mark = next((told[name] for name in _MARKS if told.get(name)), "")
+    return f"{told['size']}\0{mark}"
+
+
+def _fetch(path: Any, copy: Path) -> None:
+    """Copy a stored file, or the files of a stored folder; those in folders below it stay there."""
+    if path.fs.isdir(path.path):
+        copy.mkdir()
+        listed = path.fs.ls(path.path, detail=True)
+        names = [each["name"].rpartition("/")[2] for each in listed if each["type"] == "file"]
+        pairs = [(f"{path.path}/{name}", copy / name) for name in names if name not in ("", "..")]
+    else:
+        pairs = [(path.path, copy)]
+    path.fs.get([source for source, _ in pairs], [str(target) for _, target in pairs])
+
+
+@contextlib.contextmanager
+def on_disk(path: Path) -> Iterator[Path]:
+    """Have a file, or the files of a folder, on this machine's disk: as it is, or as a copy.
+
+    The copy has the same name; an error that leaves the block names the original. Raises ValueError
+    if it cannot be fetched.
+    """
+    if not _is_stored(path):
+        yield path
+        return
+    with TemporaryDirectory(prefix="valve_friction_") as folder:
+        copy = Path(folder, path.name)
+        with explained(path):
+            _fetch(path, copy)
+        try:
+            yield copy
+        except (RefusalError, ValueError) as error:
+            kind = RefusalError if isinstance(error, RefusalError) else ValueError
+            raise kind(str(error).replace(str(copy), str(path))) from None
