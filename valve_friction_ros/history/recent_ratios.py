@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-from valve_friction_ros.history.file import HistoryFile
-from valve_friction_ros.history.schema import has_table, reading
+from valve_friction_ros.history.connection import has_table
+from valve_friction_ros.history.reader import History
+from valve_friction_ros.history.schema import reading
 
 __all__ = ["HistoryMark", "KeptRatio", "history_mark", "ratios_after"]
 
@@ -29,12 +30,12 @@ class HistoryMark(NamedTuple):
     valves: int
 
 
-def history_mark(file: HistoryFile) -> HistoryMark:
+def history_mark(file: History) -> HistoryMark:
     """Return the mark of a file as it is now.
 
     Raises HistoryError if the file cannot be read.
     """
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
 
         def one(query: str) -> int:
             return int(connection.execute(query).fetchone()[0])
@@ -48,12 +49,12 @@ def history_mark(file: HistoryFile) -> HistoryMark:
         )
 
 
-def ratios_after(file: HistoryFile, row: int, since: int) -> tuple[KeptRatio, ...]:
+def ratios_after(file: History, row: int, since: int) -> tuple[KeptRatio, ...]:
     """Return the ratios of all valves in rows after one, made since a time, ns; oldest row first.
 
     Raises HistoryError if the file cannot be read.
     """
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
         rows = connection.execute(
             "SELECT identification.id, valve.name, time_ns, ratio FROM identification "
             "JOIN valve ON valve.id = valve_id "
