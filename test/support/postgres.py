@@ -61,7 +61,11 @@ class PostgresServer:
             "host all owner 127.0.0.1/32 trust\nhost all all 127.0.0.1/32 scram-sha-256\n"
         )
         self.port = _free_port()
-        self.settings = {"fsync": "off", "listen_addresses": "127.0.0.1", "logging_collector": "off"}
+        self.settings = {
+            "fsync": "off",
+            "listen_addresses": "127.0.0.1",
+            "logging_collector": "off",
+        }
         self._process = None
         self.start()
 
@@ -73,6 +77,7 @@ class PostgresServer:
             capture_output=True,
             text=True,
             timeout=_PATIENCE,
+            check=False,
             **self._who,
         )
         assert done.returncode == 0, done.stderr
@@ -88,8 +93,7 @@ class PostgresServer:
                 # One that was killed leaves processes that end a little later.
                 with (self.folder / "log").open("ab") as log:
                     self._process = subprocess.Popen(
-                        [_program("postgres"), "-D", self.data, "-p", str(self.port)]
-                        + ["-k", str(self.folder), *options],
+                        [_program("postgres"), "-D", self.data, *options],
                         cwd=self.folder,
                         env={"PATH": os.environ["PATH"], "LC_ALL": "C"},
                         stdout=log,
@@ -107,9 +111,8 @@ class PostgresServer:
     def url(self, database, user="owner", password=None, **parameters):
         secret = "" if password is None else f":{password}"
         query = "&".join(f"{name}={value}" for name, value in parameters.items())
-        return (
-            f"postgresql://{user}{secret}@127.0.0.1:{self.port}/{database}{'?' * bool(query)}{query}"
-        )
+        place = f"{user}{secret}@127.0.0.1:{self.port}/{database}"
+        return f"postgresql://{place}{'?' * bool(query)}{query}"
 
     def database(self):
         """Make a new database; return its name."""

@@ -142,7 +142,8 @@ def write_rows(connection: Connection, part: Part, rows: Sequence[tuple[int, Cop
     columns = _columns(connection, rows)
     by_columns: defaultdict[tuple[str, ...], list[tuple[Any, ...]]] = defaultdict(list)
     for valve, values in columns:
-        by_columns[("valve_id", *values)].append((valve, *values.values()))
+        names = ("valve_id", *values)
+        by_columns[names].append((valve, *values.values()))
     for names, cells in by_columns.items():
         connection.executemany(_insertion(part, names), cells)
     if part.children:

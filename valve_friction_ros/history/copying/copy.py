@@ -53,6 +53,11 @@ class CopiedPart(NamedTuple):
     checksum: str
     copied: str
 
+    @property
+    def is_same(self) -> bool:
+        """Whether each row of the first one is in the second one as it is there."""
+        return self.rows == self.same and self.checksum == self.copied
+
 
 def is_there(place: Place) -> bool:
     """Return whether a history is there, and can be read."""

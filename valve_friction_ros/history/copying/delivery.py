@@ -70,7 +70,7 @@ class Delivery:
         self._open.close()
 
     def send(self, is_over: Callable[[], bool]) -> None:
-        """Send the rows that wait, some at least, until `is_over`; what is sent twice changes nothing."""
+        """Send the rows that wait, some at least, until `is_over`; sent twice is sent once."""
         after = 0
         while True:
             waiting, rows, valves = self._waiting(after)

@@ -95,14 +95,14 @@ def _fill(connection: sqlite3.Connection) -> None:
     """Have all rows wait."""
     now = "CAST(strftime('%s', 'now') AS INTEGER)"
     connection.execute("DELETE FROM unsent")
-    connection.execute(
-        "INSERT INTO unsent (valve_id, part, key, since) "
+    connection.execute(  # no user's text in either statement
+        "INSERT INTO unsent (valve_id, part, key, since) "  # noqa: S608
         f"SELECT id, '{VALVE}', '[]', {now} FROM valve"
     )
     for part in PARTS:
         order = "id" if part.children or part.table == "answer" else "valve_id"
         connection.execute(
-            "INSERT INTO unsent (valve_id, part, key, since) "
+            "INSERT INTO unsent (valve_id, part, key, since) "  # noqa: S608
             f"SELECT valve_id, '{part.table}', json_array({', '.join(part.key)}), {now} "
             f"FROM {part.table} ORDER BY {order}"
         )

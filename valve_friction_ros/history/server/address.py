@@ -1,9 +1,11 @@
 """The address of a history on a server."""
 
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-__all__ = ["INSTALL", "URL_VARIABLE", "HistoryServer", "is_url"]
+__all__ = ["INSTALL", "URL_VARIABLE", "HistoryServer", "is_url", "server_from"]
 
 URL_VARIABLE = "VALVE_FRICTION_HISTORY_URL"
 """The variable of the environment that names the server, also with a password."""
@@ -70,3 +72,27 @@ class HistoryServer:
         for secret in (self.url, *self.secrets):
             text = text.replace(secret, _HIDDEN)
         return " ".join(text.split())
+
+
+def server_from(
+    url: str, name: str = "history_url", environment: Mapping[str, str] = os.environ
+) -> HistoryServer | None:
+    """Return the server of a parameter of this `name`, else of the environment; None for none.
+
+    Raises ValueError, without the address, if it is none, or if the parameter holds a password.
+    """
+    url = url.strip()
+    place = name if url else URL_VARIABLE
+    url = url or environment.get(URL_VARIABLE, "").strip()
+    if not url:
+        return None
+    try:
+        server = HistoryServer(url)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None
+    if place == name and server.secrets:
+        raise ValueError(
+            f"{name} holds a password, which everybody on the ROS graph can read: put it into "
+            f"~/.pgpass or PGPASSWORD, or the whole address into {URL_VARIABLE}"
+        )
+    return server
