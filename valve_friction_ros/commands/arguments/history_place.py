@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from valve_friction_ros.history import HistoryServer, Place, is_url
+from valve_friction_ros.history import URL_VARIABLE, HistoryServer, Place, is_url
 from valve_friction_ros.records.data_folder import history_file
 
 __all__ = ["PLACE", "history_place", "usual_history"]
