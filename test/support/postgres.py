@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda one: one.parent.name)
-_PATIENCE = 120.0
+_PATIENCE = 60.0
 _databases = itertools.count()
 
 
@@ -62,9 +62,10 @@ class PostgresServer:
         )
         self.port = _free_port()
         self.settings = {
-            "fsync": "off",
+            "port": self.port,
+            "unix_socket_directories": self.folder,
             "listen_addresses": "127.0.0.1",
-            "logging_collector": "off",
+            "fsync": "off",
         }
         self._process = None
         self.start()

@@ -297,7 +297,7 @@ def entries_in(
     connection: Connection, valves: Sequence[str] | None, since: int, until: int
 ) -> tuple[HistoryEntry, ...]:
     """Read identifications, oldest first; see `HistoryFile.entries`."""
-    names = [name for (name,) in connection.execute("SELECT name FROM valve")]
+    names = sorted(name for (name,) in connection.execute("SELECT name FROM valve"))
     wanted = names if valves is None else valves
     found = [
         entry for valve in wanted for entry in _entries_of_valve(connection, (valve, since, until))

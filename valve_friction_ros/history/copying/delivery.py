@@ -22,7 +22,7 @@ from valve_friction_ros.history.copying.unsent import (
     first_unsent,
     has_unsent,
     refuse,
-    send_all_to,
+    send_to,
     sent_to,
 )
 from valve_friction_ros.history.entry import KeptValve
@@ -71,6 +71,8 @@ class Delivery:
 
     def send(self, is_over: Callable[[], bool]) -> None:
         """Send the rows that wait, some at least, until `is_over`; sent twice is sent once."""
+        if self._connection is None:
+            self._tried(lambda: None)
         after = 0
         while True:
             waiting, rows, valves = self._waiting(after)
@@ -118,7 +120,7 @@ class Delivery:
                     "SELECT value FROM mark WHERE name = 'identity'"
                 ).fetchone()
             if sent_to(self._path) != identity:
-                send_all_to(self._path, identity)
+                send_to(self._path, identity)
             self._connection = connection
         return self._connection
 
@@ -197,9 +199,9 @@ class Delivery:
         """Put the rows of a valve into the file in one transaction; tell whether that was done."""
         taken = {part: [*rows_of(server, part, number)] for part in PARTS}
         with writing(self._path) as file:
-            here = valve_id(file, valve)
-            if is_over() or has_unsent(file, here):
+            if is_over() or has_unsent(file, valve.name):
                 return False
+            here = valve_id(file, valve)
             for part, rows in taken.items():
                 if not part.is_kept:
                     file.execute(f"DELETE FROM {part.table} WHERE valve_id = ?", (here,))  # noqa: S608

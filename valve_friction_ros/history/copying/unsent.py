@@ -24,7 +24,7 @@ __all__ = [
     "follow",
     "has_unsent",
     "refuse",
-    "send_all_to",
+    "send_to",
     "sent_to",
 ]
 
@@ -109,7 +109,7 @@ def _fill(connection: sqlite3.Connection) -> None:
 
 
 def follow(path: Path) -> None:
-    """Have each change from now on wait for a server, unless that is so already.
+    """Have all rows, and each change from now on, wait for a server, unless that is so already.
 
     Raises HistoryError if the file cannot be written.
     """
@@ -123,6 +123,7 @@ def follow(path: Path) -> None:
         for statement in (_TABLE, _INDEX, *_triggers()):
             file.execute(statement)
         file.execute("INSERT OR IGNORE INTO mark VALUES ('identity', ?)", (uuid.uuid4().hex,))
+        _fill(file)
 
 
 def file_name(path: Path) -> str:
@@ -139,11 +140,12 @@ def sent_to(path: Path) -> str | None:
     return None if row is None else str(row[0])
 
 
-def send_all_to(path: Path, identity: str) -> None:
-    """Have all rows of a file wait for a server that has none of them."""
+def send_to(path: Path, identity: str) -> None:
+    """Note which server gets the rows; all wait for it where another one has got them so far."""
     with writing(path) as connection:
+        if connection.execute("SELECT 1 FROM mark WHERE name = 'sent_to'").fetchone():
+            _fill(connection)
         connection.execute("INSERT OR REPLACE INTO mark VALUES ('sent_to', ?)", (identity,))
-        _fill(connection)
 
 
 def count_unsent(path: Path) -> UnsentCount:
@@ -157,9 +159,13 @@ def count_unsent(path: Path) -> UnsentCount:
     return UnsentCount(waiting - refused, since, refused)
 
 
-def has_unsent(connection: Connection, valve: int) -> bool:
-    """Return whether rows of a valve wait."""
-    found = connection.execute("SELECT 1 FROM unsent WHERE valve_id = ? LIMIT 1", (valve,))
+def has_unsent(connection: Connection, valve: str) -> bool:
+    """Return whether rows of the valve of this name wait."""
+    found = connection.execute(
+        "SELECT 1 FROM unsent JOIN valve ON valve.id = valve_id WHERE name = ? AND part != ? "
+        "LIMIT 1",
+        (valve, VALVE),
+    )
     return found.fetchone() is not None
 
 
