@@ -59,6 +59,7 @@ setup(
         # Private names of rosbags 0.11 are used.
         "bags": ["backports.zstd", "lz4", "rosbags>=0.11.9,<0.12"],
         "dashboard": ["nicegui>=3.18,<4"],
+        "database": ["psycopg[binary]>=3.2,<4"],
         "tables": ["openpyxl", "pandas", "pyarrow"],  # Excel and Parquet
         # By pytest among them `colcon test` knows that there are tests.
         "test": ["hypothesis", "pytest", "pytest-timeout"],

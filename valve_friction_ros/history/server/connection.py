@@ -32,6 +32,11 @@ _PATIENCE = 30.0
 
 _REMEDIES = (
     ("password", "check user and password: PGPASSWORD, ~/.pgpass"),
+    (
+        "permission denied for schema",
+        "have the owner of the database run `valve_friction history copy`",
+    ),
+    ("must be owner", "have the owner of the database run `valve_friction history copy`"),
     ("permission denied", "give this role the rights that doc/how_to/history_server.md lists"),
     ("read-only transaction", "name the server that takes writes, or target_session_attrs"),
     ("does not exist", "make it, or name another database or role"),
