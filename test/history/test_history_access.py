@@ -73,7 +73,7 @@ def test_a_node_may_send_and_take(history, roles, plant, tmp_path):
 def test_a_reader_reads_and_writes_nothing(history, roles):
     assert all_of(History(roles["valve_readers"])) == all_of(history)
     history.add(success(START + 9))
-    with pytest.raises(HistoryError, match="permission denied.*history_server.md") as error:
+    with pytest.raises(HistoryError, match=r"permission denied.*history_server\.md") as error:
         copied(history.path, roles["valve_readers"])
     assert "another" not in str(error.value)
 

@@ -30,23 +30,26 @@ _SESSION = "SET idle_in_transaction_session_timeout = '60s'; SET extra_float_dig
 _PATIENCE = 30.0
 """Longest wait, s, for an answer. Chosen: a statement takes milliseconds."""
 
+_OWNER = "have the owner of the database run `valve_friction history copy` once"
+
+_TLS = "check sslmode and sslrootcert of the address"
+
+_AWAY = "check that the server runs, and that this machine reaches it"
+
 _REMEDIES = (
     ("password", "check user and password: PGPASSWORD, ~/.pgpass"),
-    (
-        "permission denied for schema",
-        "have the owner of the database run `valve_friction history copy`",
-    ),
-    ("must be owner", "have the owner of the database run `valve_friction history copy`"),
+    ("permission denied for schema", _OWNER),
+    ("must be owner", _OWNER),
     ("permission denied", "give this role the rights that doc/how_to/history_server.md lists"),
     ("read-only transaction", "name the server that takes writes, or target_session_attrs"),
     ("does not exist", "make it, or name another database or role"),
     ("No space left", "make room on the disk of the server"),
-    ("SSL", "check sslmode and sslrootcert of the address"),
-    ("certificate", "check sslmode and sslrootcert of the address"),
-    ("onnect", "check that the server runs, and that this machine reaches it"),
-    ("timeout", "check that the server runs, and that this machine reaches it"),
+    ("no encryption", _TLS),
+    ("SSL", _TLS),
+    ("certificate", _TLS),
+    ("onnect", _AWAY),
+    ("timeout", _AWAY),
 )
-
 
 _REFUSALS = (
     psycopg.DataError,
