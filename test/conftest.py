@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from hypothesis import settings
-from postgres import plant, postgres  # noqa: F401 - fixtures
+from postgres import database, postgres  # noqa: F401 - fixtures
 from records import sine_record
 
 from valve_friction_ros.model import (

@@ -34,10 +34,10 @@ def history(tmp_path):
 
 
 @pytest.fixture
-def roles(history, plant, postgres):
+def roles(history, database, postgres):
     """Addresses of the server for a node and a reader, with the rights of the page."""
-    copied(history.path, plant)
-    name = plant.url.rpartition("/")[2]
+    copied(history.path, database)
+    name = database.url.rpartition("/")[2]
     postgres.do(name, "DROP ROLE IF EXISTS valve_nodes; DROP ROLE IF EXISTS valve_readers;" + ROLES)
     yield {
         role: HistoryServer(postgres.url(name, role, password))
@@ -47,7 +47,7 @@ def roles(history, plant, postgres):
     postgres.do(name, "DROP ROLE valve_nodes, valve_readers")
 
 
-def test_a_node_may_send_and_take(history, roles, plant, tmp_path):
+def test_a_node_may_send_and_take(history, roles, database, tmp_path):
     sender = sender_of(history.path, roles["valve_nodes"])
     try:
         assert sender.take(VALVE) is None
@@ -55,7 +55,7 @@ def test_a_node_may_send_and_take(history, roles, plant, tmp_path):
         keep_renewal(history, VALVE, START + 10**9)  # deletes
         history.add(success(START + 9, valve=VALVE._replace(tag="renamed")))
         deadline = time.monotonic() + 60
-        while all_of(History(plant)) != all_of(history):
+        while all_of(History(database)) != all_of(history):
             assert time.monotonic() < deadline, sender.state
             time.sleep(0.1)
         assert sender.state.problem is None
@@ -104,8 +104,8 @@ def test_what_a_node_may_not(roles, statement):
         connection.execute(statement)
 
 
-def test_who_may_make_no_tables_is_told_who_does(history, plant, postgres):
-    name = plant.url.rpartition("/")[2]
+def test_who_may_make_no_tables_is_told_who_does(history, database, postgres):
+    name = database.url.rpartition("/")[2]
     postgres.do(name, "CREATE ROLE stranger LOGIN PASSWORD 'three'")
     try:
         with pytest.raises(HistoryError, match="have the owner of the database run"):
@@ -178,13 +178,13 @@ def encrypted(postgres, folder):
         postgres.start()
 
 
-def test_encryption_by_the_address(history, plant, postgres, tmp_path):
+def test_encryption_by_the_address(history, database, postgres, tmp_path):
     with encrypted(postgres, tmp_path) as certificate:
         stranger, _ = _certificate(tmp_path, "stranger")
-        checked = f"{plant.url}?sslmode=verify-full&sslrootcert="
+        checked = f"{database.url}?sslmode=verify-full&sslrootcert="
         parts = copied(history.path, HistoryServer(f"{checked}{certificate}"))
         assert all(one.is_same for one in parts)
-        for url in (f"{checked}{stranger}", f"{plant.url}?sslmode=disable"):
+        for url in (f"{checked}{stranger}", f"{database.url}?sslmode=disable"):
             with pytest.raises(HistoryError) as error:
                 History(HistoryServer(url)).valves()
             assert "check sslmode and sslrootcert" in str(error.value)

@@ -38,7 +38,7 @@ def other(request, tmp_path):
     """A place for a copy."""
     if request.param == "file":
         return tmp_path / "folder" / "copy.sqlite"
-    return request.getfixturevalue("plant")
+    return request.getfixturevalue("database")
 
 
 def is_same(parts):

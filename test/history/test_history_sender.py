@@ -69,21 +69,21 @@ def database_of(server):
     return server.url.rpartition("/")[2]
 
 
-def test_what_was_there_and_what_comes_arrives(history, plant):
+def test_what_was_there_and_what_comes_arrives(history, database):
     fill(history)
-    with sending(history, plant) as sender:
+    with sending(history, database) as sender:
         wait_until_sent(sender)
-        assert all_of(History(plant)) == all_of(history)
+        assert all_of(History(database)) == all_of(history)
         fill(history, OTHER)
         history.add(success(START + 9))
         wait_until_sent(sender)
-        assert all_of(History(plant)) == all_of(history)
+        assert all_of(History(database)) == all_of(history)
         assert sender.state.is_sending
 
 
-def test_what_changes_and_what_goes_follows(history, plant):
+def test_what_changes_and_what_goes_follows(history, database):
     fill(history)
-    with sending(history, plant) as sender:
+    with sending(history, database) as sender:
         wait_until_sent(sender)
         keep_told_level(history, VALVE, Level.OK)
         forget_moves_after(history, VALVE, service_move(1).end)
@@ -91,7 +91,7 @@ def test_what_changes_and_what_goes_follows(history, plant):
         retagged = VALVE._replace(tag="FV-101-B")
         keep_moves(history, retagged, BUILT, [service_move(1)])
         wait_until_sent(sender)
-        server = History(plant)
+        server = History(database)
         assert server.valves() == (retagged,)
         assert read_told_level(server, VALVE.name) is Level.OK
         assert len(read_moves(server, VALVE.name, BUILT)) == 2
@@ -103,13 +103,13 @@ def test_what_changes_and_what_goes_follows(history, plant):
         assert read_answers(server, VALVE.name) == ()
 
 
-def test_the_server_keeps_what_the_file_forgets(history, plant):
+def test_the_server_keeps_what_the_file_forgets(history, database):
     history.add(success())
-    with sending(history, plant) as sender:
+    with sending(history, database) as sender:
         wait_until_sent(sender)
         history.add(success(START + 9 * DAY), days=1.0)
         wait_until_sent(sender)
-    assert [len(one.entries()) for one in (history, History(plant))] == [1, 2]
+    assert [len(one.entries()) for one in (history, History(database))] == [1, 2]
 
 
 def test_a_file_without_a_server_keeps_no_list(history):
@@ -135,17 +135,17 @@ def test_each_row_waits_once_since_it_first_changed(history):
 
 
 class TestFaults:
-    def test_a_server_that_is_away(self, history, plant, postgres):
+    def test_a_server_that_is_away(self, history, database, postgres):
         """Rows wait, the reason is told once, and they arrive when it returns."""
         history.add(success())
         postgres.stop()
         try:
-            with sending(history, plant) as sender:
+            with sending(history, database) as sender:
                 wait_until(lambda: sender.state.problem)
                 assert "check that the server runs" in sender.state.problem
                 assert sender.state.count.waiting == 2
                 news = sender.news()
-                assert news.startswith(f"the history waits in {history.path}: {plant}: ")
+                assert news.startswith(f"the history waits in {history.path}: {database}: ")
                 assert sender.news() is None
                 begun = time.monotonic()
                 told = sender.take(VALVE)
@@ -153,12 +153,12 @@ class TestFaults:
                 assert time.monotonic() - begun < 5.0
                 postgres.start()
                 wait_until_sent(sender)
-                assert sender.news() == f"{plant}: the history is sent again"
+                assert sender.news() == f"{database}: the history is sent again"
         finally:
             postgres.start()
-        assert all_of(History(plant)) == all_of(history)
+        assert all_of(History(database)) == all_of(history)
 
-    def test_killed_and_paused_under_load(self, history, plant, postgres):
+    def test_killed_and_paused_under_load(self, history, database, postgres):
         """The one who writes is not held up, and each row arrives once."""
         slowest, stop, written = [0.0], threading.Event(), []
 
@@ -176,8 +176,10 @@ class TestFaults:
         writer = threading.Thread(target=load)
         writer.start()
         try:
-            with sending(history, plant) as sender:
-                wait_until(lambda: History(plant).entries() if sender.state.is_sending else False)
+            with sending(history, database) as sender:
+                wait_until(
+                    lambda: History(database).entries() if sender.state.is_sending else False
+                )
                 for _ in range(2):
                     postgres.kill()
                     count = len(written)
@@ -195,16 +197,16 @@ class TestFaults:
             writer.join()
         assert max(slowest) < 3.0  # the patience of a writer: it waits for no server
         assert len(history.entries()) == len(written)
-        assert [repr(one) for one in History(plant).entries()] == [
+        assert [repr(one) for one in History(database).entries()] == [
             repr(one) for one in history.entries()
         ]
 
-    def test_a_sender_that_is_killed(self, history, plant):
+    def test_a_sender_that_is_killed(self, history, database):
         """At any instant, also between the server's commit and what the file notes of it."""
         written, folder, name = 0, history.path.parent, history.path.name
         for run in range(3):
             process = subprocess.Popen(
-                [sys.executable, WRITER, folder, plant.url, "1000000", f"{name}={run}"],
+                [sys.executable, WRITER, folder, database.url, "1000000", f"{name}={run}"],
                 stdout=subprocess.PIPE,
                 text=True,
             )
@@ -215,32 +217,32 @@ class TestFaults:
             process.stdout.close()
             assert len(history.entries()) > written
             written = len(history.entries())
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             wait_until_sent(sender)
-        assert all_of(History(plant)) == all_of(history)
-        assert all(one.is_same for one in copied(history.path, plant))
+        assert all_of(History(database)) == all_of(history)
+        assert all(one.is_same for one in copied(history.path, database))
 
-    def test_what_is_sent_twice_changes_nothing(self, history, plant):
+    def test_what_is_sent_twice_changes_nothing(self, history, database):
         """As after a kill between the server's commit and what the file notes of it."""
         fill(history)
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             wait_until_sent(sender)
-        before = all_of(History(plant))
+        before = all_of(History(database))
         with closing(sqlite3.connect(history.path)) as connection:
             connection.execute("UPDATE mark SET value = 'another' WHERE name = 'sent_to'")
             connection.commit()
         history.add(success(START + 50))
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             wait_until_sent(sender)
-        after = all_of(History(plant))
-        assert len(History(plant).entries()) == 4
+        after = all_of(History(database))
+        assert len(History(database).entries()) == 4
         assert after != before
         assert after == all_of(history)
 
-    def test_a_server_without_its_rows_gets_all_of_them(self, history, plant, postgres):
+    def test_a_server_without_its_rows_gets_all_of_them(self, history, database, postgres):
         """As where it was made anew, or another one is named."""
         fill(history)
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             wait_until_sent(sender)
         other = HistoryServer(postgres.url(postgres.database()))
         history.add(success(START + 50))
@@ -248,12 +250,12 @@ class TestFaults:
             wait_until_sent(sender)
         assert all_of(History(other)) == all_of(history)
 
-    def test_a_full_disk_of_the_server(self, history, plant, postgres):
-        with sending(history, plant) as sender:
+    def test_a_full_disk_of_the_server(self, history, database, postgres):
+        with sending(history, database) as sender:
             history.add(success())
             wait_until_sent(sender)
             postgres.do(
-                database_of(plant),
+                database_of(database),
                 "CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RAISE "
                 "'could not extend file: No space left on device' USING ERRCODE = '53100'; END $$;"
                 "CREATE TRIGGER full_disk BEFORE INSERT ON parameter "
@@ -263,47 +265,51 @@ class TestFaults:
             wait_until(lambda: sender.state.problem)
             assert "make room on the disk of the server" in sender.state.problem
             assert sender.state.count.refused == 0
-            assert len(History(plant).entries()) == 1
-            postgres.do(database_of(plant), "DROP TRIGGER full_disk ON parameter")
+            assert len(History(database).entries()) == 1
+            postgres.do(database_of(database), "DROP TRIGGER full_disk ON parameter")
             wait_until_sent(sender)
-        assert all_of(History(plant)) == all_of(history)
+        assert all_of(History(database)) == all_of(history)
 
-    def test_a_row_that_the_server_refuses_holds_up_no_other(self, history, plant, postgres):
+    def test_a_row_that_the_server_refuses_holds_up_no_other(self, history, database, postgres):
         history.add(success())
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             wait_until_sent(sender)
             postgres.do(
-                database_of(plant),
+                database_of(database),
                 "ALTER TABLE identification ADD CHECK (method != 'best')",
             )
             for number, method in enumerate(("refined", "best", "robust"), 1):
                 history.add(success(START + number, method=method))
             wait_until_sent(sender)
             wait_until(lambda: sender.state.count.refused == 1)
-        assert [one.method for one in History(plant).entries()] == ["refined", "refined", "robust"]
+        assert [one.method for one in History(database).entries()] == [
+            "refined",
+            "refined",
+            "robust",
+        ]
 
-    def test_a_file_that_is_removed_begins_anew(self, history, plant):
+    def test_a_file_that_is_removed_begins_anew(self, history, database):
         history.add(success())
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             wait_until_sent(sender)
             for path in history.path.parent.glob(f"{history.path.name}*"):
                 path.unlink()
             wait_until(lambda: sender.state.problem is None and history.path.exists())
             history.add(success(START + 1))
-            wait_until(lambda: len(History(plant).entries()) == 2, lambda: sender.state)
+            wait_until(lambda: len(History(database).entries()) == 2, lambda: sender.state)
 
 
-def test_ten_writers(tmp_path, plant):
+def test_ten_writers(tmp_path, database):
     """Of ten machines, as it were, one valve among them twice: all arrive, once."""
     number = 60
     places = [f"{k}.sqlite={k % 9}" for k in range(10)]
     subprocess.run(
-        [sys.executable, WRITER, tmp_path, plant.url, str(number), *places],
+        [sys.executable, WRITER, tmp_path, database.url, str(number), *places],
         stdout=subprocess.DEVNULL,
         check=True,
         timeout=110,
     )
-    server = History(plant)
+    server = History(database)
     assert len(server.valves()) == 9
     counts = {valve.name: len(server.entries([valve.name])) for valve in server.valves()}
     assert counts.pop("/fv_0/identifier") == 2 * number
@@ -311,20 +317,20 @@ def test_ten_writers(tmp_path, plant):
     for k in range(10):
         assert all(
             one.rows == one.same
-            for one in copied(tmp_path / f"{k}.sqlite", plant)
+            for one in copied(tmp_path / f"{k}.sqlite", database)
             if one.table in ("identification", "baseline")
         )
 
 
 class TestAnotherMachine:
-    def test_a_valve_is_taken_where_it_was_kept_elsewhere(self, history, plant, tmp_path):
+    def test_a_valve_is_taken_where_it_was_kept_elsewhere(self, history, database, tmp_path):
         fill(history)
         fill(history, OTHER)
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             assert sender.take(VALVE) is None
             wait_until_sent(sender)
         second = HistoryFile(tmp_path / "second.sqlite")
-        with sending(second, plant) as sender:
+        with sending(second, database) as sender:
             assert sender.take(VALVE) is None
             assert second.valves() == (VALVE,)
             assert all_of(second)[2:10] == all_of(history)[2:10]
@@ -332,34 +338,34 @@ class TestAnotherMachine:
             second.set_baseline(VALVE, KeptBaseline(Baseline(99.0), START + 90, START + 90))
             keep_told_level(second, VALVE, Level.WARN)
             wait_until_sent(sender)
-        with sending(history, plant) as sender:  # and back
+        with sending(history, database) as sender:  # and back
             assert sender.take(VALVE) is None
             assert history.baseline(VALVE.name).baseline.coulomb_friction == 99.0
             assert read_told_level(history, VALVE.name) is Level.WARN
             assert read_told_level(history, OTHER.name) is Level.ERROR
             wait_until_sent(sender)
-        assert all_of(History(plant)) == all_of(history)
+        assert all_of(History(database)) == all_of(history)
 
-    def test_its_own_rows_are_not_taken_again(self, history, plant):
+    def test_its_own_rows_are_not_taken_again(self, history, database):
         history.add(success())
-        with sending(history, plant) as sender:
+        with sending(history, database) as sender:
             assert sender.take(VALVE) is None
             history.add(success(START + 9 * DAY), days=1.0)
             assert sender.take(VALVE) is None
             wait_until_sent(sender)
         assert len(history.entries()) == 1
 
-    def test_a_server_that_stands_still_is_not_waited_for(self, history, plant, postgres):
-        with sending(history, plant) as sender:
+    def test_a_server_that_stands_still_is_not_waited_for(self, history, database, postgres):
+        with sending(history, database) as sender:
             assert sender.take(VALVE) is None
             begun = time.monotonic()
             with postgres.paused():
                 told = sender.take(OTHER)
-            assert str(plant) in told
+            assert str(database) in told
             assert time.monotonic() - begun < 30.0
 
-    def test_two_processes_of_one_file_share_a_sender(self, history, plant):
-        with sending(history, plant) as sender:
+    def test_two_processes_of_one_file_share_a_sender(self, history, database):
+        with sending(history, database) as sender:
             wait_until(lambda: sender.state.is_sending)
             code = (
                 "import sys, time; sys.path.insert(0, sys.argv[3])\n"
@@ -370,13 +376,13 @@ class TestAnotherMachine:
                 "print(sender.state.is_sending); sender.end()\n"
             )
             done = subprocess.run(
-                [sys.executable, "-c", code, history.path, plant.url, str(HERE.parents[1])],
+                [sys.executable, "-c", code, history.path, database.url, str(HERE.parents[1])],
                 capture_output=True,
                 text=True,
                 check=True,
                 timeout=100,
             )
             assert done.stdout.split() == ["None", "False"]
-            assert sender_of(history.path, plant) is sender
+            assert sender_of(history.path, database) is sender
             sender.end()
             assert sender.state.is_sending

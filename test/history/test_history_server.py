@@ -38,21 +38,21 @@ def history(tmp_path):
     return history
 
 
-def test_it_is_read_as_the_file_is(history, plant):
-    copied(history.path, plant)
-    assert all_of(History(plant)) == all_of(history)
-    mark = history_mark(History(plant))
+def test_it_is_read_as_the_file_is(history, database):
+    copied(history.path, database)
+    assert all_of(History(database)) == all_of(history)
+    mark = history_mark(History(database))
     assert mark[:4] == history_mark(history)[:4]
     assert mark.settled
     found, expected = (
-        sorted(one[1:] for one in ratios_after(each, 0, 0)) for each in (History(plant), history)
+        sorted(one[1:] for one in ratios_after(each, 0, 0)) for each in (History(database), history)
     )
     assert len(found) == 2
     assert found == expected
 
 
-def test_the_view_for_plain_sql_is_the_same(history, plant, postgres):
-    copied(history.path, plant)
+def test_the_view_for_plain_sql_is_the_same(history, database, postgres):
+    copied(history.path, database)
     query = (
         "SELECT time, valve, tag, coulomb_friction, half_width, sliding_friction, ratio, message, "
         "refusal FROM friction"
@@ -60,7 +60,7 @@ def test_the_view_for_plain_sql_is_the_same(history, plant, postgres):
     with schema.writing(history.path) as file:
         expected = sorted(file.execute(query), key=repr)
     assert len(expected) == 6
-    assert sorted(postgres.do(database_of(plant), query), key=repr) == expected
+    assert sorted(postgres.do(database_of(database), query), key=repr) == expected
 
 
 def database_of(server):
@@ -75,19 +75,19 @@ def written(dump, folder):
     return path
 
 
-def test_there_is_nothing_before_the_first_row(plant):
+def test_there_is_nothing_before_the_first_row(database):
     with pytest.raises(HistoryError, match="holds no history: `valve_friction history copy`"):
-        History(plant).valves()
-    with server_connection(plant):
+        History(database).valves()
+    with server_connection(database):
         pass
-    assert History(plant).valves() == ()
+    assert History(database).valves() == ()
 
 
-def test_columns_of_both_engines_are_the_same(history, plant, postgres):
-    with server_connection(plant):
+def test_columns_of_both_engines_are_the_same(history, database, postgres):
+    with server_connection(database):
         pass
     found = postgres.do(
-        database_of(plant),
+        database_of(database),
         "SELECT table_name, column_name FROM information_schema.columns "
         "WHERE table_schema = 'public' ORDER BY table_name, ordinal_position",
     )
@@ -109,19 +109,19 @@ def test_columns_of_both_engines_are_the_same(history, plant, postgres):
 class TestVersions:
     """Tables of an older version are changed, those of a newer one are left alone."""
 
-    def test_a_server_of_version_7_is_read_and_extended(self, tmp_path, plant, postgres):
+    def test_a_server_of_version_7_is_read_and_extended(self, tmp_path, database, postgres):
         """It holds what the file of that version holds."""
-        postgres.do(database_of(plant), VERSION_7.read_text())
+        postgres.do(database_of(database), VERSION_7.read_text())
         file = HistoryFile(written(VERSION_7.with_name("history_of_version_7.sql"), tmp_path))
-        assert all_of(History(plant)) == all_of(file)
-        assert [one.written for one in copied(file.path, plant)] == [0] * 10
+        assert all_of(History(database)) == all_of(file)
+        assert [one.written for one in copied(file.path, database)] == [0] * 10
         file.add(success(START + 9))
-        assert sum(one.written for one in copied(file.path, plant)) == 1
-        assert all_of(History(plant)) == all_of(file)
+        assert sum(one.written for one in copied(file.path, database)) == 1
+        assert all_of(History(database)) == all_of(file)
 
-    def test_a_step_is_done_once_by_many(self, history, plant, monkeypatch):
-        copied(history.path, plant)
-        before = all_of(History(plant))
+    def test_a_step_is_done_once_by_many(self, history, database, monkeypatch):
+        copied(history.path, database)
+        before = all_of(History(database))
         from valve_friction_ros.history import tables
         from valve_friction_ros.history.server import tables as of_server
 
@@ -131,14 +131,14 @@ class TestVersions:
         step = ("ALTER TABLE valve ADD COLUMN remark REAL",)
         monkeypatch.setattr(tables, "_STEPS", {**tables._STEPS, schema.SCHEMA_VERSION: step})
         for _ in range(2):
-            with server_connection(plant) as connection:
+            with server_connection(database) as connection:
                 found = connection.execute("SELECT remark FROM valve").fetchall()
         assert len(found) == 2
-        assert all_of(History(plant)) == before
+        assert all_of(History(database)) == before
 
-    def test_a_step_that_fails_changes_nothing(self, history, plant, monkeypatch):
-        copied(history.path, plant)
-        before = all_of(History(plant))
+    def test_a_step_that_fails_changes_nothing(self, history, database, monkeypatch):
+        copied(history.path, database)
+        before = all_of(History(database))
         from valve_friction_ros.history import tables
         from valve_friction_ros.history.server import tables as of_server
 
@@ -147,19 +147,19 @@ class TestVersions:
             patch.setattr(of_server, "SCHEMA_VERSION", schema.SCHEMA_VERSION + 1)
             steps = ("DROP VIEW friction", "ALTER TABLE nowhere ADD COLUMN remark REAL")
             patch.setattr(tables, "_STEPS", {**tables._STEPS, schema.SCHEMA_VERSION: steps})
-            with pytest.raises(HistoryError, match="nowhere"), server_connection(plant):
+            with pytest.raises(HistoryError, match="nowhere"), server_connection(database):
                 pass
-        assert all_of(History(plant)) == before
-        with server_connection(plant) as connection:
+        assert all_of(History(database)) == before
+        with server_connection(database) as connection:
             assert connection.execute("SELECT count(*) FROM friction").fetchone()[0] == 6
 
-    def test_a_newer_one_is_refused(self, history, plant, postgres):
-        copied(history.path, plant)
-        postgres.do(database_of(plant), "UPDATE mark SET value = '99' WHERE name = 'schema'")
+    def test_a_newer_one_is_refused(self, history, database, postgres):
+        copied(history.path, database)
+        postgres.do(database_of(database), "UPDATE mark SET value = '99' WHERE name = 'schema'")
         with pytest.raises(HistoryError, match="newer version of this package"):
-            History(plant).valves()
+            History(database).valves()
         with pytest.raises(HistoryError, match="newer version of this package"):
-            copied(history.path, plant)
+            copied(history.path, database)
 
 
 class TestTrouble:
@@ -178,8 +178,8 @@ class TestTrouble:
             (lambda url: url + f"?nonsense=1&password={SECRET}", "cannot read"),
         ],
     )
-    def test_what_hinders(self, plant, change, words):
-        server = HistoryServer(change(plant.url))
+    def test_what_hinders(self, database, change, words):
+        server = HistoryServer(change(database.url))
         with pytest.raises(HistoryError, match=words) as error:
             History(server).valves()
         message = str(error.value)
@@ -213,30 +213,30 @@ class TestTrouble:
         with pytest.raises(ValueError, match=f"{name}: no address"):
             server_from("", environment={name: "s3cret"})
 
-    def test_a_server_that_stands_still_is_left(self, history, plant, postgres):
+    def test_a_server_that_stands_still_is_left(self, history, database, postgres):
         from valve_friction_ros.history.server.connection import ServerConnection
 
-        copied(history.path, plant)
-        connection = ServerConnection(plant, patience=1.0)
+        copied(history.path, database)
+        connection = ServerConnection(database, patience=1.0)
         with postgres.paused(), pytest.raises(HistoryError, match="no answer for 1 s"):  # noqa: SIM117
             with connection.transaction():
                 pass
-        assert History(plant).valves() == history.valves()
+        assert History(database).valves() == history.valves()
 
-    def test_a_connection_that_has_ended_is_made_anew(self, history, plant, postgres):
-        copied(history.path, plant)
-        assert History(plant).valves() == history.valves()
+    def test_a_connection_that_has_ended_is_made_anew(self, history, database, postgres):
+        copied(history.path, database)
+        assert History(database).valves() == history.valves()
         postgres.stop()
         with pytest.raises(HistoryError):
-            History(plant).valves()
+            History(database).valves()
         postgres.start()
-        assert History(plant).valves() == history.valves()
+        assert History(database).valves() == history.valves()
 
-    def test_texts_of_any_kind_arrive(self, history, plant):
+    def test_texts_of_any_kind_arrive(self, history, database):
         entry = success(START + 9, warnings=("a\0b '; DROP TABLE valve; -- %s ? 😀",))
         history.add(entry)
-        assert all(one.is_same for one in copied(history.path, plant))
-        last = History(plant).entries([VALVE.name])[-1]
+        assert all(one.is_same for one in copied(history.path, database))
+        last = History(database).entries([VALVE.name])[-1]
         assert last.warnings == ("a␀b '; DROP TABLE valve; -- %s ? 😀",)
 
 

@@ -27,14 +27,14 @@ def sent(client):
     )
 
 
-def test_rows_arrive_and_wait_while_the_server_is_away(live, history, plant, postgres):
-    node = live.start_identifier({"history_url": plant.url})
+def test_rows_arrive_and_wait_while_the_server_is_away(live, history, database, postgres):
+    node = live.start_identifier({"history_url": database.url})
     client = live.client
     client.identified(RECORD)
     assert client.trigger("set_baseline").success
     values = sent(client)
-    assert values["history_server"] == str(plant)
-    assert len(History(plant).entries()) == len(history.entries())
+    assert values["history_server"] == str(database)
+    assert len(History(database).entries()) == len(history.entries())
     postgres.kill()
     try:
         client.identified(RECORD)  # answered as ever
@@ -50,30 +50,30 @@ def test_rows_arrive_and_wait_while_the_server_is_away(live, history, plant, pos
     finally:
         postgres.start()
     sent(client)
-    assert all(one.is_same for one in copied(history.path, plant))
+    assert all(one.is_same for one in copied(history.path, database))
     assert f"the history waits in {history.path}" in node.errors
 
 
-def test_without_a_server_it_starts_and_says_so(live, history, plant, postgres):
+def test_without_a_server_it_starts_and_says_so(live, history, database, postgres):
     history.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
     postgres.stop()
     try:
-        live.start_identifier({"history_url": plant.url})
+        live.start_identifier({"history_url": database.url})
         values = live.client.status_values(what="the first diagnostic")
-        assert str(plant) in values["history_server not taken"]
+        assert str(database) in values["history_server not taken"]
         assert float(values["baseline_coulomb_friction [N]"]) == 152.7
     finally:
         postgres.start()
 
 
-def test_what_another_machine_kept_is_taken(live, history, plant, tmp_path):
+def test_what_another_machine_kept_is_taken(live, history, database, tmp_path):
     other = HistoryFile(tmp_path / "other.sqlite")
     other.set_baseline(VALVE, KeptBaseline(Baseline(152.7, 1.0), START, START))
     other.add(success(baseline=Baseline(152.7, 1.0)))
-    sender = sender_of(other.path, plant)
+    sender = sender_of(other.path, database)
     assert sender.take(VALVE) is None
     sender.end()
-    live.start_identifier({"history_url": plant.url})
+    live.start_identifier({"history_url": database.url})
     values = live.client.status_values(what="the first diagnostic")
     assert float(values["baseline_coulomb_friction [N]"]) == 152.7
     assert values["estimate_from"] == "before the restart"
@@ -90,8 +90,8 @@ def test_a_password_in_a_parameter_is_refused(live):
     assert "s3cret" not in node.errors
 
 
-def test_a_password_of_the_environment_is_never_shown(live, plant, postgres, monkeypatch):
-    url = postgres.url(plant.url.rpartition("/")[2], "nobody", "s3cret")
+def test_a_password_of_the_environment_is_never_shown(live, database, postgres, monkeypatch):
+    url = postgres.url(database.url.rpartition("/")[2], "nobody", "s3cret")
     monkeypatch.setenv(NAME, url)
     node = live.start_identifier()
     values = live.client.status_values(

@@ -180,7 +180,7 @@ def postgres():
 
 
 @pytest.fixture
-def plant(postgres):
+def database(postgres):
     """The address of a new, empty database."""
     from valve_friction_ros.history.server.address import HistoryServer
 

@@ -251,7 +251,7 @@ def reading_server(server: HistoryServer) -> Iterator[ServerConnection]:
     except BaseException:
         connection.close()
         raise
-    kept = _idle[server]
+    kept = _idle.setdefault(server, [])
     if len(kept) < _MOST_IDLE:
         kept.append(connection)
     else:
