@@ -60,6 +60,15 @@ class _Taking:
         self.is_over = False
 
 
+def _stamp_of(path: Path) -> tuple[int, int]:
+    """Return time and size of a file, zeros where it is not there."""
+    try:
+        status = path.stat()
+    except OSError:
+        return 0, 0
+    return status.st_mtime_ns, status.st_size
+
+
 class Sender:
     """Sends what is new in a file to a server, and takes the rows of valves that come from there.
 
@@ -135,9 +144,15 @@ class Sender:
         self._thread.join(_ENDING)
 
     def _run(self) -> None:
-        failures = 0
+        failures, looked, seen = 0, -_LONGEST_PAUSE, None
         while True:
             ends, problem = self._ends.is_set(), None
+            stamp, now = self._stamp(), time.monotonic()
+            if stamp == seen and now - looked < _LONGEST_PAUSE and not ends and not self._has_work:
+                self._wake.wait(_PAUSE)
+                self._wake.clear()
+                continue
+            seen, looked = stamp, now
             try:
                 self._cycle()
                 failures = 0
@@ -153,6 +168,17 @@ class Sender:
             self._wake.clear()
         self._delivery.close()
         self._claim.release()
+
+    @property
+    def _has_work(self) -> bool:
+        state = self.state
+        waits = state.count.waiting > 0 or not self._takings.empty()
+        return waits or state.problem is not None or not state.is_sending
+
+    def _stamp(self) -> tuple[tuple[int, int], ...]:
+        """Return what changes when the file does, its journal included."""
+        journal = self._path.with_name(f"{self._path.name}-wal")
+        return _stamp_of(self._path), _stamp_of(journal)
 
     def _cycle(self) -> None:
         follow(self._path)
