@@ -79,6 +79,11 @@ venv-dashboard:  ## the same, with what the dashboard needs
 	@$(python-found)
 	@$(INSTALL) dashboard
 
+.PHONY: venv-database
+venv-database:  ## the same, with what a history on a server needs
+	@$(python-found)
+	@$(INSTALL) database
+
 .PHONY: venv-cluster
 venv-cluster:  ## the same, with what Dask clusters and object stores need
 	@$(python-found)
@@ -97,6 +102,16 @@ browser:  ## Chromium for the tests of pages, by apt-get where root runs make; t
 	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 	        apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null; \
 	else echo "make: tests of pages in a browser are skipped: run \`apt install chromium\`"; fi
+
+.PHONY: postgres
+postgres:  ## PostgreSQL for the tests of a history on a server, by apt-get where root runs make; they are skipped without it
+	@if command -v postgres >/dev/null || ls /usr/lib/postgresql/*/bin/postgres >/dev/null 2>&1; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "Installing PostgreSQL: once, about a minute ..."; \
+	    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+	        apt-get install -y -qq --no-install-recommends postgresql >/dev/null; } \
+	    || echo "make: tests of a history on a server are skipped: \`apt-get install postgresql\` has failed"; \
+	else echo "make: tests of a history on a server are skipped: run \`apt install postgresql\`"; fi
 
 .PHONY: docs
 docs:  ## the documentation as pages, build/docs/index.html

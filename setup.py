@@ -60,6 +60,7 @@ setup(
         "bags": ["backports.zstd", "lz4", "rosbags>=0.11.9,<0.12"],
         "cluster": ["distributed>=2026.8"],  # Dask: folders on many machines
         "dashboard": ["nicegui>=3.18,<4"],
+        "database": ["psycopg[binary]>=3.2,<4"],
         "stores": ["s3fs", "universal_pathlib>=0.3.10,<0.4"],  # folders in object stores
         "tables": ["openpyxl", "pandas", "pyarrow"],  # Excel and Parquet
         # By pytest among them `colcon test` knows that there are tests.

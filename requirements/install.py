@@ -1,7 +1,8 @@
 """Make or reuse a virtual environment: `python3 requirements/install.py .venv [WORD]`.
 
 run.txt goes in, ros.txt where no ROS 2 Jazzy is sourced, the package itself as an editable install;
-with the word `dashboard` dashboard.txt too, with `cluster` also cluster.txt, with `test` also
+with the word `dashboard` dashboard.txt too, with `database` also database.txt, with `cluster` also
+cluster.txt, with `test` also
 test.txt, with `docs` also docs.txt;
 with `oldest` oldest.txt in place of them all.
 It is made anew when Python, ROS or one of the files changed. Where the versions of oldest.txt
@@ -21,6 +22,7 @@ NOT_HERE = 3
 MESSAGES = ("diagnostic_msgs", "sensor_msgs", "std_msgs", "std_srvs")
 ORDER = [
     ("dashboard", "the dashboard needs"),
+    ("database", "a history on a server needs"),
     ("cluster", "Dask clusters and object stores need"),
     ("test", "checks the package"),
     ("docs", "builds the documentation"),

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from hypothesis import settings
+from postgres import database, postgres  # noqa: F401 - fixtures
 from records import sine_record
 
 from valve_friction_ros.model import (
@@ -52,6 +53,7 @@ class Bench(NamedTuple):
 def ros_home(tmp_path_factory):
     """Nodes that keep files where nobody told them keep them here."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("VALVE_FRICTION_HISTORY_URL", raising=False)
         patch.setenv("ROS_HOME", str(tmp_path_factory.mktemp("ros_home")))
         yield
 

@@ -48,6 +48,8 @@ INNER = {
     "identification.robust": {"trust", "published"},
     "identification.refined": {"trust", "published"},
     "identification.signature": {"trust", "published", "steps"},
+    "history.server": set(),
+    "history.copying": {"server"},
     "fleet.sharing": set(),
     "records.bags": set(),
     "records.tables": set(),

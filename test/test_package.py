@@ -81,6 +81,7 @@ LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
     "yaml": ("python3-yaml", "PyYAML"),
 }
 BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
+DATABASE_LIBRARIES = {"psycopg"}
 DASHBOARD_LIBRARIES = {"fastapi", "nicegui", "starlette"}  # NiceGUI is built on the others
 
 CLUSTER_LIBRARIES = {"dask", "distributed"}
@@ -111,6 +112,8 @@ def test_manifest_names_every_message_package_and_library():
     for module, path in third_party_imports():
         if module in BAG_LIBRARIES:
             assert path.parent == PROJECT / NAME / "records" / "bags"
+        elif module in DATABASE_LIBRARIES:
+            assert path.parent == PROJECT / NAME / "history" / "server"
         elif module in DASHBOARD_LIBRARIES:
             assert path.is_relative_to(PROJECT / NAME / "dashboard")
         elif module in CLUSTER_LIBRARIES:
@@ -153,15 +156,15 @@ def test_setup_names_every_library():
     assert bags == set(BAG_LIBRARIES.values())
 
 
-def test_the_dashboard_is_an_extra():
+@pytest.mark.parametrize("extra", ["dashboard", "database"])
+def test_what_is_an_extra(extra):
     """Its limits hold for what is pinned, and a page says how it is installed."""
-    (needed,) = requirements("extras_require")["dashboard"]
-    name, limits = parted(needed)
+    (needed,) = requirements("extras_require")[extra]
+    name, limits = parted(needed.replace("[binary]", ""))
     lowest, highest = re.fullmatch(r">=(\d+\.\d+),<(\d+)", limits).groups()
-    pinned = pins("dashboard.txt")[name]
-    assert pinned.startswith(f"{lowest}.")
-    assert int(pinned.partition(".")[0]) == int(highest) - 1
-    for command in (f"pip install '{needed}'", "make venv-dashboard"):
+    pinned = [int(part) for part in pins(f"{extra}.txt")[name].split(".")[:2]]
+    assert [int(part) for part in lowest.split(".")] <= pinned < [int(highest), 0]
+    for command in (f"pip install '{needed}'", f"make venv-{extra}"):
         assert command in TEXT
 
 

@@ -1,6 +1,7 @@
 """The sub-commands of `valve_friction`, as their parsers declare them."""
 
 import argparse
+import re
 from collections.abc import Iterator
 from importlib import import_module
 
@@ -16,7 +17,7 @@ def command_names() -> dict[str, str]:
 
 def parser_of(command: str) -> argparse.ArgumentParser:
     """Return the parser of a sub-command."""
-    module = import_module(f"valve_friction_ros.commands.{command.replace('-', '_')}")
+    module = import_module(f"valve_friction_ros.commands.{re.sub('[- ]', '_', command)}")
     parser = argparse.ArgumentParser(prog=f"valve_friction {command}")
     module.declare(parser)
     return parser

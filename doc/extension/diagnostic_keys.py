@@ -29,6 +29,7 @@ _WRITERS = {
     "identifier/alarm_recorder.py": ("values",),
     "identifier/alerts.py": ("_mark",),
     "identifier/history_writer.py": ("values",),
+    "identifier/history_sending.py": ("values",),
     "identifier/schedule.py": ("values",),
     "identifier/valve_inputs.py": ("values",),
     "plumbing/readiness.py": ("values",),

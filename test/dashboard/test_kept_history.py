@@ -3,6 +3,7 @@
 import json
 import math
 import sqlite3
+import threading
 from contextlib import closing
 from zoneinfo import ZoneInfo
 
@@ -15,7 +16,17 @@ from valve_friction_ros.dashboard.kept import KeptHistory
 from valve_friction_ros.dashboard.status_keys import Quantity
 from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.health import Baseline
-from valve_friction_ros.history import HistoryFile, KeptBaseline, history_mark, keep_usage
+from valve_friction_ros.history import (
+    HistoryFile,
+    KeptBaseline,
+    copied,
+    history_mark,
+    keep_usage,
+)
+from valve_friction_ros.history.copying.copied_rows import rows_of, write_rows
+from valve_friction_ros.history.copying.parts import PARTS
+from valve_friction_ros.history.rows import valve_id
+from valve_friction_ros.history.schema import reading, server_connection
 from valve_friction_ros.usage import Usage, UsedDay
 
 NOW = START + 40 * DAY
@@ -51,6 +62,69 @@ def test_it_is_read_again_when_it_has_changed(file):
     assert len(kept.valve(VALVE.name).entries) == 32
     assert kept.spark(OTHER.name) is None  # without a baseline there is no ratio
     assert {one.name for one in kept.valves} == {VALVE.name, OTHER.name}
+
+
+def test_a_server_is_asked_and_not_waited_for(file, database, postgres, monkeypatch):
+    monkeypatch.setattr("valve_friction_ros.dashboard.kept._PAUSE", 0.0)
+
+    def refreshed(condition):
+        for _ in range(600):
+            kept.refresh()
+            if condition():
+                return True
+            threading.Event().wait(0.05)
+        return False
+
+    copied(file.path, database)
+    kept = KeptHistory(database)
+    assert not kept.refresh()
+    assert refreshed(lambda: kept.valves == (VALVE,))
+    before = kept.spark(VALVE.name)
+    assert before is not None
+    assert len(kept.valve(VALVE.name).entries) == 31
+    file.add(success(START + 32 * DAY, 300.0, baseline=BASELINE))
+    file.add(success(START + 32 * DAY, 100.0, valve=OTHER))
+    copied(file.path, database)
+    assert refreshed(lambda: OTHER in kept.valves)
+    assert kept.spark(VALVE.name) != before
+    assert len(kept.valve(VALVE.name).entries) == 32
+    postgres.stop()
+    try:
+        assert refreshed(lambda: kept.problem)
+        assert str(database) in kept.problem
+    finally:
+        postgres.start()
+    assert refreshed(lambda: kept.problem is None)
+    assert OTHER in kept.valves
+
+
+def test_a_row_that_is_written_before_and_arrives_after_another_is_seen(database, tmp_path):
+    """Of two who write to a server, the one that has begun first may end last."""
+    files = [HistoryFile(tmp_path / f"{k}.sqlite") for k in range(3)]
+    for k, file in enumerate(files):
+        valve = VALVE._replace(name=f"/fv_{k}/identifier")
+        file.add(success(START + k * DAY, 150.0, valve=valve, baseline=BASELINE))
+        file.add(success(START + k * DAY + 1, 150.0, valve=valve, baseline=BASELINE))
+    copied(files[0].path, database)
+    kept = KeptHistory(database)
+    kept._refresh()
+    with server_connection(database) as early, early.transaction():
+        with reading(files[1].path) as source:
+            (part, *_) = PARTS
+            rows = [(valve_id(early, VALVE), row) for row in rows_of(source, part, 1)]
+        write_rows(early, part, rows)
+        copied(files[2].path, database)
+        kept._refresh()
+        found = {name: len(some) for name, some in kept._ratios.items()}
+        assert found == {"/fv_0/identifier": 2, "/fv_2/identifier": 2}
+        kept._refresh()
+    kept._refresh()
+    found = {name: len(some) for name, some in kept._ratios.items()}
+    assert found == {"/fv_0/identifier": 2, "/fv_2/identifier": 2, VALVE.name: 2}
+    revision = kept.revision
+    kept._refresh()
+    assert kept.revision == revision
+    assert not kept._rows
 
 
 def test_another_file_at_the_path_is_read_from_its_beginning(file, tmp_path):

@@ -105,8 +105,11 @@ _OF_VERSION_5 = {
 
 
 def make_version_5(history):
-    """Take away what version 6 of the schema knows: the valve in service."""
+    """Take away what versions 6 and 7 of the schema know: the valve in service, and other files."""
     with closing(sqlite3.connect(history.path)) as connection:
+        for table in ("identification", "baseline"):
+            connection.execute(f"DROP INDEX {table}_uid")
+            connection.execute(f"ALTER TABLE {table} DROP COLUMN uid")
         tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
         newer = {name for (name,) in tables} - _OF_VERSION_5
         connection.executescript("".join(f"DROP TABLE {name};" for name in newer))

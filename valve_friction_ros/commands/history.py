@@ -7,6 +7,11 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
+from valve_friction_ros.commands.arguments.history_place import (
+    PLACE,
+    history_place,
+    usual_history,
+)
 from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
@@ -16,8 +21,9 @@ from valve_friction_ros.commands.output.usage_output import (
     write_usage,
 )
 from valve_friction_ros.history import (
+    URL_VARIABLE,
+    History,
     HistoryError,
-    HistoryFile,
     KeptValve,
     ValveHistory,
     read_usage,
@@ -67,11 +73,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "file",
-        type=Path,
+        type=history_place,
         nargs="?",
-        default=history_file(),
-        metavar="FILE.sqlite",
-        help="the identifiers' history_file (%(default)s)",
+        default=usual_history(),
+        metavar=PLACE,
+        help="the identifiers' history_file, or the server of their history_url "
+        f"(that of {URL_VARIABLE}, else {history_file()})",
     )
     parser.add_argument(
         "--valve",
@@ -115,7 +122,7 @@ def _usages(options: argparse.Namespace) -> list[tuple[KeptValve, ValveUsage]]:
     """Read the usage of the chosen valves, on the chosen days."""
     if options.plot is not None or options.fail_on is not None:
         raise ValueError("--usage: neither --plot nor --fail-on belong to it")
-    file, found = HistoryFile(options.file), []
+    file, found = History(options.file), []
     since, until = _span(options)
     for valve in chosen_valves(file.valves(), options.valve, "--valve"):
         usage = read_usage(file, valve.name)
@@ -151,7 +158,7 @@ def _span(options: argparse.Namespace) -> tuple[int, int]:
 
 def _histories(options: argparse.Namespace) -> tuple[ValveHistory, ...]:
     """Read the chosen valves within the chosen times."""
-    file = HistoryFile(options.file)
+    file = History(options.file)
     histories = valve_histories(
         file,
         chosen_valves(file.valves(), options.valve, "--valve"),

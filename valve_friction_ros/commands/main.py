@@ -5,6 +5,7 @@ import difflib
 import importlib
 import logging
 import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -32,6 +33,7 @@ SUB_COMMANDS = {
     "validate": "simulate a recording with an identified model",
     "call": "have a running identifier identify, set its baseline, save, report or clear",
     "history": "list, export and draw what the nodes have identified",
+    "history copy": "copy a history to another file, or to or from a server",
     "dashboard-account": "make an account of the dashboard, with the hash of a password",
     "reproduce-paper": "run the paper's programme and write a report",
     "demo": "tighten the packing of a simulated valve that is monitored",
@@ -57,7 +59,7 @@ class SubCommand(Protocol):
 
 def _imported(name: str) -> SubCommand:
     package, _, _ = __name__.rpartition(".")
-    return cast(SubCommand, importlib.import_module(f"{package}.{name.replace('-', '_')}"))
+    return cast(SubCommand, importlib.import_module(f"{package}.{re.sub('[- ]', '_', name)}"))
 
 
 def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
@@ -78,6 +80,9 @@ def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
     if chosen.command not in SUB_COMMANDS:
         (nearest,) = difflib.get_close_matches(chosen.command, SUB_COMMANDS, 1, cutoff=0.0)
         parser.error(f"there is no sub-command {chosen.command!r}; the nearest is {nearest!r}")
+    two_words = " ".join((chosen.command, *chosen.arguments[:1]))
+    if two_words in SUB_COMMANDS:
+        return two_words, chosen.arguments[1:]
     return chosen.command, chosen.arguments
 
 

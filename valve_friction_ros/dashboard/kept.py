@@ -7,11 +7,13 @@ from pathlib import Path
 
 from valve_friction_ros.dashboard.sparkline import Sparkline, sparkline
 from valve_friction_ros.history import (
+    History,
     HistoryError,
-    HistoryFile,
     HistoryMark,
+    HistoryServer,
     KeptRatio,
     KeptValve,
+    Place,
     ValveHistory,
     history_mark,
     ratios_after,
@@ -28,6 +30,8 @@ _DEPTH = 1100 * DAY
 """Time, ns, of a valve's history that is read at most."""
 _CACHED = 8
 """Valves whose histories are kept in memory."""
+_PAUSE = 2.0
+"""Time, s, between two questions to a server."""
 
 
 def _stamp_of(path: Path) -> tuple[int, int, int]:
@@ -43,16 +47,20 @@ class KeptHistory:
     """What the history file says of all valves and of each.
 
     `refresh` and `valve` read the file, so they are called in a thread of their own; all else
-    returns at once. What cannot be read is a `problem`, and what was read before stays.
+    returns at once. What cannot be read is a `problem`, and what was read before stays. A server
+    may keep one waiting: `refresh` asks it in another thread, and does not wait.
 
     Parameters
     ----------
-    path : Path or None
-        The file of the history; None: there is none.
+    place : Path or HistoryServer or None
+        The history; None: there is none.
     """
 
-    def __init__(self, path: Path | None) -> None:
-        self._file = None if path is None else HistoryFile(path)
+    def __init__(self, place: Place | None) -> None:
+        self._file = None if place is None else History(place)
+        self._asking: threading.Thread | None = None
+        self._asked = -_PAUSE
+        self._rows: set[int] = set()
         self._lock = threading.Lock()
         self._seen: tuple[object, ...] = ()
         self._mark: HistoryMark | None = None
@@ -64,18 +72,33 @@ class KeptHistory:
         self._sparks: dict[str, Sparkline | None] = {}
         self._histories: OrderedDict[str, ValveHistory | None] = OrderedDict()
         self.valves: tuple[KeptValve, ...] = ()
-        self.problem: str | None = None if path else "no history_file is named: nothing is kept"
+        self.problem: str | None = None if place else "no history_file is named: nothing is kept"
         self.revision = 0
 
     def _state(self) -> tuple[object, ...]:
         """Return what changes when the file does, its journal included."""
         if self._file is None:
             return ()
-        path = self._file.path
+        path = self._file.place
+        if isinstance(path, HistoryServer):
+            return (time.monotonic(),)
         return tuple(map(_stamp_of, (path, path.with_name(path.name + "-wal"))))
 
     def refresh(self) -> bool:
-        """Read what is new, if the file has changed; return whether it has."""
+        """Read what is new, if the file has changed; return whether it has.
+
+        A server is asked, and what it answers is there later.
+        """
+        if self._file is None or not isinstance(self._file.place, HistoryServer):
+            return self._refresh()
+        is_asking = self._asking is not None and self._asking.is_alive()
+        if not is_asking and time.monotonic() - self._asked >= _PAUSE:
+            self._asked = time.monotonic()
+            self._asking = threading.Thread(target=self._refresh, name="history", daemon=True)
+            self._asking.start()
+        return False
+
+    def _refresh(self) -> bool:
         with self._lock:
             state = self._state()
             if self._file is None or state == self._seen:
@@ -85,7 +108,9 @@ class KeptHistory:
             self._begin_anew_for_another_file()
             try:
                 mark = history_mark(self._file)
-                if mark == self._mark and self.problem is None:
+                if self._mark is not None and mark.database != self._mark.database:
+                    self._begin_anew()
+                if mark == self._mark and mark.settled and self.problem is None:
                     return False
                 self.valves = self._file.valves()
                 found = ratios_after(self._file, self._row, since)
@@ -94,9 +119,13 @@ class KeptHistory:
                 self.revision += is_new
                 return is_new
             self.problem, self._mark = None, mark
+            found = tuple(one for one in found if one.row not in self._rows)
             for one in found:
                 self._ratios[one.valve].append(one)
-                self._row = max(self._row, one.row)
+            self._rows.update(one.row for one in found)
+            if mark.settled:  # no row comes any more before the last one
+                self._row = max(self._row, mark.identification)
+                self._rows = {row for row in self._rows if row > self._row}
             for valve in {one.valve for one in found}:
                 ratios = list(self._ratios[valve])
                 self._sparks[valve] = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
@@ -106,14 +135,18 @@ class KeptHistory:
 
     def _begin_anew_for_another_file(self) -> None:
         """Forget what was read where another file stands at the path: its rows count from 1."""
-        if self._file is None:
+        if self._file is None or isinstance(self._file.place, HistoryServer):
             return
-        number = _stamp_of(self._file.path)[2]
+        number = _stamp_of(self._file.place)[2]
         if number and self._number and number != self._number:
-            self._mark, self._row = None, 0
-            self._ratios.clear()
-            self._sparks.clear()
+            self._begin_anew()
         self._number = number or self._number
+
+    def _begin_anew(self) -> None:
+        self._mark, self._row = None, 0
+        self._rows.clear()
+        self._ratios.clear()
+        self._sparks.clear()
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the picture of a valve's ratios, if there are some."""

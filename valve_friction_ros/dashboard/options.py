@@ -5,6 +5,7 @@ from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from valve_friction_ros.dashboard.access import Access
+from valve_friction_ros.history import Place
 
 __all__ = ["INSTALL", "DashboardOptions", "zone_of"]
 
@@ -32,7 +33,7 @@ class DashboardOptions:
         Address that it listens at, and whom it lets in.
     port : int
         Port that it listens at.
-    history_file : Path or None
+    history : Path or HistoryServer or None
         The history of the valves; None: there is none.
     reports, bags, alarms : Path or None
         The folders that it serves files from; None: there are none.
@@ -49,7 +50,7 @@ class DashboardOptions:
 
     access: Access = field(default_factory=Access)
     port: int = 8080
-    history_file: Path | None = None
+    history: Place | None = None
     reports: Path | None = None
     bags: Path | None = None
     alarms: Path | None = None

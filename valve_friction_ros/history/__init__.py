@@ -6,6 +6,7 @@ from valve_friction_ros.history.alarm_rows import (
     keep_alarm_recording,
 )
 from valve_friction_ros.history.answer_rows import keep_answers, read_answers
+from valve_friction_ros.history.copying import CopiedPart, Sender, SentState, copied, sender_of
 from valve_friction_ros.history.entry import (
     FrictionPoint,
     HistoryEntry,
@@ -24,11 +25,19 @@ from valve_friction_ros.history.evidence_rows import (
     read_reference,
 )
 from valve_friction_ros.history.file import HistoryError, HistoryFile
+from valve_friction_ros.history.reader import History
 from valve_friction_ros.history.recent_ratios import (
     HistoryMark,
     KeptRatio,
     history_mark,
     ratios_after,
+)
+from valve_friction_ros.history.schema import Place
+from valve_friction_ros.history.server.address import (
+    URL_VARIABLE,
+    HistoryServer,
+    is_url,
+    server_from,
 )
 from valve_friction_ros.history.told_level import keep_told_level, read_told_level
 from valve_friction_ros.history.trend import MONTH, Crossing, Limit, Trend, trend_of
@@ -44,20 +53,28 @@ from valve_friction_ros.history.valve_history import ValveHistory, current_trend
 __all__ = [
     "LIMIT_NAMES",
     "MONTH",
+    "URL_VARIABLE",
     "AlarmRecording",
+    "CopiedPart",
     "Crossing",
     "FrictionPoint",
+    "History",
     "HistoryEntry",
     "HistoryError",
     "HistoryFile",
     "HistoryMark",
+    "HistoryServer",
     "KeptBaseline",
     "KeptRatio",
     "KeptValve",
     "Limit",
+    "Place",
+    "Sender",
+    "SentState",
     "Trend",
     "ValveHistory",
     "alarm_recordings",
+    "copied",
     "current_trend",
     "drift_text",
     "end_of_trend",
@@ -65,6 +82,7 @@ __all__ = [
     "forget_moves_after",
     "friction_of",
     "history_mark",
+    "is_url",
     "keep_alarm_recording",
     "keep_answers",
     "keep_change",
@@ -80,6 +98,8 @@ __all__ = [
     "read_reference",
     "read_told_level",
     "read_usage",
+    "sender_of",
+    "server_from",
     "trend_of",
     "trended",
     "valve_histories",

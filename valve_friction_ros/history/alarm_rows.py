@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from valve_friction_ros.health.levels import Level
+from valve_friction_ros.history.connection import has_table
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.reader import History
 from valve_friction_ros.history.retention import forget_older
 from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
+from valve_friction_ros.history.schema import HistoryError, reading, writing
 
 __all__ = ["AlarmRecording", "alarm_recordings", "keep_alarm_recording"]
 
@@ -65,12 +67,12 @@ def keep_alarm_recording(
         forget_older(connection, "alarm_recording", "time_ns", row, one.time, days)
 
 
-def alarm_recordings(file: HistoryFile, valve: str) -> tuple[AlarmRecording, ...]:
+def alarm_recordings(file: History, valve: str) -> tuple[AlarmRecording, ...]:
     """Return the recordings of the valve of this name, oldest first; an older file holds none.
 
     Raises HistoryError if the file cannot be read.
     """
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
         if not has_table(connection, "alarm_recording"):
             return ()
         rows = connection.execute(
@@ -84,4 +86,4 @@ def alarm_recordings(file: HistoryFile, valve: str) -> tuple[AlarmRecording, ...
             for time, level, path, message in rows
         )
     except (TypeError, ValueError) as error:
-        raise HistoryError(f"{file.path}: a row holds no recording: {error}") from None
+        raise HistoryError(f"{file.place}: a row holds no recording: {error}") from None

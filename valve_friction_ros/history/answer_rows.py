@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
+from valve_friction_ros.history.connection import has_table
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.reader import History
 from valve_friction_ros.history.retention import forget_beyond, forget_older
 from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
+from valve_friction_ros.history.schema import HistoryError, reading, writing
 from valve_friction_ros.response import Move
 
 __all__ = ["forget_answers", "keep_answers", "read_answers"]
@@ -45,13 +47,13 @@ def keep_answers(
         forget_beyond(connection, "answer", "id", row, _MOST)
 
 
-def read_answers(file: HistoryFile, valve: str, travel: float | None = None) -> tuple[Move, ...]:
+def read_answers(file: History, valve: str, travel: float | None = None) -> tuple[Move, ...]:
     """Return the answers of the valve of this name, in the order in which they were kept.
 
     Only those with this travel, m, are returned; None: that of the last answer. Raises HistoryError
     if the file cannot be read; an older one holds none.
     """
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
         if not has_table(connection, "answer"):
             return ()
         rows = connection.execute(
@@ -65,7 +67,7 @@ def read_answers(file: HistoryFile, valve: str, travel: float | None = None) -> 
     try:
         return tuple(_move(row[1:]) for row in rows if row[0] == wanted)
     except (TypeError, ValueError) as error:
-        raise HistoryError(f"{file.path}: a row holds no answer: {error}") from None
+        raise HistoryError(f"{file.place}: a row holds no answer: {error}") from None
 
 
 def forget_answers(connection: sqlite3.Connection, row: int) -> None:

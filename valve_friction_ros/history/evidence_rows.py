@@ -8,11 +8,13 @@ from typing import Any
 
 from valve_friction_ros.evidence import MOST_MOVES, Change, Move
 from valve_friction_ros.health import Reference, SlidingFriction
+from valve_friction_ros.history.connection import has_table
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.reader import History
 from valve_friction_ros.history.retention import forget_beyond, forget_older
 from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
+from valve_friction_ros.history.schema import HistoryError, reading, writing
 from valve_friction_ros.model.valve import Valve
 
 __all__ = [
@@ -89,13 +91,13 @@ def _row(move: Move) -> tuple[float, ...]:
     )
 
 
-def read_moves(file: HistoryFile, valve: str, built: Valve) -> tuple[Move, ...]:
+def read_moves(file: History, valve: str, built: Valve) -> tuple[Move, ...]:
     """Return the moves of the valve of this name, oldest first.
 
     Only those are returned whose forces were computed with the area and the pressure reference in
     force. Raises HistoryError if the file cannot be read; one of an older version holds no moves.
     """
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
         if not has_table(connection, "move"):
             return ()
         rows = connection.execute(
@@ -106,7 +108,7 @@ def read_moves(file: HistoryFile, valve: str, built: Valve) -> tuple[Move, ...]:
     try:
         return tuple(_move(row) for row in rows)
     except (TypeError, ValueError) as error:
-        raise HistoryError(f"{file.path}: a row holds no move: {error}") from None
+        raise HistoryError(f"{file.place}: a row holds no move: {error}") from None
 
 
 def _move(row: Sequence[float | None]) -> Move:
@@ -134,7 +136,7 @@ def keep_reference(file: HistoryFile, valve: KeptValve, built: Valve, reference:
         )
 
 
-def read_reference(file: HistoryFile, valve: str, built: Valve) -> Reference | None:
+def read_reference(file: History, valve: str, built: Valve) -> Reference | None:
     """Return the first friction by the moves of the valve of this name, with this actuator.
 
     Raises HistoryError if the file cannot be read; one of an older version holds none.
@@ -161,7 +163,7 @@ def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: Chang
         )
 
 
-def read_change(file: HistoryFile, valve: str, built: Valve) -> Change | None:
+def read_change(file: History, valve: str, built: Valve) -> Change | None:
     """Return the last change that the moves of the valve of this name, with this actuator, showed.
 
     Raises HistoryError if the file cannot be read; an older one holds none.
@@ -172,10 +174,10 @@ def read_change(file: HistoryFile, valve: str, built: Valve) -> Change | None:
 
 
 def _row_of(
-    file: HistoryFile, table: str, columns: Sequence[str], valve: str, built: Valve
+    file: History, table: str, columns: Sequence[str], valve: str, built: Valve
 ) -> tuple[Any, ...] | None:
     """Return the row of a table for the valve of this name, with this actuator, if it is there."""
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
         if not has_table(connection, table):
             return None
         found: tuple[Any, ...] | None = connection.execute(

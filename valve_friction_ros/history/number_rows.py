@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
+from valve_friction_ros.history.connection import Connection, has_table
 from valve_friction_ros.identification import plain
 from valve_friction_ros.model.valve import Valve
 
@@ -39,18 +40,20 @@ def insert_numbers(
 
 
 def numbers_in(
-    connection: sqlite3.Connection, owner: str, first: int, last: int
+    connection: Connection, owner: str, valve: str, first: int, last: int
 ) -> dict[int, dict[str, Measured]]:
-    """Return the numbers of the rows `first` to `last` of the table `owner`, by row.
+    """Return the numbers of a valve's rows `first` to `last` of the table `owner`, by row.
 
     There are none in a file of an older version.
     """
     found: defaultdict[int, dict[str, Measured]] = defaultdict(dict)
     table = f"{owner}_number"
-    if connection.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (table,)).fetchone():
+    if has_table(connection, table):
         for row, name, value, width in connection.execute(
-            f"SELECT * FROM {table} WHERE {owner}_id BETWEEN ? AND ?",  # noqa: S608
-            (first, last),
+            f"SELECT {table}.* FROM {table} JOIN {owner} ON {owner}.id = {owner}_id "  # noqa: S608
+            "JOIN valve ON valve.id = valve_id "
+            f"WHERE valve.name = ? AND {owner}.id BETWEEN ? AND ?",
+            (valve, first, last),
         ):
             found[row][name] = Measured(value, width)
     return found
@@ -63,17 +66,13 @@ _FARTHEST = {
 """Ends of the stem's motion: the stop beside each, and the order that begins with the farthest."""
 
 
-def known_numbers_in(
-    connection: sqlite3.Connection, name: str, valve: Valve, since: int
-) -> KnownNumbers:
+def known_numbers_in(connection: Connection, name: str, valve: Valve, since: int) -> KnownNumbers:
     """Return what the identifications of a valve since a time (ns) say of it (`KnownNumbers`).
 
     Those made with other parameters of the valve do not count. There is nothing in a file of an
     older version.
     """
-    if not connection.execute(
-        "SELECT 1 FROM sqlite_master WHERE name = 'identification_number'"
-    ).fetchone():
+    if not has_table(connection, "identification_number"):
         return KnownNumbers()
     same = json.dumps(plain(vars(valve)), sort_keys=True)
     settings = [

@@ -2,6 +2,7 @@
 
 import math
 import sqlite3
+import uuid
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -15,6 +16,7 @@ from valve_friction_ros.health.comparison import Ratio
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.history.connection import Connection, has_table
 from valve_friction_ros.history.entry import (
     Fit,
     HistoryEntry,
@@ -39,6 +41,7 @@ __all__ = [
     "insert_entry",
     "kept_baseline_in",
     "record_in",
+    "settings_id",
     "valve_id",
 ]
 
@@ -62,18 +65,19 @@ _OF_REPLACED = tuple(f"replaced_{name}" for name in _OF_BASELINE)
 """Columns of a baseline: in its table, in that of the identifications, and as the one before."""
 
 
-def valve_id(connection: sqlite3.Connection, valve: KeptValve) -> int:
+def valve_id(connection: Connection, valve: KeptValve) -> int:
     """Return the row of a valve, with its tag updated."""
     connection.execute(
         "INSERT INTO valve (name, tag) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET "
-        "tag = excluded.tag WHERE tag != excluded.tag",
+        "tag = excluded.tag WHERE valve.tag != excluded.tag",
         valve,
     )
     (row,) = connection.execute("SELECT id FROM valve WHERE name = ?", valve[:1]).fetchone()
     return int(row)
 
 
-def _settings_id(connection: sqlite3.Connection, text: str) -> int:
+def settings_id(connection: Connection, text: str) -> int:
+    """Return the row of settings, which are added where they are new."""
     connection.execute("INSERT INTO settings (content) VALUES (?) ON CONFLICT DO NOTHING", (text,))
     (row,) = connection.execute("SELECT id FROM settings WHERE content = ?", (text,)).fetchone()
     return int(row)
@@ -94,6 +98,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
     identification = _insert(
         connection,
         "identification",
+        uid=uuid.uuid4().hex,
         valve_id=valve,
         time_ns=entry.time,
         begin_ns=begin,
@@ -117,7 +122,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
         warn_ratio=entry.limits.warn_ratio,
         error_ratio=entry.limits.error_ratio,
         low_ratio=entry.limits.low_ratio,
-        settings_id=_settings_id(connection, entry.settings),
+        settings_id=settings_id(connection, entry.settings),
         software_version=entry.version,
     )
     for one in entry.parameters.values():
@@ -142,6 +147,7 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
     row = _insert(
         connection,
         "baseline",
+        uid=uuid.uuid4().hex,
         valve_id=valve,
         time_ns=kept.time,
         since_ns=kept.since,
@@ -164,19 +170,15 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         )
 
 
-def record_in(connection: sqlite3.Connection, baseline: int) -> Recording | None:
+def record_in(connection: Connection, baseline: int) -> Recording | None:
     """Return the record of the baseline of this row, if any."""
-    has_records = connection.execute(
-        "SELECT 1 FROM sqlite_master WHERE name = 'baseline_record'"
+    if not has_table(connection, "baseline_record"):
+        return None
+    row = connection.execute(
+        "SELECT sample_period, driven_by, drive, position FROM baseline_record "
+        "WHERE baseline_id = ?",
+        (baseline,),
     ).fetchone()
-    row = (
-        has_records
-        and connection.execute(
-            "SELECT sample_period, driven_by, drive, position FROM baseline_record "
-            "WHERE baseline_id = ?",
-            (baseline,),
-        ).fetchone()
-    )
     if row is None:
         return None
     period, driven_by, *samples = row
@@ -193,7 +195,7 @@ def _baseline_columns(baseline: Baseline | None, names: Sequence[str]) -> dict[s
     return dict(zip(names, values, strict=True))
 
 
-def kept_baseline_in(row: sqlite3.Row) -> KeptBaseline:
+def kept_baseline_in(row: Any) -> KeptBaseline:
     """Return the baseline in a row of its table, without its record."""
     baseline, level = _baseline_in(row, _OF_BASELINE), _cell(row, "level")
     if baseline is None:
@@ -209,14 +211,14 @@ def kept_baseline_in(row: sqlite3.Row) -> KeptBaseline:
     )
 
 
-def _baseline_in(row: sqlite3.Row, names: Sequence[str]) -> Baseline | None:
+def _baseline_in(row: Any, names: Sequence[str]) -> Baseline | None:
     friction, width, *sliding = (_cell(row, name) for name in names)
     if friction is None and sliding[0] is None:
         return None
     return Baseline(friction, width, None if sliding[0] is None else SlidingFriction(*sliding))
 
 
-def _cell(row: sqlite3.Row, name: str) -> Any:
+def _cell(row: Any, name: str) -> Any:
     """Return a cell, or None where a file of an older version has no such column."""
     return row[name] if name in row.keys() else None  # noqa: SIM118 - a row is no mapping
 
@@ -231,7 +233,7 @@ def _place(parameter: Parameter) -> int:
     return names.index(parameter.name) if parameter.name in names else len(names)
 
 
-def _parameter(row: sqlite3.Row) -> Parameter:
+def _parameter(row: Any) -> Parameter:
     shown = Parameter(
         row["name"],
         _number(row["value"]),
@@ -248,7 +250,7 @@ def _parameter(row: sqlite3.Row) -> Parameter:
 
 
 def _entry(
-    row: sqlite3.Row, parameters: Sequence[Parameter], numbers: Mapping[str, Measured]
+    row: Any, parameters: Sequence[Parameter], numbers: Mapping[str, Measured]
 ) -> HistoryEntry:
     ratio = Ratio(
         _number(row["ratio"]),
@@ -282,7 +284,7 @@ def _entry(
 
 
 def frictions_in(
-    rows: Sequence[sqlite3.Row],
+    rows: Sequence[Any],
 ) -> Iterator[tuple[int, dict[str, Parameter], float]]:
     """Gather rows of parameters, each with its identification: time, parameters, sliding speed."""
     for _, some in groupby(rows, key=lambda row: row["identification_id"]):
@@ -292,10 +294,10 @@ def frictions_in(
 
 
 def entries_in(
-    connection: sqlite3.Connection, valves: Sequence[str] | None, since: int, until: int
+    connection: Connection, valves: Sequence[str] | None, since: int, until: int
 ) -> tuple[HistoryEntry, ...]:
     """Read identifications, oldest first; see `HistoryFile.entries`."""
-    names = [name for (name,) in connection.execute("SELECT name FROM valve")]
+    names = sorted(name for (name,) in connection.execute("SELECT name FROM valve"))
     wanted = names if valves is None else valves
     found = [
         entry for valve in wanted for entry in _entries_of_valve(connection, (valve, since, until))
@@ -304,7 +306,7 @@ def entries_in(
 
 
 def _entries_of_valve(
-    connection: sqlite3.Connection, choice: tuple[str, int, int]
+    connection: Connection, choice: tuple[str, int, int]
 ) -> Iterator[HistoryEntry]:
     parameters: defaultdict[int, list[Parameter]] = defaultdict(list)
     for row in connection.execute(
@@ -322,7 +324,7 @@ def _entries_of_valve(
         choice,
     ).fetchall()
     ids = [row["id"] for row in rows] or [0]
-    numbers = numbers_in(connection, "identification", min(ids), max(ids))
+    numbers = numbers_in(connection, "identification", choice[0], min(ids), max(ids))
     for row in rows:
         ordered = sorted(parameters[row["id"]], key=_place)
         yield _entry(row, ordered, numbers.get(row["id"], {}))

@@ -4,16 +4,26 @@ import contextlib
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from valve_friction_ros.history.connection import Connection, has_table
+from valve_friction_ros.history.errors import HistoryError
+from valve_friction_ros.history.server.address import INSTALL, HistoryServer
 from valve_friction_ros.history.tables import ADDED_LATE, SCHEMA_VERSION, statements_from
+
+if TYPE_CHECKING:
+    from valve_friction_ros.history.server.connection import ServerConnection
 
 __all__ = [
     "SCHEMA_VERSION",
     "HistoryError",
+    "Place",
     "has_table",
     "is_current",
     "reading",
+    "server_connection",
     "writing",
 ]
 
@@ -44,8 +54,8 @@ _REMEDIES = (
 )
 
 
-class HistoryError(Exception):
-    """The history cannot be read or written; the message names the file, the cause and a remedy."""
+Place = Path | HistoryServer
+"""Where a history is: a file, or a server."""
 
 
 def _explained(path: Path, error: sqlite3.Error) -> HistoryError:
@@ -92,12 +102,6 @@ def _is_new(path: Path, connection: sqlite3.Connection) -> bool:
             f"version knows {SCHEMA_VERSION}): update the package, or name another history_file"
         )
     return False
-
-
-def has_table(connection: sqlite3.Connection, name: str) -> bool:
-    """Return whether a file has a table, which one of an older version may lack."""
-    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?"
-    return connection.execute(query, (name,)).fetchone() is not None
 
 
 def _set_journal(connection: sqlite3.Connection) -> None:
@@ -162,12 +166,42 @@ def _reading_mode(path: Path) -> str:
     return "mode=ro"
 
 
+def _connections(server: HistoryServer) -> ModuleType:
+    """Load what speaks to servers, which a node without one does without."""
+    try:
+        from valve_friction_ros.history.server import connection  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise HistoryError(f"{server}: {INSTALL}") from None
+    return connection
+
+
 @contextlib.contextmanager
-def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open an existing history, to read one state of it.
+def server_connection(server: HistoryServer) -> Iterator["ServerConnection"]:
+    """Connect to a server to write; its tables are made if they are missing, or old.
+
+    Raises HistoryError if it cannot be reached, or the tables lack and the right to make them.
+    """
+    with _connections(server).connected(server) as connection:
+        yield connection
+
+
+@contextlib.contextmanager
+def reading(place: Place) -> Iterator[Connection]:
+    """Open an existing history, to read one state of it; rows have their columns' names.
 
     Raises HistoryError if it is missing, or cannot be read.
     """
+    if isinstance(place, HistoryServer):
+        with _connections(place).reading_server(place) as connection:
+            yield connection
+        return
+    with _reading_file(place) as file:
+        file.row_factory = sqlite3.Row
+        yield file
+
+
+@contextlib.contextmanager
+def _reading_file(path: Path) -> Iterator[sqlite3.Connection]:
     try:
         is_there = path.is_file()
     except OSError as error:
@@ -184,7 +218,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
 def is_current(path: Path) -> bool:
     """Return whether a file is a readable history of this version of the schema."""
     try:
-        with reading(path) as connection:
+        with _reading_file(path) as connection:
             return _pragma(connection, "user_version") == SCHEMA_VERSION
     except HistoryError:
         return False

@@ -9,12 +9,13 @@ from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, ANSWERS,
 
 __all__ = ["ADDED_LATE", "SCHEMA_VERSION", "statements_from"]
 
-SCHEMA_VERSION = 6
+SCHEMA_VERSION = 7
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
 and no half widths without calibration; version 3 has no records of baselines; version 4 does not
-say what a baseline replaced; version 5 knows nothing of the valve in service."""
+say what a baseline replaced; version 5 knows nothing of the valve in service; version 6 has no keys
+that hold on several machines, and is the last one that servers never had."""
 
 _SCHEMA = """
 CREATE TABLE valve (
@@ -156,6 +157,26 @@ _SERVICE = ";".join(
 )
 """The tables of the valve in service."""
 
+_SHARED = """
+ALTER TABLE identification ADD COLUMN uid TEXT;
+ALTER TABLE baseline ADD COLUMN uid TEXT;
+UPDATE identification SET uid = time_ns || '-' || id;
+UPDATE baseline SET uid = time_ns || '-' || id;
+CREATE UNIQUE INDEX identification_uid ON identification (valve_id, uid);
+CREATE UNIQUE INDEX baseline_uid ON baseline (valve_id, uid);
+CREATE TABLE mark (
+    name TEXT PRIMARY KEY,
+    value TEXT NOT NULL
+);
+CREATE TABLE keeper (
+    valve_id INTEGER PRIMARY KEY REFERENCES valve,
+    file TEXT NOT NULL
+);
+"""
+"""What several files and a server need to share rows: a key of each row that holds everywhere (of
+a row from before the same in each copy of its file), names of the database itself, and the file
+that keeps a valve now."""
+
 ADDED_LATE = (EVIDENCE_CHANGE, ANSWERS)
 """Tables that the first files of this version lack: each writing makes what is not there."""
 
@@ -185,12 +206,13 @@ _STEPS = {
     3: (_RECORD,),
     4: tuple(_REPLACED.split(";")),
     5: tuple(_SERVICE.split(";")),
+    6: tuple(_SHARED.split(";")),
 }
 """What leads from a version to the next one."""
 
 
 def statements_from(version: int) -> Iterator[str]:
     """Return the statements that lead from a version of the tables to the present; 0: no tables."""
-    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, _SERVICE)
+    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, _SERVICE, _SHARED)
     steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
     return filter(str.strip, chain(*steps) if version else ";".join(tables).split(";"))

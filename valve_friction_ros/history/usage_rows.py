@@ -4,13 +4,16 @@ import contextlib
 import json
 import sqlite3
 from collections.abc import Iterable
+from typing import Any
 
 from valve_friction_ros.history.answer_rows import forget_answers
+from valve_friction_ros.history.connection import has_table
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.evidence_rows import forget_evidence
 from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.reader import History
 from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import HistoryError, has_table, reading, writing
+from valve_friction_ros.history.schema import HistoryError, reading, writing
 from valve_friction_ros.usage import Usage, UsedDay, ValveUsage, total
 
 __all__ = ["keep_renewal", "keep_usage", "read_usage"]
@@ -92,15 +95,14 @@ def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
         forget_answers(connection, row)
 
 
-def read_usage(file: HistoryFile, valve: str) -> ValveUsage:
+def read_usage(file: History, valve: str) -> ValveUsage:
     """Return the usage of the valve of this name; an older file holds none.
 
     Raises HistoryError if the file cannot be read.
     """
-    with reading(file.path) as connection:
+    with reading(file.place) as connection:
         if not has_table(connection, "usage"):
             return ValveUsage()
-        connection.row_factory = sqlite3.Row
         rows = connection.execute(
             "SELECT usage.* FROM usage JOIN valve ON valve.id = valve_id WHERE name = ?", (valve,)
         ).fetchall()
@@ -112,10 +114,10 @@ def read_usage(file: HistoryFile, valve: str) -> ValveUsage:
     try:
         return ValveUsage.of(map(_day, rows), renewal or 0)
     except (TypeError, ValueError) as error:
-        raise HistoryError(f"{file.path}: a row holds no usage: {error}") from None
+        raise HistoryError(f"{file.place}: a row holds no usage: {error}") from None
 
 
-def _day(row: sqlite3.Row) -> UsedDay:
+def _day(row: Any) -> UsedDay:
     usage = Usage(
         row["distance"],
         row["reversals"],

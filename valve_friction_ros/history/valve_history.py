@@ -7,7 +7,7 @@ from valve_friction_ros.health.friction_monitor import MonitorSettings
 from valve_friction_ros.history.alarm_rows import AlarmRecording, alarm_recordings
 from valve_friction_ros.history.answer_rows import read_answers
 from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve
-from valve_friction_ros.history.file import HistoryFile
+from valve_friction_ros.history.reader import History
 from valve_friction_ros.history.trend import Trend, trend_of
 from valve_friction_ros.history.usage_rows import read_usage
 from valve_friction_ros.response import ResponseSummary, summarised
@@ -52,7 +52,7 @@ class ValveHistory:
 
 
 def valve_histories(
-    history: HistoryFile, valves: tuple[KeptValve, ...], since: int, until: int
+    history: History, valves: tuple[KeptValve, ...], since: int, until: int
 ) -> tuple[ValveHistory, ...]:
     """Read the histories of some valves from `since` to `until`, ns; empty histories are left out.
 
@@ -80,7 +80,7 @@ def valve_histories(
 
 
 def current_trend(
-    history: HistoryFile, valve: str, baseline: Baseline | None, settings: MonitorSettings
+    history: History, valve: str, baseline: Baseline | None, settings: MonitorSettings
 ) -> Trend | None:
     """Return the trend of a valve since its baseline was last set, by the method in force.
 

@@ -40,6 +40,7 @@ _IDENTIFIER_ONLY = (
     "save_folder",
     "report_folder",
     "history_file",
+    "history_url",
     "history_days",
     "number_topics",
     "command_unit",

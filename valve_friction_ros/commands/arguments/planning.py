@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from valve_friction_ros.commands.arguments.estimate_file import read_estimate
+from valve_friction_ros.commands.arguments.history_place import PLACE, history_place
 from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
-from valve_friction_ros.history import HistoryFile
+from valve_friction_ros.history import History
 from valve_friction_ros.identification import (
     CALIBRATION,
     TIMING_UNCERTAINTY,
@@ -68,10 +69,10 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
     )
     source.add_argument(
         "--history",
-        type=Path,
-        metavar="FILE.sqlite",
-        help="the last identification in the identifiers' history_file; of several valves that of "
-        "--valve-name",
+        type=history_place,
+        metavar=PLACE,
+        help="the last identification in the identifiers' history_file, or on their server; "
+        "of several valves that of --valve-name",
     )
     for name, unit in _KNOWN.items():
         known.add_argument(
@@ -158,7 +159,7 @@ def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
         return read_estimate(options.estimate)
     if options.history is None:
         return {}
-    file = HistoryFile(options.history)
+    file = History(options.history)
     names = None if options.valve_name is None else [options.valve_name]
     valves = chosen_valves(file.valves(), names, "--valve-name")
     if len(valves) != 1:

@@ -29,7 +29,7 @@ class ExitCode(IntEnum):
 
     DONE = 0
     PARTLY = 1
-    """Some recordings were refused, or the demonstration was off its tolerances."""
+    """Some recordings were refused, the demonstration was off its tolerances, or a copy differs."""
     REFUSED = 2
     """An option, a file or all recordings were refused, or a file could not be written."""
     ALARM = 3

@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         board = Board(
             options,
             node.plant,
-            KeptHistory(options.history_file),
+            KeptHistory(options.history),
             GuardedOperator(node.calls, visitors, log),
             node.signals,
             visitors,

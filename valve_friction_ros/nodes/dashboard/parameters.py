@@ -6,6 +6,7 @@ from typing import Any
 
 from valve_friction_ros.dashboard import DashboardOptions
 from valve_friction_ros.dashboard.access import Access, accounts_from
+from valve_friction_ros.history import server_from
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
 from valve_friction_ros.records.data_folder import data_folder, history_file
 
@@ -54,6 +55,13 @@ PARAMETERS = (
         "history_file",
         str(history_file()),
         "File of the identifiers' history, which is read [-]; empty: none",
+        read_only=True,
+    ),
+    ParameterSpec(
+        "history_url",
+        "",
+        "PostgreSQL server of the identifiers' histories, which is read in place of the file [-]; "
+        "empty: that of the environment, VALVE_FRICTION_HISTORY_URL. No password belongs here",
         read_only=True,
     ),
     ParameterSpec(
@@ -110,7 +118,7 @@ def options_from(values: Mapping[str, Any]) -> DashboardOptions:
             session_file=file("session_file"),
         ),
         port=values["port"],
-        history_file=file("history_file"),
+        history=server_from(values["history_url"]) or file("history_file"),
         reports=folder("report_folder", "reports").expanduser(),
         bags=folder("save_folder", "saved").expanduser(),
         alarms=folder("alarm_folder", "alarms").expanduser(),

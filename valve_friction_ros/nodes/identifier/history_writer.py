@@ -42,6 +42,7 @@ from valve_friction_ros.history import (
 )
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_guard import HistoryGuard
+from valve_friction_ros.nodes.identifier.history_sending import HistorySending
 from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.identifier.waiting_changes import WaitingChanges
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
@@ -78,6 +79,7 @@ class HistoryWriter:
         self._guard = None
         if self._file is not None:
             self._guard = HistoryGuard(self._file.path, self._valve.name)
+        self._sending = HistorySending(node, self.path, self._valve)
         self._writer = Worker("history", finishes=True)
         self._waiting = WaitingChanges()
         self._problem: str | None = None
@@ -116,11 +118,12 @@ class HistoryWriter:
         """Leave the history to another node."""
         if self._guard is not None:
             self._guard.release()
+        self._sending.close()
 
     def values(self) -> dict[str, str]:
-        """Return the value of the diagnostic that says that nothing is kept, if so."""
+        """Return what the diagnostics say: that nothing is kept, or how it goes to a server."""
         if self._file is not None:
-            return {}
+            return self._sending.values()
         lost = f"none, as {HISTORY_FILE.name} is empty: diagnosis and baseline end with this node"
         return {"history": lost}
 
@@ -155,6 +158,7 @@ class HistoryWriter:
     def prepare(self) -> HistoryEntry | None:
         """Make the file if it is not there, and read the valve's baseline in it, if any.
 
+        What another machine has kept of the valve since is taken from the server first.
         Returns the last success, if any.
         """
         name = self._valve.name
@@ -162,6 +166,7 @@ class HistoryWriter:
         if self._guard is not None:
             self._guard.ask()
             self._guard.note()
+        self._sending.take()
         self._baseline = last = self._tried(lambda file: file.baseline(name))
         if last is not None:
             self._former = self._tried(lambda file: file.baseline(name, until=last.time))
@@ -302,6 +307,7 @@ class HistoryWriter:
         """Take the outcomes of `keep_soon` that are there, and claim what was not granted."""
         if self._guard is not None:
             self._guard.ask()
+        self._sending.follow()
         while self._under_way and self._under_way[0].done():
             with self._failures_remembered():
                 self._under_way.pop(0).result()

@@ -31,6 +31,7 @@ __all__ = [
     "CHANGEABLE",
     "HISTORY_DAYS",
     "HISTORY_FILE",
+    "HISTORY_URL",
     "IDENTIFICATION_LIMIT",
     "INPUT_TIMEOUT",
     "NUMBER_TOPICS",
@@ -58,6 +59,13 @@ HISTORY_FILE = ParameterSpec(
     "history_file",
     str(history_file()),
     "File in which identifications and baselines are kept [-]; empty: nowhere",
+    read_only=True,
+)
+HISTORY_URL = ParameterSpec(
+    "history_url",
+    "",
+    "PostgreSQL server that the history_file is sent to, postgresql://user@host/database [-]; "
+    "empty: that of the environment, VALVE_FRICTION_HISTORY_URL, or none. No password belongs here",
     read_only=True,
 )
 HISTORY_DAYS = ParameterSpec(
@@ -190,7 +198,7 @@ CHANGEABLE = (
 )
 """Those that can be changed while the node runs."""
 
-PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, JOINT, NUMBER_TOPICS)
+PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, HISTORY_URL, JOINT, NUMBER_TOPICS)
 
 
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:

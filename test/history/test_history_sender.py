@@ -1,0 +1,388 @@
+"""What a file sends to a server: all of it, once, whatever ends in between."""
+
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+import time
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+from full_history import BUILT, all_of, answer, fill, service_move
+from histories import DAY, OTHER, START, VALVE, refused, success
+
+from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.history import (
+    History,
+    HistoryFile,
+    HistoryServer,
+    KeptBaseline,
+    copied,
+    forget_moves_after,
+    keep_answers,
+    keep_moves,
+    keep_renewal,
+    keep_told_level,
+    read_answers,
+    read_moves,
+    read_told_level,
+    sender_of,
+)
+from valve_friction_ros.history.copying.unsent import count_unsent, follow
+
+HERE = Path(__file__).parent
+WRITER = HERE / "sending_writer.py"
+_PATIENCE = 90.0
+
+
+def wait_until(condition, told=lambda: ""):
+    deadline = time.monotonic() + _PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, told()
+        time.sleep(0.02)
+
+
+@contextmanager
+def sending(file, server):
+    sender = sender_of(file.path, server)
+    try:
+        yield sender
+    finally:
+        sender.end()
+
+
+def wait_until_sent(sender):
+    """All that is written now has been sent, and the sender knows."""
+    wait_until(lambda: sender.state.is_sending, lambda: sender.state)
+    wait_until(lambda: not count_unsent(sender._path).waiting, lambda: sender.state)
+    wait_until(lambda: sender.state.problem is None, lambda: sender.state)
+
+
+@pytest.fixture
+def history(tmp_path):
+    return HistoryFile(tmp_path / "history.sqlite")
+
+
+def database_of(server):
+    return server.url.rpartition("/")[2]
+
+
+def test_what_was_there_and_what_comes_arrives(history, database):
+    fill(history)
+    with sending(history, database) as sender:
+        wait_until_sent(sender)
+        assert all_of(History(database)) == all_of(history)
+        fill(history, OTHER)
+        history.add(success(START + 9))
+        wait_until_sent(sender)
+        assert all_of(History(database)) == all_of(history)
+        assert sender.state.is_sending
+
+
+def test_what_changes_and_what_goes_follows(history, database):
+    fill(history)
+    with sending(history, database) as sender:
+        wait_until_sent(sender)
+        keep_told_level(history, VALVE, Level.OK)
+        forget_moves_after(history, VALVE, service_move(1).end)
+        keep_answers(history, VALVE, 0.02, [answer(1, 0.5)])
+        retagged = VALVE._replace(tag="FV-101-B")
+        keep_moves(history, retagged, BUILT, [service_move(1)])
+        wait_until_sent(sender)
+        server = History(database)
+        assert server.valves() == (retagged,)
+        assert read_told_level(server, VALVE.name) is Level.OK
+        assert len(read_moves(server, VALVE.name, BUILT)) == 2
+        assert read_answers(server, VALVE.name)[0].dead_time in (0.25, 0.5)
+        assert {one.dead_time for one in read_answers(server, VALVE.name)} >= {0.5}
+        keep_renewal(history, VALVE, START + DAY)
+        wait_until_sent(sender)
+        assert read_moves(server, VALVE.name, BUILT) == ()
+        assert read_answers(server, VALVE.name) == ()
+
+
+def test_the_server_keeps_what_the_file_forgets(history, database):
+    history.add(success())
+    with sending(history, database) as sender:
+        wait_until_sent(sender)
+        history.add(success(START + 9 * DAY), days=1.0)
+        wait_until_sent(sender)
+    assert [len(one.entries()) for one in (history, History(database))] == [1, 2]
+
+
+def test_a_file_without_a_server_keeps_no_list(history):
+    fill(history)
+    assert count_unsent(history.path) == (0, None, 0)
+
+
+def test_each_row_waits_once_since_it_first_changed(history):
+    history.prepare()
+    follow(history.path)
+    for level in (Level.OK, Level.WARN, Level.ERROR):
+        keep_told_level(history, VALVE, level)
+    history.add(success())
+    before = time.time()
+    count = count_unsent(history.path)
+    assert count.waiting == 3  # the valve, its level, an identification
+    assert before - 60 < count.since <= before
+    with closing(sqlite3.connect(history.path)) as connection:
+        connection.execute("UPDATE unsent SET since = 5 WHERE part = 'told_level'")
+        connection.commit()
+    keep_told_level(history, VALVE, Level.OK)
+    assert count_unsent(history.path) == (3, 5, 0)
+
+
+class TestFaults:
+    def test_a_server_that_is_away(self, history, database, postgres):
+        """Rows wait, the reason is told once, and they arrive when it returns."""
+        history.add(success())
+        postgres.stop()
+        try:
+            with sending(history, database) as sender:
+                wait_until(lambda: sender.state.problem)
+                assert "check that the server runs" in sender.state.problem
+                assert sender.state.count.waiting == 2
+                news = sender.news()
+                assert news.startswith(f"the history waits in {history.path}: {database}: ")
+                assert sender.news() is None
+                begun = time.monotonic()
+                told = sender.take(VALVE)
+                assert told == sender.state.problem
+                assert time.monotonic() - begun < 5.0
+                postgres.start()
+                wait_until_sent(sender)
+                assert sender.news() == f"{database}: the history is sent again"
+        finally:
+            postgres.start()
+        assert all_of(History(database)) == all_of(history)
+
+    def test_killed_and_paused_under_load(self, history, database, postgres):
+        """The one who writes is not held up, and each row arrives once."""
+        slowest, stop, written = [0.0], threading.Event(), []
+
+        def load():
+            while not stop.is_set():
+                begun = time.monotonic()
+                number = len(written)
+                entry = success if number % 3 else refused
+                history.add(entry(START + number))
+                written.append(number)
+                slowest.append(time.monotonic() - begun)
+                time.sleep(0.01)
+
+        history.prepare()
+        writer = threading.Thread(target=load)
+        writer.start()
+        try:
+            with sending(history, database) as sender:
+                wait_until(
+                    lambda: History(database).entries() if sender.state.is_sending else False
+                )
+                for _ in range(2):
+                    postgres.kill()
+                    count = len(written)
+                    wait_until(lambda: sender.state.problem and len(written) > count + 20)  # noqa: B023
+                    postgres.start()
+                    wait_until(lambda: sender.state.problem is None)
+                with postgres.paused():
+                    count = len(written)
+                    wait_until(lambda: len(written) > count + 50)
+                stop.set()
+                writer.join()
+                wait_until_sent(sender)
+        finally:
+            stop.set()
+            writer.join()
+        assert max(slowest) < 3.0  # the patience of a writer: it waits for no server
+        assert len(history.entries()) == len(written)
+        assert [repr(one) for one in History(database).entries()] == [
+            repr(one) for one in history.entries()
+        ]
+
+    def test_a_sender_that_is_killed(self, history, database):
+        """At any instant, also between the server's commit and what the file notes of it."""
+        written, folder, name = 0, history.path.parent, history.path.name
+        for run in range(3):
+            process = subprocess.Popen(
+                [sys.executable, WRITER, folder, database.url, "1000000", f"{name}={run}"],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            for _ in range(30 + 17 * run):
+                assert process.stdout.readline().strip()
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            process.stdout.close()
+            assert len(history.entries()) > written
+            written = len(history.entries())
+        with sending(history, database) as sender:
+            wait_until_sent(sender)
+        assert all_of(History(database)) == all_of(history)
+        assert all(one.is_same for one in copied(history.path, database))
+
+    def test_what_is_sent_twice_changes_nothing(self, history, database):
+        """As after a kill between the server's commit and what the file notes of it."""
+        fill(history)
+        with sending(history, database) as sender:
+            wait_until_sent(sender)
+        before = all_of(History(database))
+        with closing(sqlite3.connect(history.path)) as connection:
+            connection.execute("UPDATE mark SET value = 'another' WHERE name = 'sent_to'")
+            connection.commit()
+        history.add(success(START + 50))
+        with sending(history, database) as sender:
+            wait_until_sent(sender)
+        after = all_of(History(database))
+        assert len(History(database).entries()) == 4
+        assert after != before
+        assert after == all_of(history)
+
+    def test_a_server_without_its_rows_gets_all_of_them(self, history, database, postgres):
+        """As where it was made anew, or another one is named."""
+        fill(history)
+        with sending(history, database) as sender:
+            wait_until_sent(sender)
+        other = HistoryServer(postgres.url(postgres.database()))
+        history.add(success(START + 50))
+        with sending(history, other) as sender:
+            wait_until_sent(sender)
+        assert all_of(History(other)) == all_of(history)
+
+    def test_a_full_disk_of_the_server(self, history, database, postgres):
+        with sending(history, database) as sender:
+            history.add(success())
+            wait_until_sent(sender)
+            postgres.do(
+                database_of(database),
+                "CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RAISE "
+                "'could not extend file: No space left on device' USING ERRCODE = '53100'; END $$;"
+                "CREATE TRIGGER full_disk BEFORE INSERT ON parameter "
+                "EXECUTE FUNCTION full_disk();",
+            )
+            history.add(success(START + 1))
+            wait_until(lambda: sender.state.problem)
+            assert "make room on the disk of the server" in sender.state.problem
+            assert sender.state.count.refused == 0
+            assert len(History(database).entries()) == 1
+            postgres.do(database_of(database), "DROP TRIGGER full_disk ON parameter")
+            wait_until_sent(sender)
+        assert all_of(History(database)) == all_of(history)
+
+    def test_a_row_that_the_server_refuses_holds_up_no_other(self, history, database, postgres):
+        history.add(success())
+        with sending(history, database) as sender:
+            wait_until_sent(sender)
+            postgres.do(
+                database_of(database),
+                "ALTER TABLE identification ADD CHECK (method != 'best')",
+            )
+            for number, method in enumerate(("refined", "best", "robust"), 1):
+                history.add(success(START + number, method=method))
+            wait_until_sent(sender)
+            wait_until(lambda: sender.state.count.refused == 1)
+        assert [one.method for one in History(database).entries()] == [
+            "refined",
+            "refined",
+            "robust",
+        ]
+
+    def test_a_file_that_is_removed_begins_anew(self, history, database):
+        history.add(success())
+        with sending(history, database) as sender:
+            wait_until_sent(sender)
+            for path in history.path.parent.glob(f"{history.path.name}*"):
+                path.unlink()
+            wait_until(lambda: sender.state.problem is None and history.path.exists())
+            history.add(success(START + 1))
+            wait_until(lambda: len(History(database).entries()) == 2, lambda: sender.state)
+
+
+def test_ten_writers(tmp_path, database):
+    """Of ten machines, as it were, one valve among them twice: all arrive, once."""
+    number = 60
+    places = [f"{k}.sqlite={k % 9}" for k in range(10)]
+    subprocess.run(
+        [sys.executable, WRITER, tmp_path, database.url, str(number), *places],
+        stdout=subprocess.DEVNULL,
+        check=True,
+        timeout=110,
+    )
+    server = History(database)
+    assert len(server.valves()) == 9
+    counts = {valve.name: len(server.entries([valve.name])) for valve in server.valves()}
+    assert counts.pop("/fv_0/identifier") == 2 * number
+    assert set(counts.values()) == {number}
+    for k in range(10):
+        assert all(
+            one.rows == one.same
+            for one in copied(tmp_path / f"{k}.sqlite", database)
+            if one.table in ("identification", "baseline")
+        )
+
+
+class TestAnotherMachine:
+    def test_a_valve_is_taken_where_it_was_kept_elsewhere(self, history, database, tmp_path):
+        fill(history)
+        fill(history, OTHER)
+        with sending(history, database) as sender:
+            assert sender.take(VALVE) is None
+            wait_until_sent(sender)
+        second = HistoryFile(tmp_path / "second.sqlite")
+        with sending(second, database) as sender:
+            assert sender.take(VALVE) is None
+            assert second.valves() == (VALVE,)
+            assert all_of(second)[2:10] == all_of(history)[2:10]
+            assert count_unsent(second.path).waiting == 0
+            second.set_baseline(VALVE, KeptBaseline(Baseline(99.0), START + 90, START + 90))
+            keep_told_level(second, VALVE, Level.WARN)
+            wait_until_sent(sender)
+        with sending(history, database) as sender:  # and back
+            assert sender.take(VALVE) is None
+            assert history.baseline(VALVE.name).baseline.coulomb_friction == 99.0
+            assert read_told_level(history, VALVE.name) is Level.WARN
+            assert read_told_level(history, OTHER.name) is Level.ERROR
+            wait_until_sent(sender)
+        assert all_of(History(database)) == all_of(history)
+
+    def test_its_own_rows_are_not_taken_again(self, history, database):
+        history.add(success())
+        with sending(history, database) as sender:
+            assert sender.take(VALVE) is None
+            history.add(success(START + 9 * DAY), days=1.0)
+            assert sender.take(VALVE) is None
+            wait_until_sent(sender)
+        assert len(history.entries()) == 1
+
+    def test_a_server_that_stands_still_is_not_waited_for(self, history, database, postgres):
+        with sending(history, database) as sender:
+            assert sender.take(VALVE) is None
+            begun = time.monotonic()
+            with postgres.paused():
+                told = sender.take(OTHER)
+            assert str(database) in told
+            assert time.monotonic() - begun < 30.0
+
+    def test_two_processes_of_one_file_share_a_sender(self, history, database):
+        with sending(history, database) as sender:
+            wait_until(lambda: sender.state.is_sending)
+            code = (
+                "import sys, time; sys.path.insert(0, sys.argv[3])\n"
+                "from pathlib import Path\n"
+                "from valve_friction_ros.history import *\n"
+                "sender = sender_of(Path(sys.argv[1]), HistoryServer(sys.argv[2]))\n"
+                "print(sender.take(KeptValve('/fv_9/identifier', 'FV-9')))\n"
+                "print(sender.state.is_sending); sender.end()\n"
+            )
+            done = subprocess.run(
+                [sys.executable, "-c", code, history.path, database.url, str(HERE.parents[1])],
+                capture_output=True,
+                text=True,
+                check=True,
+                timeout=100,
+            )
+            assert done.stdout.split() == ["None", "False"]
+            assert sender_of(history.path, database) is sender
+            sender.end()
+            assert sender.state.is_sending

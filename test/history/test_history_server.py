@@ -1,0 +1,266 @@
+"""A history on a PostgreSQL server: read as a file is, its tables, its address."""
+
+import os
+import re
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from full_history import all_of, fill
+from histories import OTHER, START, VALVE, success
+
+from valve_friction_ros.history import (
+    History,
+    HistoryError,
+    HistoryFile,
+    HistoryServer,
+    copied,
+    history_mark,
+    ratios_after,
+    schema,
+    server_from,
+)
+from valve_friction_ros.history.schema import server_connection
+
+PROJECT = Path(__file__).resolve().parents[2]
+VERSION_7 = Path(__file__).with_name("server_of_version_7.sql")
+SECRET = "s3cret%2Fword"
+
+
+@pytest.fixture
+def history(tmp_path):
+    history = HistoryFile(tmp_path / "history.sqlite")
+    fill(history)
+    fill(history, OTHER)
+    return history
+
+
+def test_it_is_read_as_the_file_is(history, database):
+    copied(history.path, database)
+    assert all_of(History(database)) == all_of(history)
+    mark = history_mark(History(database))
+    assert mark[:4] == history_mark(history)[:4]
+    assert mark.settled
+    found, expected = (
+        sorted(one[1:] for one in ratios_after(each, 0, 0)) for each in (History(database), history)
+    )
+    assert len(found) == 2
+    assert found == expected
+
+
+def test_the_view_for_plain_sql_is_the_same(history, database, postgres):
+    copied(history.path, database)
+    query = (
+        "SELECT time, valve, tag, coulomb_friction, half_width, sliding_friction, ratio, message, "
+        "refusal FROM friction"
+    )
+    with schema.writing(history.path) as file:
+        expected = sorted(file.execute(query), key=repr)
+    assert len(expected) == 6
+    assert sorted(postgres.do(database_of(database), query), key=repr) == expected
+
+
+def database_of(server):
+    return server.url.rpartition("/")[2].partition("?")[0]
+
+
+def written(dump, folder):
+    """Make a file of the SQL that a version has dumped."""
+    path = folder / dump.with_suffix(".sqlite").name
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(dump.read_text())
+    return path
+
+
+def test_there_is_nothing_before_the_first_row(database):
+    with pytest.raises(HistoryError, match="holds no history: `valve_friction history copy`"):
+        History(database).valves()
+    with server_connection(database):
+        pass
+    assert History(database).valves() == ()
+
+
+def test_columns_of_both_engines_are_the_same(history, database, postgres):
+    with server_connection(database):
+        pass
+    found = postgres.do(
+        database_of(database),
+        "SELECT table_name, column_name FROM information_schema.columns "
+        "WHERE table_schema = 'public' ORDER BY table_name, ordinal_position",
+    )
+    with schema.writing(history.path) as file:
+        tables = sorted(
+            name
+            for (name,) in file.execute(
+                "SELECT name FROM sqlite_master WHERE type IN ('table', 'view')"
+            )
+        )
+        expected = [
+            (table, row[1])
+            for table in tables
+            for row in file.execute(f"PRAGMA table_info({table})")
+        ]
+    assert found == expected
+
+
+class TestVersions:
+    """Tables of an older version are changed, those of a newer one are left alone."""
+
+    def test_a_server_of_version_7_is_read_and_extended(self, tmp_path, database, postgres):
+        """It holds what the file of that version holds."""
+        postgres.do(database_of(database), VERSION_7.read_text())
+        file = HistoryFile(written(VERSION_7.with_name("history_of_version_7.sql"), tmp_path))
+        assert all_of(History(database)) == all_of(file)
+        assert [one.written for one in copied(file.path, database)] == [0] * 10
+        file.add(success(START + 9))
+        assert sum(one.written for one in copied(file.path, database)) == 1
+        assert all_of(History(database)) == all_of(file)
+
+    def test_a_step_is_done_once_by_many(self, history, database, monkeypatch):
+        copied(history.path, database)
+        before = all_of(History(database))
+        from valve_friction_ros.history import tables
+        from valve_friction_ros.history.server import tables as of_server
+
+        version = schema.SCHEMA_VERSION + 1
+        monkeypatch.setattr(tables, "SCHEMA_VERSION", version)
+        monkeypatch.setattr(of_server, "SCHEMA_VERSION", version)
+        step = ("ALTER TABLE valve ADD COLUMN remark REAL",)
+        monkeypatch.setattr(tables, "_STEPS", {**tables._STEPS, schema.SCHEMA_VERSION: step})
+        for _ in range(2):
+            with server_connection(database) as connection:
+                found = connection.execute("SELECT remark FROM valve").fetchall()
+        assert len(found) == 2
+        assert all_of(History(database)) == before
+
+    def test_a_step_that_fails_changes_nothing(self, history, database, monkeypatch):
+        copied(history.path, database)
+        before = all_of(History(database))
+        from valve_friction_ros.history import tables
+        from valve_friction_ros.history.server import tables as of_server
+
+        with monkeypatch.context() as patch:
+            patch.setattr(tables, "SCHEMA_VERSION", schema.SCHEMA_VERSION + 1)
+            patch.setattr(of_server, "SCHEMA_VERSION", schema.SCHEMA_VERSION + 1)
+            steps = ("DROP VIEW friction", "ALTER TABLE nowhere ADD COLUMN remark REAL")
+            patch.setattr(tables, "_STEPS", {**tables._STEPS, schema.SCHEMA_VERSION: steps})
+            with pytest.raises(HistoryError, match="nowhere"), server_connection(database):
+                pass
+        assert all_of(History(database)) == before
+        with server_connection(database) as connection:
+            assert connection.execute("SELECT count(*) FROM friction").fetchone()[0] == 6
+
+    def test_a_newer_one_is_refused(self, history, database, postgres):
+        copied(history.path, database)
+        postgres.do(database_of(database), "UPDATE mark SET value = '99' WHERE name = 'schema'")
+        with pytest.raises(HistoryError, match="newer version of this package"):
+            History(database).valves()
+        with pytest.raises(HistoryError, match="newer version of this package"):
+            copied(history.path, database)
+
+
+class TestTrouble:
+    """One line: what, where, what to do; and never a password."""
+
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            (
+                lambda url: url.replace("owner@", f"nobody:{SECRET}@"),
+                "password",
+            ),
+            (lambda url: re.sub(":[0-9]+/", ":1/", url), "check that the server runs"),
+            (lambda url: url + "x", "make it, or name another database"),
+            (lambda url: url + "?sslmode=require", "check sslmode"),
+            (lambda url: url + f"?nonsense=1&password={SECRET}", "cannot read"),
+        ],
+    )
+    def test_what_hinders(self, database, change, words):
+        server = HistoryServer(change(database.url))
+        with pytest.raises(HistoryError, match=words) as error:
+            History(server).valves()
+        message = str(error.value)
+        assert message.startswith(f"{server}: ")
+        assert "\n" not in message
+        for secret in ("s3cret", "word@"):
+            assert secret not in message + repr(server) + str(server)
+
+    def test_addresses(self):
+        server = HistoryServer("postgresql://me:s3cret@host:1/db?sslmode=require&password=o%20ther")
+        assert str(server) == "postgresql://me@host:1/db"
+        assert "s3cret" not in repr(server)
+        told = server.without_secrets("no s3cret,\nno o%20ther, no o ther")
+        assert told == "no ***, no ***, no ***"
+        assert str(HistoryServer("postgres://a,b/db")) == "postgresql://a,b/db"
+        for wrong in ("host/db", "mysql://host/db", "postgresql://a b", "postgresql://[::1/db"):
+            with pytest.raises(ValueError, match="address of") as error:
+                HistoryServer(wrong)
+            assert wrong not in str(error.value)
+
+    def test_parameter_and_environment(self):
+        name = "VALVE_FRICTION_HISTORY_URL"
+        outer = {name: "postgresql://me:s3cret@host/outer"}
+        assert server_from("", environment={}) is None
+        assert str(server_from("", environment=outer)) == "postgresql://me@host/outer"
+        inner = "postgresql://me@host/inner"
+        assert server_from(inner, environment=outer) == HistoryServer(inner)
+        with pytest.raises(ValueError, match=r"history_url holds a password.*pgpass") as error:
+            server_from(outer[name], environment={})
+        assert "s3cret" not in str(error.value)
+        with pytest.raises(ValueError, match=f"{name}: no address"):
+            server_from("", environment={name: "s3cret"})
+
+    def test_a_server_that_stands_still_is_left(self, history, database, postgres):
+        from valve_friction_ros.history.server.connection import ServerConnection
+
+        copied(history.path, database)
+        connection = ServerConnection(database, patience=1.0)
+        with postgres.paused(), pytest.raises(HistoryError, match="no answer for 1 s"):  # noqa: SIM117
+            with connection.transaction():
+                pass
+        assert History(database).valves() == history.valves()
+
+    def test_a_connection_that_has_ended_is_made_anew(self, history, database, postgres):
+        copied(history.path, database)
+        assert History(database).valves() == history.valves()
+        postgres.stop()
+        with pytest.raises(HistoryError):
+            History(database).valves()
+        postgres.start()
+        assert History(database).valves() == history.valves()
+
+    def test_texts_of_any_kind_arrive(self, history, database):
+        entry = success(START + 9, warnings=("a\0b '; DROP TABLE valve; -- %s ? 😀",))
+        history.add(entry)
+        assert all(one.is_same for one in copied(history.path, database))
+        last = History(database).entries([VALVE.name])[-1]
+        assert last.warnings == ("a␀b '; DROP TABLE valve; -- %s ? 😀",)
+
+
+def test_without_a_server_its_library_is_not_loaded(tmp_path):
+    code = (
+        "import sys, valve_friction_ros.history as h; from pathlib import Path; "
+        f"h.HistoryFile(Path({str(tmp_path / 'h.sqlite')!r})).prepare(); "
+        "print('psycopg' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(PROJECT)},
+    )
+    assert done.stdout == "False\n"
+
+
+def test_without_its_library_one_line_says_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "psycopg", None)
+    monkeypatch.delitem(sys.modules, "valve_friction_ros.history.server.connection", raising=False)
+    monkeypatch.delattr("valve_friction_ros.history.server.connection", raising=False)
+    with pytest.raises(HistoryError, match=r"^postgresql://h/d: psycopg is missing: pip install"):
+        History(HistoryServer("postgresql://h/d")).valves()

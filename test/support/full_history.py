@@ -1,0 +1,106 @@
+"""A history with rows in each of its tables, as a plant of two valves would have them."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+from histories import DAY, OTHER, SECOND, START, VALVE, refused, success
+
+from valve_friction_ros.evidence import Change
+from valve_friction_ros.evidence import Move as ServiceMove
+from valve_friction_ros.health import Baseline, Level, Measured, Reference, SlidingFriction
+from valve_friction_ros.history import (
+    AlarmRecording,
+    KeptBaseline,
+    alarm_recordings,
+    keep_alarm_recording,
+    keep_answers,
+    keep_change,
+    keep_moves,
+    keep_reference,
+    keep_renewal,
+    keep_told_level,
+    keep_usage,
+    read_answers,
+    read_change,
+    read_moves,
+    read_reference,
+    read_told_level,
+    read_usage,
+    valve_histories,
+)
+from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
+from valve_friction_ros.response import Move
+from valve_friction_ros.usage import BINS, Usage, UsedDay
+
+BUILT = Valve(diaphragm_area=0.0445, pressure_reference=41_740.0, travel=0.03)
+SLIDING = SlidingFriction(205.5, 3.25, 9.5e-3)
+NUMBERS = {"spring_constant": Measured(2.05e5, 40.0), "lag": Measured(-0.002, 0.003)}
+
+
+def answer(place, dead_time=0.25):
+    flags = {one.name: True for one in fields(Move) if one.type in (bool, "bool")}
+    numbers = {one.name: 0.125 for one in fields(Move) if one.name not in flags}
+    numbers |= {"stamp": START + place * SECOND, "dead_time": dead_time}
+    return Move(**numbers, **flags)
+
+
+def service_move(number):
+    begin = START + 12 * SECOND * number
+    onset = (500.0, 1e-3, 20.0) if number % 2 else ()
+    return ServiceMove(begin, begin + SECOND, 1e-3, 2e-3, 500.0 + number, 10.0, 1e-3, *onset)
+
+
+def usage(distance):
+    return Usage(distance, 4, 2, (3600 * 10**9, *[0] * (BINS - 1)))
+
+
+def fill(history, valve=VALVE):
+    """Write what an identifier may write of a valve, into each table."""
+    drive = 1e5 + 100.0 * np.arange(100)
+    record = Recording(0.01, drive, drive / 1e8)
+    baseline = Baseline(140.0, 2.0, SLIDING, numbers=NUMBERS)
+    keep_renewal(history, valve, START - DAY)
+    for kept in (
+        KeptBaseline(Baseline(150.0), START, START),
+        KeptBaseline(baseline, START + 3, START, record, Baseline(150.0), level=Level.WARN),
+    ):
+        history.set_baseline(valve, kept)
+    for entry in (
+        success(START, 150.123456789, 1 / 3, valve=valve, warnings=("one", "two")),
+        success(START + 2, valve=valve, baseline=baseline, sliding=SLIDING, numbers=NUMBERS),
+        refused(START + 4, valve=valve),
+    ):
+        history.add(entry)
+    for run, day in (("run 1", 0), ("run 2", 0), ("run 2", 1)):
+        keep_usage(history, valve, run, [UsedDay(START // DAY + day, START - DAY, usage(1.5))])
+    one = AlarmRecording(START, Level.ERROR, Path("/alarms/1"), "excess friction")
+    keep_alarm_recording(history, valve, one)
+    keep_told_level(history, valve, Level.ERROR)
+    keep_moves(history, valve, BUILT, [*map(service_move, range(4))])
+    keep_reference(history, valve, BUILT, Reference(SLIDING, START))
+    keep_change(history, valve, BUILT, Change(START, START + DAY, 1.5, 1.4, 1.6))
+    keep_answers(history, valve, 0.02, [answer(1), answer(2, float("nan")), answer(0)])
+
+
+def all_of(history):
+    """Everything that is read of a history, as text: nan is not itself."""
+    found = [history.valves(), history.entries()]
+    for valve in (VALVE, OTHER):
+        name = valve.name
+        found += [
+            history.baseline(name),
+            history.baselines(name),
+            history.last_success(name) if history.entries([name]) else None,
+            history.known_numbers(name, BENCH_VALVE, 0),
+            history.points(name, "refined"),
+            read_usage(history, name),
+            alarm_recordings(history, name),
+            read_told_level(history, name),
+            read_moves(history, name, BUILT),
+            read_reference(history, name, BUILT),
+            read_change(history, name, BUILT),
+            read_answers(history, name),
+            valve_histories(history, [valve], 0, 2**62),
+        ]
+    return [repr(one) for one in found]
