@@ -1,0 +1,139 @@
+"""Process that publishes the topics of many valves, made from what one identifier has published.
+
+The messages are serialised beforehand, so that the process itself takes little of the machine. Each
+second one valve is identified anew.
+"""
+
+import argparse
+import random
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from datetime import datetime, timezone
+from pathlib import Path
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.signals import SignalHandlerOptions
+
+from valve_friction_ros.nodes.plumbing.qos import LATCHED
+
+__all__ = ["identifier_of", "main", "tag_of"]
+
+_BEATS = 4
+"""Seconds after which the counters of a valve begin again."""
+_COUNTERS = ("reversals", "breakaways", "buffered_samples")
+_KINDS = (
+    (0, "", 1.0, "friction normal"),
+    (0, "", 1.03, "friction normal"),
+    (0, "", 0.98, "friction normal"),
+    (1, "M", 1.44, "friction has grown"),
+    (2, "F", 2.31, "excessive friction"),
+    (2, "S", 0.41, "friction has collapsed"),
+)
+"""Level, letter of NE 107, ratio and first words of the diagnosis."""
+
+
+def identifier_of(index: int) -> str:
+    """Return the name of the identifier of a valve."""
+    return f"/area_{1 + index // 40}/fv_{1001 + index}/identifier"
+
+
+def tag_of(index: int) -> str:
+    """Return the tag of a valve."""
+    return f"{10 + index // 40}-FV-{1001 + index}"
+
+
+def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticStatus:
+    """Return what the identifier of a valve says at a beat: the template, with its own numbers."""
+    chance = random.Random(1000 * index + (beat if beat >= _BEATS else 0))  # noqa: S311
+    level, letter, ratio, words = _KINDS[index % len(_KINDS)]
+    ratio *= chance.uniform(0.97, 1.03)
+    made = time.time() - (0.0 if beat >= _BEATS else chance.uniform(60, 86_400))
+    own = {
+        "NE 107": letter,
+        "estimate_time": f"{datetime.fromtimestamp(made, timezone.utc):%Y-%m-%dT%H:%M:%S.%fZ}",
+        "friction_ratio": f"{ratio:.9g}",
+        "friction_ratio low": f"{ratio * 0.95:.9g}",
+        "friction_ratio high": f"{ratio * 1.05:.9g}",
+    }
+    status = deepcopy(template)
+    status.name = f"{identifier_of(index)}: friction"
+    status.hardware_id = tag_of(index)
+    status.level = bytes([level])
+    status.message = f"{words}: {ratio:.2f} times its baseline; {template.message}"
+    for value in status.values:
+        if value.key in own:
+            value.value = own.pop(value.key)
+        elif value.key.partition(" ")[0] in _COUNTERS:
+            value.value = str(15_000 + beat % _BEATS)
+    status.values += [KeyValue(key=key, value=value) for key, value in own.items()]
+    return status
+
+
+def _diagnostics(status: DiagnosticStatus) -> bytes:
+    raw: bytes = serialize_message(DiagnosticArray(status=[status]))
+    return raw
+
+
+def _due(count: int, rate: float) -> Iterator[tuple[int, int]]:
+    """Yield beat and index of the valve that is due, evenly spread over each beat."""
+    begin, beat = time.monotonic(), 0
+    while True:
+        for index in range(count):
+            due = begin + (beat + index / count) / rate
+            if (wait := due - time.monotonic()) > 0.005:
+                time.sleep(wait)
+            yield beat, index
+        beat += 1
+
+
+def _publish(node: Node, template: DiagnosticStatus, count: int, rate: float) -> Iterator[None]:
+    diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1000)
+    estimates = [
+        node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)
+        for index in range(count)
+    ]
+    known = [
+        [status_of(template, index, beat) for beat in range(_BEATS)] for index in range(count)
+    ]
+    arrays = [[_diagnostics(status) for status in beats] for beats in known]
+    latched = [[serialize_message(status) for status in beats] for beats in known]
+    del known
+    print("publishing", flush=True)  # noqa: T201 - who has started it waits for this
+    for beat, index in _due(count, rate):
+        if index == beat % count and beat >= _BEATS:
+            anew = status_of(template, index, beat)
+            arrays[index] = [_diagnostics(anew)] * _BEATS
+            latched[index] = [serialize_message(anew)] * _BEATS
+        diagnostics.publish(arrays[index][beat % _BEATS])
+        estimates[index].publish(latched[index][beat % _BEATS])
+        yield
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Publish until SIGTERM."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("template", type=Path, help="a serialised DiagnosticStatus")
+    parser.add_argument("--valves", type=int, default=500)
+    parser.add_argument("--rate", type=float, default=1.0, help="Hz")
+    options = parser.parse_args(arguments)
+    stopped: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("plant", enable_rosout=False, start_parameter_services=False)
+    template = deserialize_message(options.template.read_bytes(), DiagnosticStatus)
+    for _ in _publish(node, template, options.valves, options.rate):
+        if stopped:
+            break
+    node.destroy_node()
+    rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
