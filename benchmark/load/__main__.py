@@ -64,9 +64,7 @@ def _measured(options: argparse.Namespace, console: Console) -> dict[str, list[R
         if "bounds" in options.parts:
             plant = stage.plant(1.0)
             stage.dashboard()
-            found["bounds"] = list(
-                bound_rows(stage, launch, options.seconds, options.repeats, say)
-            )
+            found["bounds"] = list(bound_rows(stage, launch, options.seconds, options.repeats, say))
             plant.end()
             stage.dashboards[-1].end()
         if "afternoon" in options.parts:

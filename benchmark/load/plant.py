@@ -98,9 +98,7 @@ def _publish(node: Node, template: DiagnosticStatus, count: int, rate: float) ->
         node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)
         for index in range(count)
     ]
-    known = [
-        [status_of(template, index, beat) for beat in range(_BEATS)] for index in range(count)
-    ]
+    known = [[status_of(template, index, beat) for beat in range(_BEATS)] for index in range(count)]
     arrays = [[_diagnostics(status) for status in beats] for beats in known]
     latched = [[serialize_message(status) for status in beats] for beats in known]
     del known

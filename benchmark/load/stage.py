@@ -68,9 +68,7 @@ class Stage:
 
     def dashboard(self) -> Process:
         """Start the dashboard, and wait until it can be opened."""
-        made = self._node(
-            "dashboard", "", {"port": self.port, "history_file": self._history}
-        )
+        made = self._node("dashboard", "", {"port": self.port, "history_file": self._history})
         made.wait_for("ready: open")
         self.dashboards.append(made)
         return made
