@@ -7,7 +7,8 @@ import pytest
 from simulated_plant import hear, values_of_valve
 
 from valve_friction_ros.dashboard import Plant, Status
-from valve_friction_ros.dashboard.plant import MOST_VALVES, Heard
+from valve_friction_ros.dashboard.heard.plant import MOST_VALVES, Heard
+from valve_friction_ros.dashboard.heard.valve_view import Interval
 from valve_friction_ros.dashboard.plant_rows import (
     RowFeed,
     interval_text,
@@ -18,7 +19,6 @@ from valve_friction_ros.dashboard.plant_rows import (
 )
 from valve_friction_ros.dashboard.selection import SORTS
 from valve_friction_ros.dashboard.sparkline import sparkline
-from valve_friction_ros.dashboard.valve_view import Interval
 
 DAY = 86_400_000_000_000
 

@@ -59,6 +59,7 @@ def values_of_valve(index, beat=0, tag=None):
     values |= {
         "sliding_speed [m/s]": "0.0042",
         "dead_band [%]": f"{dead:.9g}",
+        "dead_band half width [%]": f"{dead * half / now:.9g}",
         "fit [%]": "98.7",
         "rms [µm]": "31.2",
         "method": "robust",

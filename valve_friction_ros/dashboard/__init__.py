@@ -4,10 +4,11 @@ The files here hold what is shown, and import no library of pages; ``pages/`` dr
 """
 
 from valve_friction_ros.dashboard.graph import Answer, Operator, Signals, Visitors
+from valve_friction_ros.dashboard.heard.plant import Plant
+from valve_friction_ros.dashboard.heard.status_reading import view_of
+from valve_friction_ros.dashboard.heard.valve_view import Status, ValveView
 from valve_friction_ros.dashboard.options import DashboardOptions
-from valve_friction_ros.dashboard.plant import Plant
 from valve_friction_ros.dashboard.selection import Selection, selected
-from valve_friction_ros.dashboard.valve_view import Status, ValveView, view_of
 
 __all__ = [
     "Answer",

@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.dashboard import Plant
+from valve_friction_ros.dashboard.heard.valve_view import Sources
 from valve_friction_ros.dashboard.options import INSTALL
-from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_from
 from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
 from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls

@@ -6,14 +6,13 @@ import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
-from valve_friction_ros.dashboard.valve_view import (
+from valve_friction_ros.dashboard.heard.status_reading import (
     Essence,
-    Status,
-    ValveView,
     essence_of,
     identifier_in,
     view_of,
 )
+from valve_friction_ros.dashboard.heard.valve_view import Status, ValveView
 
 __all__ = ["MOST_VALVES", "Heard", "Plant"]
 
