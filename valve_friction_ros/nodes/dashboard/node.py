@@ -100,6 +100,27 @@ def _spare_memory() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
+    _spare_memory()
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        node = Dashboard()
+    except (*WRONG_REQUESTS, OSError) as error:
+        rclpy.try_shutdown()
+        return cannot_start(error)
+    with contextlib.ExitStack() as limited:
+        try:
+            with _Turning(node):  # it meets the valves while the library of the pages is imported
+                return _serve(node, limited)
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+
+
+def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
+    """Serve the pages of a node; return the exit code.
+
+    After Ctrl-C all that is left within `limited` has its time; before, it ends the process at once.
+    """
     # A library for clients, 10 MB: engineio, which is imported below, does without it.
     sys.modules.setdefault("aiohttp", None)  # type: ignore[arg-type]
     try:
@@ -112,44 +133,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(_MISSING, file=sys.stderr)  # noqa: T201
         return 2
-    _spare_memory()
+    options, log = node.options, node.get_logger().info
+    stop = limited.enter_context(StopRequest())
+    try:
+        server.require_free(options.access.host, options.port)
+        visitors = server.guarded(options.access, log)
+    except (*WRONG_REQUESTS, OSError) as error:
+        stop.is_followed = True
+        return cannot_start(error)
+    board = Board(
+        options,
+        node.plant,
+        KeptHistory(options.history_file),
+        GuardedOperator(node.calls, visitors, log),
+        node.signals,
+        visitors,
+    )
 
-    def log(line: str) -> None:
-        node.get_logger().info(line)
+    def tell() -> None:
+        if options.access.warning:
+            node.get_logger().warning(options.access.warning)
+        log(f"ready: open {options.address}")
 
-    with StopRequest() as stop:
-        try:
-            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-            node = Dashboard()
-            options = node.options
-            server.require_free(options.access.host, options.port)
-            visitors = server.guarded(options.access, log)
-        except (*WRONG_REQUESTS, OSError) as error:
-            stop.is_followed = True
-            rclpy.try_shutdown()
-            return cannot_start(error)
-        board = Board(
-            options,
-            node.plant,
-            KeptHistory(options.history_file),
-            GuardedOperator(node.calls, visitors, log),
-            node.signals,
-            visitors,
-        )
-
-        def tell() -> None:
-            if options.access.warning:
-                node.get_logger().warning(options.access.warning)
-            log(f"ready: open {options.address}")
-
-        try:
-            with _Turning(node):
-                if not stop.has_come:
-                    server.serve(board, tell)
-                stop.is_followed = True
-        finally:
-            node.destroy_node()
-            rclpy.try_shutdown()
+    if not stop.has_come:
+        server.serve(board, tell)
+    stop.is_followed = True
     return 0
 
 
