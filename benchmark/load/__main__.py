@@ -13,6 +13,7 @@ from rich.console import Console
 from benchmark.load.afternoon import afternoon_rows
 from benchmark.load.bounds import bound_rows
 from benchmark.load.browser import launched
+from benchmark.load.pictures import picture_rows
 from benchmark.load.processes import running
 from benchmark.load.stage import Stage
 from benchmark.speed.rows import Row
@@ -21,13 +22,14 @@ from valve_friction_ros.commands.demo.bench_processes import free_domain
 
 __all__ = ["main"]
 
-_PARTS = ("bounds", "afternoon")
+_PARTS = ("bounds", "afternoon", "pictures")
+
 _WIDTH_OF_A_FILE = 120
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="load", description=__doc__)
-    parser.add_argument("--parts", nargs="+", choices=_PARTS, default=_PARTS)
+    parser.add_argument("--parts", nargs="+", choices=_PARTS, default=_PARTS[:2])
     parser.add_argument("--valves", type=int, default=500)
     parser.add_argument("--seconds", type=float, default=60.0, help="of each usage (%(default)g)")
     parser.add_argument("--repeats", type=int, default=5, help="of each time (%(default)s)")
@@ -68,11 +70,17 @@ def _measured(options: argparse.Namespace, console: Console) -> dict[str, list[R
             plant.end()
             stage.dashboards[-1].end()
         if "afternoon" in options.parts:
-            stage.plant(options.rate)
+            plant = stage.plant(options.rate)
             stage.dashboard()
             found["afternoon"] = list(
                 afternoon_rows(stage, launch(), options.minutes, options.seed, say)
             )
+            plant.end()
+            stage.dashboards[-1].end()
+        if "pictures" in options.parts:
+            stage.plant(1.0)
+            stage.dashboard()
+            found["pictures"] = list(picture_rows(stage, launch(), folder / "pictures", say))
     console.print(f"logs in {folder}", soft_wrap=True)
     return found
 

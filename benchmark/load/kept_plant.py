@@ -5,7 +5,7 @@ import random
 import time
 from pathlib import Path
 
-from benchmark.load.plant import identifier_of, tag_of
+from benchmark.load.plant import identifier_of, ratio_of, tag_of
 from valve_friction_ros.health import (
     Baseline,
     Diagnosis,
@@ -67,8 +67,9 @@ def write_history(path: Path, valves: int, weeks: int = 52) -> None:
             valve = KeptValve(identifier_of(index), tag_of(index))
             number, healthy = valve_id(connection, valve), chance.uniform(150, 900)
             baseline = Baseline(healthy, 0.02 * healthy)
-            growth = chance.uniform(-0.002, 0.008)
+            change = ratio_of(index) - 1
             for week in range(weeks):
-                friction = healthy * (1 + growth * week) * chance.gauss(1.0, 0.01)
+                share = max(0.0, 2 * week / weeks - 1)
+                friction = healthy * (1 + change * share) * chance.gauss(1.0, 0.01)
                 stamp = now - (weeks - week) * _EVERY
                 insert_entry(connection, number, _entry(valve, baseline, friction, stamp))

@@ -5,6 +5,7 @@ second one valve is identified anew.
 """
 
 import argparse
+import math
 import random
 import signal
 import sys
@@ -22,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
-__all__ = ["identifier_of", "main", "tag_of"]
+__all__ = ["identifier_of", "main", "ratio_of", "tag_of"]
 
 _BEATS = 4
 """Seconds after which the counters of a valve begin again."""
@@ -30,12 +31,22 @@ _COUNTERS = ("reversals", "breakaways", "buffered_samples")
 _KINDS = (
     (0, "", 1.0, "friction normal"),
     (0, "", 1.03, "friction normal"),
-    (0, "", 0.98, "friction normal"),
     (1, "M", 1.44, "friction has grown"),
+    (0, "", 0.98, "friction normal"),
     (2, "F", 2.31, "excessive friction"),
+    (0, "", 1.01, "friction normal"),
+    (0, "", 1.05, "friction normal"),
     (2, "S", 0.41, "friction has collapsed"),
+    (0, "", math.nan, "no baseline: call ~/set_baseline on the healthy valve"),
 )
-"""Level, letter of NE 107, ratio and first words of the diagnosis."""
+"""Level, letter of NE 107, ratio (nan without a baseline) and first words of the diagnosis."""
+_SCALED = ("coulomb_friction", "sliding_friction", "dead_band", "static_friction")
+
+
+def ratio_of(index: int) -> float:
+    """Return the friction of a valve over its baseline; 1 where it has none."""
+    ratio = _KINDS[index % len(_KINDS)][2]
+    return 1.0 if math.isnan(ratio) else ratio
 
 
 def identifier_of(index: int) -> str:
@@ -50,10 +61,12 @@ def tag_of(index: int) -> str:
 
 def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticStatus:
     """Return what the identifier of a valve says at a beat: the template, with its own numbers."""
-    chance = random.Random(1000 * index + (beat if beat >= _BEATS else 0))  # noqa: S311
+    anew = beat >= _BEATS
+    chance = random.Random(1000 * index + (beat if anew else 0))  # noqa: S311
     level, letter, ratio, words = _KINDS[index % len(_KINDS)]
-    ratio *= chance.uniform(0.97, 1.03)
-    made = time.time() - (0.0 if beat >= _BEATS else chance.uniform(60, 86_400))
+    ratio *= chance.uniform(0.98, 1.02)
+    size = random.Random(index).uniform(0.5, 2.0)  # noqa: S311
+    made = time.time() - (0.0 if anew else chance.uniform(60, 86_400))
     own = {
         "NE 107": letter,
         "estimate_time": f"{datetime.fromtimestamp(made, timezone.utc):%Y-%m-%dT%H:%M:%S.%fZ}",
@@ -65,14 +78,26 @@ def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticSt
     status.name = f"{identifier_of(index)}: friction"
     status.hardware_id = tag_of(index)
     status.level = bytes([level])
-    status.message = f"{words}: {ratio:.2f} times its baseline; {template.message}"
-    for value in status.values:
-        if value.key in own:
-            value.value = own.pop(value.key)
-        elif value.key.partition(" ")[0] in _COUNTERS:
-            value.value = str(15_000 + beat % _BEATS)
-    status.values += [KeyValue(key=key, value=value) for key, value in own.items()]
+    status.message = words
+    if not math.isnan(ratio):
+        figures = f"{ratio:.2f} ({ratio * 0.95:.2f} to {ratio * 1.05:.2f})"
+        status.message += f": sliding friction is {figures} times its baseline"
+    status.values = [
+        KeyValue(key=value.key, value=own.get(value.key, _own(value, beat, size, ratio_of(index))))
+        for value in template.values
+        if not (math.isnan(ratio) and value.key.startswith(("friction_ratio", "baseline")))
+    ]
     return status
+
+
+def _own(value: KeyValue, beat: int, size: float, ratio: float) -> str:
+    """Return a value of a valve whose friction is larger, and has grown, by factors."""
+    if value.key.partition(" ")[0] in _COUNTERS:
+        return str(15_000 + beat % _BEATS)
+    factor = size if value.key.startswith("baseline") else size * ratio
+    if value.key.startswith((*_SCALED, "baseline")) and value.key.endswith("]"):
+        return f"{float(value.value) * factor:.9g}"
+    return str(value.value)
 
 
 def _diagnostics(status: DiagnosticStatus) -> bytes:

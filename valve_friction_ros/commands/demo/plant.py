@@ -22,6 +22,8 @@ __all__ = ["VALVES", "PlantValve", "plant_nodes", "require_dashboard", "show_pla
 _PORT = 8080
 _RATE = 200.0
 _RECORD = 2 * SquareWave().period
+_REST = _RECORD
+"""Time between a change of the packings and their identification, s: a record is new by then."""
 _FRICTION = 300.0
 _START_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 120.0
@@ -114,7 +116,7 @@ def _tell(client: Caller, console: Console) -> None:
             packing = _packing(valve.friction(step))
             client.set_parameters(f"/{valve.name}/simulator", packing, _ANSWER_TIMEOUT)
             _call(client, valve, "clear")
-        time.sleep(_RECORD)
+        time.sleep(_REST)
         for valve in VALVES:
             answer = _call(client, valve, "identify")
             if step == 0:

@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
     """Serve the pages of a node; return the exit code.
 
-    After Ctrl-C all that is left within `limited` has its time; before, it ends the process at once.
+    Once it serves, Ctrl-C leaves a limited time to all that is within `limited`.
     """
     # A library for clients, 10 MB: engineio, which is imported below, does without it.
     sys.modules.setdefault("aiohttp", None)  # type: ignore[arg-type]
