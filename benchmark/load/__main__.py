@@ -13,7 +13,7 @@ from rich.console import Console
 from benchmark.load.afternoon import afternoon_rows
 from benchmark.load.bounds import bound_rows
 from benchmark.load.browser import launched
-from benchmark.load.pictures import picture_rows
+from benchmark.load.pictures import picture_rows, take_manual_picture
 from benchmark.load.processes import running
 from benchmark.load.stage import Stage
 from benchmark.speed.rows import Row
@@ -78,9 +78,14 @@ def _measured(options: argparse.Namespace, console: Console) -> dict[str, list[R
             plant.end()
             stage.dashboards[-1].end()
         if "pictures" in options.parts:
-            stage.plant(1.0)
+            plain = stage.plant(1.0)
             stage.dashboard()
-            found["pictures"] = list(picture_rows(stage, launch(), folder / "pictures", say))
+            browser = launch()
+            say("the picture of the manual")
+            take_manual_picture(stage, browser, folder / "dashboard.png")
+            plain.end()
+            stage.plant(1.0, "--awkward")
+            found["pictures"] = list(picture_rows(stage, browser, folder / "pictures", say))
     console.print(f"logs in {folder}", soft_wrap=True)
     return found
 

@@ -10,7 +10,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from datetime import datetime, timezone
 from pathlib import Path
@@ -40,6 +40,14 @@ _KINDS = (
     (0, "", math.nan, "no baseline: call ~/set_baseline on the healthy valve"),
 )
 """Level, letter of NE 107, ratio (nan without a baseline) and first words of the diagnosis."""
+_AWKWARD = {
+    2: "A long tag with many words that somebody once typed into the settings of this valve",
+    4: f"NO-SPACE-{'X' * 70}",
+    7: "Überströmventil №5 – 工場の弁",
+    8: '<b>"bold"</b> & so on',
+    11: "V",
+}
+"""Tags that are hard to draw."""
 _SCALED = ("coulomb_friction", "sliding_friction", "dead_band", "static_friction")
 
 
@@ -117,13 +125,18 @@ def _due(count: int, rate: float) -> Iterator[tuple[int, int]]:
         beat += 1
 
 
-def _publish(node: Node, template: DiagnosticStatus, count: int, rate: float) -> Iterator[None]:
+def _publish(
+    node: Node, template: DiagnosticStatus, count: int, rate: float, tags: Mapping[int, str]
+) -> Iterator[None]:
     diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1000)
     estimates = [
         node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)
         for index in range(count)
     ]
     known = [[status_of(template, index, beat) for beat in range(_BEATS)] for index in range(count)]
+    for index, tag in tags.items():
+        for status in known[index] if index < count else ():
+            status.hardware_id = tag
     arrays = [[_diagnostics(status) for status in beats] for beats in known]
     latched = [[serialize_message(status) for status in beats] for beats in known]
     del known
@@ -144,13 +157,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("template", type=Path, help="a serialised DiagnosticStatus")
     parser.add_argument("--valves", type=int, default=500)
     parser.add_argument("--rate", type=float, default=1.0, help="Hz")
+    parser.add_argument("--awkward", action="store_true", help="some tags are hard to draw")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: stopped.append(number))
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("plant", enable_rosout=False, start_parameter_services=False)
     template = deserialize_message(options.template.read_bytes(), DiagnosticStatus)
-    for _ in _publish(node, template, options.valves, options.rate):
+    tags = _AWKWARD if options.awkward else {}
+    for _ in _publish(node, template, options.valves, options.rate, tags):
         if stopped:
             break
     node.destroy_node()

@@ -73,9 +73,9 @@ class Stage:
         self.dashboards.append(made)
         return made
 
-    def plant(self, rate: float) -> Process:
+    def plant(self, rate: float, *more: str) -> Process:
         """Start the simulated valves, and wait until they publish."""
-        arguments = [str(self._template), "--valves", str(self.valves), "--rate", str(rate)]
+        arguments = [str(self._template), "--valves", str(self.valves), "--rate", str(rate), *more]
         made = self.start("benchmark.load.plant", arguments)
         made.wait_for("publishing")
         return made

@@ -26,5 +26,5 @@ if __name__ == "__main__":
         valve._replace(growth=valve.end) if valve.fate != "healthy" else valve
         for valve in plant.VALVES
     )
-    webbrowser.open = lambda address: print(f"opened {address}", flush=True)
+    webbrowser.open = lambda _: None
     sys.exit(main())

@@ -33,13 +33,15 @@ def demo(ros_environment, tmp_path):
     log = tmp_path / "demo.log"
     folder = tmp_path / "temporary"
     folder.mkdir()
+    more = {"TMPDIR": str(folder), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"}
     with log.open("w") as stream:
         process = subprocess.Popen(
             [sys.executable, HERE / "quick_plant.py", "demo", "--dashboard"],
             stdout=stream,
             stderr=subprocess.STDOUT,
             cwd=tmp_path,
-            env=ros_environment | {"TMPDIR": str(folder), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"},
+            env=ros_environment
+            | {"TMPDIR": str(folder), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"},
         )
     process.log, process.folder = log, folder
 
@@ -74,7 +76,7 @@ def ends_clean(demo, request):
 
 @pytest.mark.slow
 def test_three_valves_their_verdicts_and_a_clean_end(demo):
-    address = demo.said(r"opened (http://127\.0\.0\.1:\d+)/")
+    address = demo.said(r"the dashboard is at (http://127\.0\.0\.1:\d+)/")
     with chromium() as browser, contextlib.closing(Tab(browser, address)) as tab:
         page = tab.open("/")
         page.set_default_timeout(1e3 * PATIENCE)
