@@ -40,8 +40,7 @@ def demo(ros_environment, tmp_path):
             stdout=stream,
             stderr=subprocess.STDOUT,
             cwd=tmp_path,
-            env=ros_environment
-            | {"TMPDIR": str(folder), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"},
+            env=ros_environment | more,
         )
     process.log, process.folder = log, folder
 
