@@ -25,6 +25,7 @@ from valve_friction_ros.nodes.plumbing.qos import LATCHED
 
 __all__ = ["identifier_of", "main", "ratio_of", "tag_of"]
 
+_BEGIN = time.time()
 _BEATS = 4
 """Seconds after which the counters of a valve begin again."""
 _COUNTERS = ("reversals", "breakaways", "buffered_samples")
@@ -74,7 +75,7 @@ def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticSt
     level, letter, ratio, words = _KINDS[index % len(_KINDS)]
     ratio *= chance.uniform(0.98, 1.02)
     size = random.Random(index).uniform(0.5, 2.0)  # noqa: S311
-    made = time.time() - (0.0 if anew else chance.uniform(60, 86_400))
+    made = time.time() if anew else _BEGIN - chance.uniform(60, 86_400)
     own = {
         "NE 107": letter,
         "estimate_time": f"{datetime.fromtimestamp(made, timezone.utc):%Y-%m-%dT%H:%M:%S.%fZ}",

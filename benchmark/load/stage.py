@@ -21,7 +21,7 @@ LIVE = "/live_1/identifier"
 """The identifier of the real valve."""
 _RECORD = 14.0
 """Length of its record, s: more than a period of its pressure."""
-_ANSWER = 120.0
+_ANSWER = 600.0
 
 
 class Stage:

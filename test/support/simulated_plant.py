@@ -117,7 +117,9 @@ def status_of(index, beat=0, tag=None):
 
 def hear(plant, status, at):
     """Have the store of a plant hear a status."""
-    plant.hear(status.name, lambda: status, at)
+    from valve_friction_ros.dashboard import Unread
+
+    plant.hear(Unread(status.name, lambda: status), at)
 
 
 def publish_until_stopped(count):

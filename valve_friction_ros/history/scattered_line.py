@@ -4,9 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import stdtrit
 
 __all__ = ["LEAST_ESTIMATES", "ScatteredLine", "fit_line"]
 
@@ -42,7 +41,7 @@ class ScatteredLine(NamedTuple):
     @property
     def quantile(self) -> float:
         """Half width of a 95 % interval in standard errors."""
-        return float(stdtrit(self.freedom, 0.975))
+        return float(scipy.special.stdtrit(self.freedom, 0.975))
 
     @property
     def slope_half_width(self) -> float:
@@ -130,7 +129,9 @@ def fit_line(
     if _misfit(0.0, times, values, errors)[-1] > freedom:
         highest = float(np.ptp(values)) + float(errors.max())
         scatter = float(
-            brentq(lambda s: _misfit(s, times, values, errors)[-1] - freedom, 0.0, 2 * highest)
+            scipy.optimize.brentq(
+                lambda s: _misfit(s, times, values, errors)[-1] - freedom, 0.0, 2 * highest
+            )
         )
     centre, level, slope, spread, misfit = _misfit(scatter, times, values, errors)
     total = float((1.0 / (errors**2 + scatter**2)).sum())

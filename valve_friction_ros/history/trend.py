@@ -7,8 +7,8 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import friction_words
@@ -146,7 +146,7 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
         time, error = days.times[worst], np.hypot(days.errors[worst], others.scatter)
         predicted = np.hypot(error, others.half_width(time) / others.quantile)
         surprise = abs(days.values[worst] - others.at(time)) / predicted
-        if surprise <= stdtrit(others.freedom, 1 - _OUTLIER / (2 * days.times.size)):
+        if surprise <= scipy.special.stdtrit(others.freedom, 1 - _OUTLIER / (2 * days.times.size)):
             break
         days, line, outliers = rest, others, outliers + 1
     return line, outliers

@@ -1,7 +1,7 @@
 """One valve as it is shown."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from valve_friction_ros.dashboard.heard.status_keys import Entry, Quantity
 from valve_friction_ros.dashboard.heard.value_groups import groups_of
 from valve_friction_ros.health import Level, StatusSignal
 
-__all__ = ["Drift", "Expected", "Interval", "Sources", "Status", "ValveView"]
+__all__ = ["Drift", "Expected", "Interval", "Sources", "Status", "Unread", "ValveView"]
 
 _NO_DEAD_BAND = Quantity("dead_band", math.nan, unit="%")
 
@@ -22,6 +22,24 @@ class Status(NamedTuple):
     hardware_id: str
     message: str
     values: Mapping[str, str]
+
+
+class Unread(NamedTuple):
+    """A status that is read when somebody looks.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    read : callable
+        Returns the status; raises ValueError if it is none.
+    mark : int or None
+        The same as long as nothing but ages and counters changes; None: it is to be read.
+    """
+
+    name: str
+    read: Callable[[], Status]
+    mark: int | None = None
 
 
 class Interval(NamedTuple):

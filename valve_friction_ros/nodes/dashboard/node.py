@@ -57,8 +57,8 @@ class Dashboard(PolledNode):
         now = time.monotonic()
         for taken in self._diagnostics.take():
             with contextlib.suppress(ValueError):  # anybody can publish other bytes
-                for name, read in statuses_in(taken.message):
-                    self.plant.hear(name, read, now)
+                for status in statuses_in(taken.message):
+                    self.plant.hear(status, now)
         self.calls.step(self)
         self.signals.step(self)
 
@@ -121,8 +121,9 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
 
     Once it serves, Ctrl-C leaves a limited time to all that is within `limited`.
     """
-    # A library for clients, 10 MB: engineio, which is imported below, does without it.
-    sys.modules.setdefault("aiohttp", None)  # type: ignore[arg-type]
+    # Libraries for other uses, 10 MB: engineio, which is imported below, does without them.
+    for unused in ("aiohttp", "tornado"):
+        sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     try:
         from valve_friction_ros.dashboard.board import Board  # noqa: PLC0415
         from valve_friction_ros.dashboard.guarded_operator import GuardedOperator  # noqa: PLC0415

@@ -6,13 +6,13 @@ valves a second. Here the name is read as the message comes, and the rest once a
 
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message
 
-from valve_friction_ros.dashboard import Status
+from valve_friction_ros.dashboard import Status, Unread
 
 __all__ = ["status_of", "statuses_in"]
 
@@ -20,10 +20,12 @@ _LITTLE_ENDIAN = b"\x00\x01"
 _AFTER_STAMP = 12
 """First byte after the representation's header (4 bytes) and the stamp (8)."""
 _COUNT = struct.Struct("<I")
+_FIRST_AGE = b"estimate_age [s]\0"
+"""Before this key an identifier says what is known of its valve, behind it ages and counters."""
 
 
-def statuses_in(message: bytes) -> Iterator[tuple[str, Callable[[], Status]]]:
-    """Yield the name of each status of a diagnostic_msgs/DiagnosticArray, and what reads it.
+def statuses_in(message: bytes) -> Iterator[Unread]:
+    """Yield each status of a diagnostic_msgs/DiagnosticArray, still unread.
 
     Raises ValueError if the bytes are no such message.
     """
@@ -32,7 +34,7 @@ def statuses_in(message: bytes) -> Iterator[tuple[str, Callable[[], Status]]]:
             yield from _quickly(message)
         else:
             for one in deserialize_message(message, DiagnosticArray).status:
-                yield one.name, partial(status_of, one)
+                yield Unread(one.name, partial(status_of, one))
     except (struct.error, IndexError, MemoryError, RuntimeError) as error:
         raise ValueError(f"no diagnostics: {error}") from None
 
@@ -48,13 +50,15 @@ def status_of(message: DiagnosticStatus) -> Status:
     )
 
 
-def _quickly(message: bytes) -> Iterator[tuple[str, Callable[[], Status]]]:
+def _quickly(message: bytes) -> Iterator[Unread]:
     frame, at = _text(message, _AFTER_STAMP)
     del frame
     count, at = _count(message, at)
     for left in range(count - 1, -1, -1):
         name, _ = _text(message, at + 1)
-        yield name, partial(_status_at, message, at)
+        known = message.find(_FIRST_AGE, at)
+        mark = hash(message[at:known]) if known > 0 else None
+        yield Unread(name, partial(_status_at, message, at), mark)
         if left:
             _, at = _read(message, at)
 
