@@ -134,7 +134,7 @@ def test_a_table_reads_a_status_again_only_where_its_mark_has_changed():
             reads.append(beat)
             return Status(name, level, tag, message, {**values, "reversals": str(beat)})
 
-        plant.hear(Unread(name, read, mark), 0.0)
+        plant.hear(Unread(name, read, lambda: mark), 0.0)
 
     node = name.partition(":")[0]
     for beat, mark in enumerate((7, 7, 7, 8)):

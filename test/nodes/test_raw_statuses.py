@@ -43,6 +43,9 @@ def test_other_bytes_are_refused(data):
         with contextlib.suppress(ValueError):
             for one in statuses_in(message):
                 one.read()
+        with contextlib.suppress(ValueError):
+            for one in statuses_in(message):
+                one.mark()
 
 
 def test_what_ends_within_its_name_is_refused():
@@ -51,7 +54,7 @@ def test_what_ends_within_its_name_is_refused():
 
 
 def marks(*statuses):
-    return [one.mark for one in statuses_in(array(statuses))]
+    return [one.mark() for one in statuses_in(array(statuses))]
 
 
 def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
@@ -61,7 +64,27 @@ def said(message="friction normal", age="1.0", ratio="1.02", count="5"):
 
 
 def test_ages_and_counters_leave_the_mark():
-    assert marks(said()) == marks(said(age="2.0", count="7")) != [None]
+    assert marks(said()) == marks(said(age="2.0", count="7"))
     assert marks(said()) != marks(said(ratio="1.03"))
     assert marks(said()) != marks(said(message="friction has grown"))
-    assert marks(DiagnosticStatus(name="/v/identifier: friction")) == [None]
+
+
+def test_a_key_within_another_one_is_none():
+    alike = DiagnosticStatus(values=[KeyValue(key="my friction_ratio", value="9")])
+    assert marks(alike) == marks(DiagnosticStatus())
+
+
+def test_each_status_of_an_array_has_its_own_mark():
+    empty, known = DiagnosticStatus(), said()
+    assert marks(empty, known) == [*marks(empty), *marks(known)]
+
+
+def test_bytes_between_the_texts_leave_the_mark():
+    """The serialiser leaves them as they were in its memory."""
+    whole = bytearray(array([said(message="ab")]))  # three bytes and a zero: none is needed
+    (before,) = (one.mark() for one in statuses_in(bytes(whole)))
+    place = whole.index(b"friction_ratio\0") + len(b"friction_ratio\0")
+    assert -place % 4
+    whole[place : place + -place % 4] = b"\xee" * (-place % 4)
+    (after,) = (one.mark() for one in statuses_in(bytes(whole)))
+    assert after == before

@@ -60,7 +60,7 @@ class _Valve:
         self.revision = 0
         self.is_kept = False
         self.view = view
-        self._mark: int | None = None
+        self._mark: object = None
         self._essence: Essence = ()
         self._read: Unread | None = None
 
@@ -72,15 +72,15 @@ class _Valve:
         latest = self.latest
         if latest is None or latest is self._read:
             return
-        is_known = latest.mark is not None and latest.mark == self._mark
-        if is_known and not with_values:
-            return
         try:
+            mark = None if latest.mark is None else latest.mark()
+            if mark is not None and mark == self._mark and not with_values:
+                return
             status = latest.read()
         except ValueError:
             self.latest = None
             return
-        self._mark = latest.mark
+        self._mark = mark
         essence = essence_of(status)
         if essence != self._essence:
             self.view, self._essence = view_of(node, status), essence

@@ -16,7 +16,7 @@ from valve_friction_ros.dashboard.heard.valve_view import (
 from valve_friction_ros.health import Level, StatusSignal
 from valve_friction_ros.outside_text import printable
 
-__all__ = ["Essence", "essence_of", "identifier_in", "view_of"]
+__all__ = ["ESSENTIAL_KEYS", "Essence", "essence_of", "identifier_in", "view_of"]
 
 _SOURCES = ("pressure_topic", "stem_topic", "stem_joint")
 _SUFFIX = ": friction"
@@ -29,7 +29,7 @@ def identifier_in(name: str) -> str | None:
     return node if node != name and node.startswith("/") and len(node) < 256 else None
 
 
-_ESSENTIAL = (
+ESSENTIAL_KEYS = (
     "NE 107",
     "estimate_valid",
     "estimate_time",
@@ -50,6 +50,7 @@ _ESSENTIAL = (
     "baseline_sliding_friction [N]",
     *_SOURCES,
 )
+"""Keys of what tells two views of a valve apart, without their counters and ages."""
 
 Essence = tuple[object, ...]
 """What tells two views of a valve apart, without their counters and ages."""
@@ -61,7 +62,7 @@ def essence_of(status: Status) -> Essence:
         status.level,
         status.hardware_id,
         status.message,
-        *map(status.values.get, _ESSENTIAL),
+        *map(status.values.get, ESSENTIAL_KEYS),
     )
 
 

@@ -33,13 +33,14 @@ class Unread(NamedTuple):
         Its name.
     read : callable
         Returns the status; raises ValueError if it is none.
-    mark : int or None
-        The same as long as nothing but ages and counters changes; None: it is to be read.
+    mark : callable or None
+        Returns what is the same as long as nothing but ages and counters changes; raises ValueError
+        if the bytes are no status. None: it has to be read.
     """
 
     name: str
     read: Callable[[], Status]
-    mark: int | None = None
+    mark: Callable[[], object] | None = None
 
 
 class Interval(NamedTuple):
