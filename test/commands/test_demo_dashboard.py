@@ -34,13 +34,15 @@ def demo(ros_environment, tmp_path):
     folder = tmp_path / "temporary"
     folder.mkdir()
     more = {"TMPDIR": str(folder), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"}
+    environment = ros_environment | more
+    environment.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI behaves otherwise within a test
     with log.open("w") as stream:
         process = subprocess.Popen(
             [sys.executable, HERE / "quick_plant.py", "demo", "--dashboard"],
             stdout=stream,
             stderr=subprocess.STDOUT,
             cwd=tmp_path,
-            env=ros_environment | more,
+            env=environment,
         )
     process.log, process.folder = log, folder
 
