@@ -13,6 +13,7 @@ from browser import Tab, chromium
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 HERE = Path(__file__).parent
 PATIENCE = 180.0
 
@@ -75,7 +76,6 @@ def ends_clean(demo, request):
     assert "Traceback" not in demo.log.read_text()
 
 
-@pytest.mark.slow
 def test_three_valves_their_verdicts_and_a_clean_end(demo):
     address = demo.said(r"the dashboard is at (http://127\.0\.0\.1:\d+)/")
     with chromium() as browser, contextlib.closing(Tab(browser, address)) as tab:
@@ -96,7 +96,6 @@ def test_three_valves_their_verdicts_and_a_clean_end(demo):
     ends_clean(demo, signal.SIGINT)
 
 
-@pytest.mark.slow
 def test_sigterm_while_it_starts_leaves_nothing_behind(demo):
     demo.said(r"the dashboard is at (\S+)")
     ends_clean(demo, signal.SIGTERM)

@@ -21,7 +21,7 @@ from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
-from valve_friction_ros.nodes.plumbing.qos import stream
+from valve_friction_ros.nodes.plumbing.qos import statuses
 from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, cannot_start
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 
@@ -45,7 +45,7 @@ class Dashboard(PolledNode):
         self.calls = ServiceCalls()
         self.signals = WatchedSignals(self._sources_of)
         self._diagnostics = PolledSubscription(
-            self, DiagnosticArray, "/diagnostics", stream(), raw=True
+            self, DiagnosticArray, "/diagnostics", statuses(), raw=True
         )
 
     def _sources_of(self, identifier: str) -> Sources:
