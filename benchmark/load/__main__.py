@@ -78,13 +78,13 @@ def _measured(options: argparse.Namespace, console: Console) -> dict[str, list[R
             plant.end()
             stage.dashboards[-1].end()
         if "pictures" in options.parts:
-            plain = stage.plant(1.0)
+            plain = stage.plant(1.0, "--still")
             stage.dashboard()
             browser = launch()
             say("the picture of the manual")
             take_manual_picture(stage, browser, folder / "dashboard.png")
             plain.end()
-            stage.plant(1.0, "--awkward")
+            stage.plant(1.0, "--still", "--awkward")
             found["pictures"] = list(picture_rows(stage, browser, folder / "pictures", say))
     console.print(f"logs in {folder}", soft_wrap=True)
     return found

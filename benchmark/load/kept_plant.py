@@ -34,7 +34,9 @@ def _parameter(name: str, value: float, share: float = 0.02) -> Parameter:
     return Parameter(name, value, half_width / 2, half_width, Verdict.IDENTIFIED, "")
 
 
-def _entry(valve: KeptValve, baseline: Baseline, friction: float, stamp: int) -> HistoryEntry:
+def _entry(
+    valve: KeptValve, baseline: Baseline | None, friction: float, stamp: int
+) -> HistoryEntry:
     parameters = {
         "mass": Parameter("mass", 1.6, 0.0, 0.0, Verdict.FIXED, "assumed"),
         "viscous_friction": _parameter("viscous_friction", 5300.0),
@@ -42,7 +44,7 @@ def _entry(valve: KeptValve, baseline: Baseline, friction: float, stamp: int) ->
         "spring_constant": _parameter("spring_constant", 2.05e5),
         "spring_preload": _parameter("spring_preload", 231.0),
     }
-    found = compared(parameters, math.nan, baseline)
+    found = None if baseline is None else compared(parameters, math.nan, baseline)
     words = "friction normal: the stem ignores reversals smaller than 9 % of its travel"
     return HistoryEntry(
         time=stamp,
@@ -66,8 +68,9 @@ def write_history(path: Path, valves: int, weeks: int = 52) -> None:
             chance = random.Random(index)  # noqa: S311
             valve = KeptValve(identifier_of(index), tag_of(index))
             number, healthy = valve_id(connection, valve), chance.uniform(150, 900)
-            baseline = Baseline(healthy, 0.02 * healthy)
-            change = ratio_of(index) - 1
+            ratio = ratio_of(index)
+            baseline = None if ratio is None else Baseline(healthy, 0.02 * healthy)
+            change = (ratio or 1.0) - 1
             for week in range(weeks):
                 share = max(0.0, 2 * week / weeks - 1)
                 friction = healthy * (1 + change * share) * chance.gauss(1.0, 0.01)

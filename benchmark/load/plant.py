@@ -52,10 +52,10 @@ _AWKWARD = {
 _SCALED = ("coulomb_friction", "sliding_friction", "dead_band", "static_friction")
 
 
-def ratio_of(index: int) -> float:
-    """Return the friction of a valve over its baseline; 1 where it has none."""
+def ratio_of(index: int) -> float | None:
+    """Return the friction of a valve over its baseline; None where it has none."""
     ratio = _KINDS[index % len(_KINDS)][2]
-    return 1.0 if math.isnan(ratio) else ratio
+    return None if math.isnan(ratio) else ratio
 
 
 def identifier_of(index: int) -> str:
@@ -92,7 +92,9 @@ def status_of(template: DiagnosticStatus, index: int, beat: int) -> DiagnosticSt
         figures = f"{ratio:.2f} ({ratio * 0.95:.2f} to {ratio * 1.05:.2f})"
         status.message += f": sliding friction is {figures} times its baseline"
     status.values = [
-        KeyValue(key=value.key, value=own.get(value.key, _own(value, beat, size, ratio_of(index))))
+        KeyValue(
+            key=value.key, value=own.get(value.key, _own(value, beat, size, ratio_of(index) or 1.0))
+        )
         for value in template.values
         if not (math.isnan(ratio) and value.key.startswith(("friction_ratio", "baseline")))
     ]
@@ -127,8 +129,14 @@ def _due(count: int, rate: float) -> Iterator[tuple[int, int]]:
 
 
 def _publish(
-    node: Node, template: DiagnosticStatus, count: int, rate: float, tags: Mapping[int, str]
+    node: Node,
+    template: DiagnosticStatus,
+    count: int,
+    rate: float,
+    tags: Mapping[int, str],
+    every: int,
 ) -> Iterator[None]:
+    """Publish; at each beat the next valve of `every` is identified anew, if there is such a one."""
     diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1000)
     estimates = [
         node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)
@@ -143,7 +151,7 @@ def _publish(
     del known
     print("publishing", flush=True)  # noqa: T201 - who has started it waits for this
     for beat, index in _due(count, rate):
-        if index == beat % count and beat >= _BEATS:
+        if index == beat % every and beat >= _BEATS and every == count:
             anew = status_of(template, index, beat)
             arrays[index] = [_diagnostics(anew)] * _BEATS
             latched[index] = [serialize_message(anew)] * _BEATS
@@ -158,6 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("template", type=Path, help="a serialised DiagnosticStatus")
     parser.add_argument("--valves", type=int, default=500)
     parser.add_argument("--rate", type=float, default=1.0, help="Hz")
+    parser.add_argument("--still", action="store_true", help="no valve is identified anew")
     parser.add_argument("--awkward", action="store_true", help="some tags are hard to draw")
     options = parser.parse_args(arguments)
     stopped: list[int] = []
@@ -166,7 +175,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     node = rclpy.create_node("plant", enable_rosout=False, start_parameter_services=False)
     template = deserialize_message(options.template.read_bytes(), DiagnosticStatus)
     tags = _AWKWARD if options.awkward else {}
-    for _ in _publish(node, template, options.valves, options.rate, tags):
+    every = sys.maxsize if options.still else options.valves
+    for _ in _publish(node, template, options.valves, options.rate, tags, every):
         if stopped:
             break
     node.destroy_node()
