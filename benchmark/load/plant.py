@@ -136,7 +136,7 @@ def _publish(
     tags: Mapping[int, str],
     every: int,
 ) -> Iterator[None]:
-    """Publish; at each beat the next valve of `every` is identified anew, if there is such a one."""
+    """Publish; at each beat the next valve is identified anew, if `every` is their number."""
     diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1000)
     estimates = [
         node.create_publisher(DiagnosticStatus, f"{identifier_of(index)}/estimate", LATCHED)

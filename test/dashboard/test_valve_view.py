@@ -49,6 +49,23 @@ def test_the_dead_band_has_the_interval_that_the_identifier_says():
     assert not view().dead_band.is_known
 
 
+def test_changes_since_the_baseline_have_their_intervals():
+    shown = view(
+        **{
+            "lag change [s]": "0.01",
+            "lag change low [s]": "-0.02",
+            "lag change high [s]": "0.04",
+            "viscous_asymmetry change [1]": "0.1",
+            "reversals": "7",
+        }
+    ).groups()
+    assert shown["changes"] == (
+        ("lag", "0.01 (-0.02 to 0.04)", "s"),
+        ("viscous asymmetry", "0.1", ""),
+    )
+    assert [one.name for one in shown["usage"]] == ["reversals"]
+
+
 def test_a_level_that_is_none_is_unknown():
     assert view(level=3).level is None
     assert view(level=2).level is Level.ERROR

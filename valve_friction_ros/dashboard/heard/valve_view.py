@@ -141,7 +141,8 @@ class ValveView:
     def groups(self) -> dict[str, tuple[Entry, ...]]:
         """Return the values that have no place of their own, by what they are about.
 
-        The groups are ``fit``, ``evidence``, ``usage``, ``command`` and ``counters``.
+        The groups are ``changes``, ``fit``, ``evidence``, ``usage``, ``command`` and
+        ``counters``.
         """
         return groups_of(self.values, {one.name for one in self.parameters})
 

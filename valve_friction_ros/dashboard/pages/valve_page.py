@@ -35,6 +35,7 @@ _PERIOD = 0.2
 _SLOWER = 5
 """Beats of the timer between two looks at all but the signals."""
 _LISTS = (
+    ("changes", "Changes since the baseline", "Nothing is compared with a baseline."),
     ("evidence", "Moves in service", "No move has been counted."),
     ("usage", "Usage of the packing", "Nothing is counted."),
     ("fit", "Fit of the model", "There is no estimate."),
