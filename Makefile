@@ -9,6 +9,7 @@ BENCH_ARGS ?=
 REALITY_ARGS ?=
 SERVICE_ARGS ?=
 CHURN_ARGS ?=
+LOAD_ARGS ?=
 MUTANTS_ARGS ?=
 
 SHELL := /bin/bash
@@ -143,6 +144,10 @@ churn: venv  ## nodes under clients that come and go for an hour; CHURN_ARGS="--
 .PHONY: soak
 soak: venv  ## a month of a plant in an hour, each sample accounted for; SOAK_ARGS="--minutes 5" for less
 	@"$(VENV)/bin/python" -m benchmark.soak $(SOAK_ARGS)
+
+.PHONY: load
+load: venv-test browser  ## the dashboard before 500 valves in a real browser, 45 minutes; LOAD_ARGS="--parts bounds" for some
+	@"$(VENV)/bin/python" -m benchmark.load $(LOAD_ARGS)
 
 .PHONY: mutants
 mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some

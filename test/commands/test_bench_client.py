@@ -38,8 +38,12 @@ def test_what_a_client_is_told(ros_environment):
     assert told["impossible"].startswith("simulator refused: ")
     assert "static_friction" in told["impossible"]
     assert told["possible"] is None
-    assert told["absent node"] == "no service /fv_7/nobody/set_parameters_atomically within 0.1 s"
-    assert told["absent service"] == "no service dance within 0.1 s"
+    assert told["absent node"] == (
+        "no answer of /fv_7/nobody/set_parameters_atomically within 0.1 s"
+    )
+    assert told["absent service"] == (
+        "/fv_7/identifier/dance is not there: start the identifier of this valve"
+    )
     assert told["sweep"] == "no sweep within 0.1 s"
     assert "actuator_pressure" in told["message"]
     assert told["estimate_valid"] == "false"

@@ -12,9 +12,9 @@ from histories import DAY, OTHER, START, VALVE, refused, success
 
 from valve_friction_ros.dashboard.charts import trend_chart
 from valve_friction_ros.dashboard.compared import compared, side_of_entry, side_of_view
+from valve_friction_ros.dashboard.heard.status_keys import Quantity
+from valve_friction_ros.dashboard.heard.valve_view import ValveView
 from valve_friction_ros.dashboard.kept import KeptHistory
-from valve_friction_ros.dashboard.status_keys import Quantity
-from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import (
     HistoryFile,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.dashboard.live_strip import LiveStrip, envelope
+from valve_friction_ros.dashboard.heard.live_strip import LiveStrip, envelope
 
 SECOND = 1_000_000_000
 

@@ -6,8 +6,9 @@ import threading
 import pytest
 from simulated_plant import hear, values_of_valve
 
-from valve_friction_ros.dashboard import Plant, Status
-from valve_friction_ros.dashboard.plant import MOST_VALVES, Heard
+from valve_friction_ros.dashboard import Plant, Status, Unread
+from valve_friction_ros.dashboard.heard.plant import MOST_VALVES, Heard
+from valve_friction_ros.dashboard.heard.valve_view import Interval
 from valve_friction_ros.dashboard.plant_rows import (
     RowFeed,
     interval_text,
@@ -18,7 +19,6 @@ from valve_friction_ros.dashboard.plant_rows import (
 )
 from valve_friction_ros.dashboard.selection import SORTS
 from valve_friction_ros.dashboard.sparkline import sparkline
-from valve_friction_ros.dashboard.valve_view import Interval
 
 DAY = 86_400_000_000_000
 
@@ -125,6 +125,32 @@ def test_a_browser_is_sent_what_has_changed(plant):
     assert news(plant, feed, 111.0, 1010.4) == {"now": 1010.4}
 
 
+def test_a_table_reads_a_status_again_only_where_its_mark_has_changed():
+    name, level, tag, message, values = values_of_valve(0)
+    plant, reads = Plant(5.0), []
+
+    def tell(mark, beat):
+        def read():
+            reads.append(beat)
+            return Status(name, level, tag, message, {**values, "reversals": str(beat)})
+
+        plant.hear(Unread(name, read, lambda: mark), 0.0)
+
+    node = name.partition(":")[0]
+    for beat, mark in enumerate((7, 7, 7, 8)):
+        tell(mark, beat)
+        (heard,) = plant.valves(0.0)
+        assert not heard.view.values
+    assert reads == [0, 3]
+    tell(8, 4)
+    (heard,) = plant.valves(0.0)
+    whole = plant.valve(node, 0.0)
+    assert whole.view.values["reversals"] == "4"  # who looks at one valve gets all of it
+    assert plant.valve(node, 0.0).view is whole.view
+    assert reads == [0, 3, 4]
+    assert whole.revision == heard.revision
+
+
 def test_a_row_has_fixed_keys_only(plant):
     """The browser library evaluates keys that begin with a colon: none is from outside."""
     hear(
@@ -183,7 +209,7 @@ def test_a_friction_that_the_record_does_not_determine_is_no_number():
     row, view = valve()
     assert row["fcof"] == "F_c"
     assert row["dead"] != "–"
-    open_ = {"coulomb_friction verdict": "not identifiable"}
+    open_ = {"coulomb_friction verdict": "not identifiable", "dead_band [%]": "nan"}
     row, view = valve(**open_)
     assert (row["fcof"], row["fc"]) == ("sliding", quantity_texts(view.friction)[0])
     assert view.friction.name == "sliding_friction"

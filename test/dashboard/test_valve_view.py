@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from simulated_plant import values_of_valve
 
 from valve_friction_ros.dashboard import Status, view_of
-from valve_friction_ros.dashboard.valve_view import identifier_in
+from valve_friction_ros.dashboard.heard.status_reading import identifier_in
 from valve_friction_ros.health import Level, StatusSignal
 
 NODE = "/fv_101/identifier"
@@ -16,20 +16,6 @@ NODE = "/fv_101/identifier"
 
 def view(level=0, message="friction normal", hardware_id="FV-101", **values):
     return view_of(NODE, Status(f"{NODE}: friction", level, hardware_id, message, values))
-
-
-def keyed(**changes):
-    values = {
-        "coulomb_friction [N]": "600",
-        "coulomb_friction half width [N]": "12",
-        "coulomb_friction verdict": "identified",
-        "spring_constant [N/m]": "2e5",
-        "spring_constant half width [N/m]": "4e3",
-        "spring_constant verdict": "identified",
-        "dead_band [%]": "21",
-        **changes,
-    }
-    return view_of(NODE, Status("", 1, "", "", values))
 
 
 def test_all_that_an_identifier_says_is_read():
@@ -57,14 +43,27 @@ def test_the_time_of_the_estimate_is_utc():
     assert shown.identified == 1_772_600_767_250_000_000
 
 
-def test_the_interval_of_the_dead_band():
-    """(F_c + F_s)/k with F_s = F_c: 2 % of the friction, 2 % of the spring, independent."""
-    assert keyed().dead_band.half_width == pytest.approx(21 * math.hypot(0.02, 0.02))
-    fixed = keyed(**{"spring_constant verdict": "fixed"})
-    assert fixed.dead_band.half_width == pytest.approx(21 * 0.02)
-    slip = {"static_friction [N]": "900", "static_friction half width [N]": "48",
-            "static_friction verdict": "weak", "spring_constant verdict": "fixed"}  # fmt: skip
-    assert keyed(**slip).dead_band.half_width == pytest.approx(21 * 60 / 1500)
+def test_the_dead_band_has_the_interval_that_the_identifier_says():
+    band = view(**{"dead_band [%]": "21", "dead_band half width [%]": "0.6"}).dead_band
+    assert (band.value, band.half_width, band.unit) == (21.0, 0.6, "%")
+    assert not view().dead_band.is_known
+
+
+def test_changes_since_the_baseline_have_their_intervals():
+    shown = view(
+        **{
+            "lag change [s]": "0.01",
+            "lag change low [s]": "-0.02",
+            "lag change high [s]": "0.04",
+            "viscous_asymmetry change [1]": "0.1",
+            "reversals": "7",
+        }
+    ).groups()
+    assert shown["changes"] == (
+        ("lag", "0.01 (-0.02 to 0.04)", "s"),
+        ("viscous asymmetry", "0.1", ""),
+    )
+    assert [one.name for one in shown["usage"]] == ["reversals"]
 
 
 def test_a_level_that_is_none_is_unknown():

@@ -12,6 +12,7 @@ from valve_friction_ros.health import (
     SlidingFriction,
     StatusSignal,
     dead_band,
+    dead_band_half_width,
     diagnose,
     percentage,
 )
@@ -25,6 +26,10 @@ from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.model import BENCH_VALVE, Valve
 
 BASELINE = Baseline(128.0)
+
+
+def known(name, value, half_width):
+    return Parameter(name, value, half_width / 2, half_width, Verdict.IDENTIFIED)
 
 
 class TestDeadBand:
@@ -56,6 +61,31 @@ class TestDeadBand:
     def test_there_is_none_without_what_it_is_made_of(self, with_values, unknown, name):
         found = with_values(static_friction=942.0, **{name: unknown(name)})
         assert math.isnan(dead_band(found, BENCH_VALVE))
+
+    def test_its_interval(self, with_values):
+        """Errors of F_c and F_s as one, 60/1500; of the spring, 41/2050; these two independent."""
+        slip = with_values(
+            coulomb_friction=known("coulomb_friction", 600.0, 12.0),
+            static_friction=known("static_friction", 900.0, 48.0),
+            spring_constant=known("spring_constant", 2050.0, 41.0),
+        )
+        valve = Valve(1.0, travel=0.5)
+        wanted = dead_band(slip, valve) * math.hypot(60 / 1500, 41 / 2050)
+        assert dead_band_half_width(slip, valve) == pytest.approx(wanted, rel=1e-12)
+
+    def test_its_interval_without_a_slip_jump(self, with_values, unknown):
+        """F_s is F_c, with its error; a fixed spring has none."""
+        found = with_values(
+            coulomb_friction=known("coulomb_friction", 600.0, 12.0),
+            static_friction=unknown("static_friction"),
+            spring_constant=known("spring_constant", 2050.0, 0.0),
+        )
+        valve = Valve(1.0, travel=0.5)
+        wanted = dead_band(found, valve) * 0.02
+        assert dead_band_half_width(found, valve) == pytest.approx(wanted, rel=1e-12)
+
+    def test_it_has_no_interval_where_there_is_none(self, with_values):
+        assert math.isnan(dead_band_half_width(with_values(spring_constant=0.0), BENCH_VALVE))
 
     def test_there_is_no_share_without_stops(self, result):
         assert math.isnan(dead_band(result, Valve(1.0)))

@@ -24,7 +24,8 @@ def test_one_message_at_each_change(live):
     shown, estimate = client.last_values(), values_of(heard[-1])
     assert heard[-1].hardware_id == "FV-101/A"
     assert heard[-1].message == client.statuses[-1][1].message
-    for key in ("coulomb_friction [N]", "coulomb_friction half width [N]", "dead_band [%]"):
+    for key in ("coulomb_friction [N]", "coulomb_friction half width [N]", "dead_band [%]",
+                "dead_band half width [%]"):  # fmt: skip
         assert estimate[key] == shown[key]
     assert estimate["estimate_time"].endswith("Z")
     assert not OF_THE_INPUTS & set(estimate)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from valve_friction_ros.dashboard.valve_view import Sources
+from valve_friction_ros.dashboard.heard.valve_view import Sources
 from valve_friction_ros.nodes.dashboard import watched_signals
 from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
 

@@ -59,6 +59,7 @@ def values_of_valve(index, beat=0, tag=None):
     values |= {
         "sliding_speed [m/s]": "0.0042",
         "dead_band [%]": f"{dead:.9g}",
+        "dead_band half width [%]": f"{dead * half / now:.9g}",
         "fit [%]": "98.7",
         "rms [µm]": "31.2",
         "method": "robust",
@@ -116,7 +117,9 @@ def status_of(index, beat=0, tag=None):
 
 def hear(plant, status, at):
     """Have the store of a plant hear a status."""
-    plant.hear(status.name, lambda: status, at)
+    from valve_friction_ros.dashboard import Unread
+
+    plant.hear(Unread(status.name, lambda: status), at)
 
 
 def publish_until_stopped(count):

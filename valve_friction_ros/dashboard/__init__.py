@@ -4,12 +4,14 @@ The files here hold what is shown, and import no library of pages; ``pages/`` dr
 """
 
 from valve_friction_ros.dashboard.graph import Answer, Operator, Signals, Visitors
+from valve_friction_ros.dashboard.heard.plant import Plant
+from valve_friction_ros.dashboard.heard.status_reading import ESSENTIAL_KEYS, view_of
+from valve_friction_ros.dashboard.heard.valve_view import Status, Unread, ValveView
 from valve_friction_ros.dashboard.options import DashboardOptions
-from valve_friction_ros.dashboard.plant import Plant
 from valve_friction_ros.dashboard.selection import Selection, selected
-from valve_friction_ros.dashboard.valve_view import Status, ValveView, view_of
 
 __all__ = [
+    "ESSENTIAL_KEYS",
     "Answer",
     "DashboardOptions",
     "Operator",
@@ -17,6 +19,7 @@ __all__ = [
     "Selection",
     "Signals",
     "Status",
+    "Unread",
     "ValveView",
     "Visitors",
     "selected",

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from valve_friction_ros.dashboard.graph import Operator, Signals, Visitors
+from valve_friction_ros.dashboard.heard.plant import Plant
 from valve_friction_ros.dashboard.kept import KeptHistory
 from valve_friction_ros.dashboard.options import DashboardOptions
-from valve_friction_ros.dashboard.plant import Plant
 
 __all__ = ["Board"]
 

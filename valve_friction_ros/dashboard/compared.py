@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from valve_friction_ros.dashboard.heard.status_keys import Quantity
+from valve_friction_ros.dashboard.heard.valve_view import ValveView
 from valve_friction_ros.dashboard.plant_rows import ratio_text
-from valve_friction_ros.dashboard.status_keys import Quantity
-from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.history import HistoryEntry
 from valve_friction_ros.identification import SLIDING, UNITS
 from valve_friction_ros.outside_text import printable

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from valve_friction_ros.dashboard.live_strip import LiveStrip
+from valve_friction_ros.dashboard.heard.live_strip import LiveStrip
 
 __all__ = ["Answer", "Operator", "Signals", "Visitors"]
 

@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from valve_friction_ros.dashboard.plant import Heard
+from valve_friction_ros.dashboard.heard.plant import Heard
+from valve_friction_ros.dashboard.heard.status_keys import Quantity
+from valve_friction_ros.dashboard.heard.valve_view import Drift, Interval, ValveView
 from valve_friction_ros.dashboard.selection import STATES, state_of
 from valve_friction_ros.dashboard.sparkline import Sparkline
-from valve_friction_ros.dashboard.status_keys import Quantity
-from valve_friction_ros.dashboard.valve_view import Drift, Interval, ValveView
 
 __all__ = [
     "SIGNAL_WORDS",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from valve_friction_ros.dashboard.plant import Heard
+from valve_friction_ros.dashboard.heard.plant import Heard
 from valve_friction_ros.health import Level, StatusSignal
 
 __all__ = [

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from valve_friction_ros.evidence.blocks import blocks_of
 from valve_friction_ros.evidence.design import (
@@ -148,7 +148,7 @@ def balance_of(
     if spring_constant is None:
         spread = math.sqrt(float(np.average((moves.place - place) ** 2, weights=moves.distance)))
         systematic[SPRING, SPRING] += (_BENT * scale / max(spread, 1e-12)) ** 2
-    quantile = float(special.stdtrit(max(count - 2, 2), 0.975))
+    quantile = float(scipy.special.stdtrit(max(count - 2, 2), 0.975))
     onsets = int(np.isfinite(moves.onset_force).sum())
     return Balance(values, scatter, systematic, quantile, speed, place, onsets, timing, lag)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from valve_friction_ros.evidence.moves import Moves
 
@@ -187,7 +187,7 @@ def scales_of(moves: Moves) -> Scales:
     )
     rows = np.column_stack((moves.direction, moves.place - place, np.ones(len(moves))))
     root = np.sqrt(moves.distance)
-    found = linalg.lstsq(rows * root[:, None], moves.force * root)[0]
+    found = scipy.linalg.lstsq(rows * root[:, None], moves.force * root)[0]
     least = 1e-9 * (1.0 + float(np.max(np.abs(moves.force))))
     return Scales(max(abs(float(found[0])), least), place, speed)
 

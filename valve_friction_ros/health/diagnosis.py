@@ -21,6 +21,7 @@ __all__ = [
     "Frictions",
     "against",
     "dead_band",
+    "dead_band_half_width",
     "diagnose",
     "diagnose_again",
     "is_compared",
@@ -178,6 +179,23 @@ def dead_band(result: Frictions, valve: Valve) -> float:
     if math.isnan(static_friction):
         static_friction = coulomb_friction
     return valve.share_of_travel((coulomb_friction + static_friction) / spring_constant)
+
+
+def dead_band_half_width(result: Frictions, valve: Valve) -> float:
+    """Return half the width of the 95 % interval of the dead band, as a share of the travel.
+
+    The errors of F_c and F_s are taken as one, which is the widest; that of k is independent. The
+    result is nan where the dead band is.
+    """
+    band = dead_band(result, valve)
+    if math.isnan(band):
+        return math.nan
+    spring, coulomb = (result.parameters[one] for one in ("spring_constant", "coulomb_friction"))
+    static = result.parameters.get("static_friction", coulomb)
+    if math.isnan(static.value):
+        static = coulomb
+    friction = (coulomb.half_width + static.half_width) / (coulomb.value + static.value or math.nan)
+    return abs(band) * math.hypot(friction, spring.half_width / spring.value)
 
 
 def leading_ratio(diagnosis: Diagnosis, findings: Iterable[Finding], level: Level) -> float:

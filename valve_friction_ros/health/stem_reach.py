@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
@@ -59,8 +59,10 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
         ``lowest_position`` and ``highest_position``; ``lower_stop`` and ``upper_stop`` where met.
     """
     mean = max(round(_MEAN / recording.sample_period), 1)
-    position = uniform_filter1d(recording.position, mean, mode="nearest")
-    force = valve.actuator_force(uniform_filter1d(recording.drive, mean, mode="nearest"))
+    position = scipy.ndimage.uniform_filter1d(recording.position, mean, mode="nearest")
+    force = valve.actuator_force(
+        scipy.ndimage.uniform_filter1d(recording.drive, mean, mode="nearest")
+    )
     noise = float(np.std(recording.position - position)) / math.sqrt(mean)
     near = max(_NEAR * float(np.ptp(position)), _NOISE * noise)
     least: NDArray[np.float64] = np.full(position.size, _SURELY * slip_force)
@@ -94,7 +96,7 @@ def _unknown_growth(
     coulomb, viscous = _friction(position[moving], speed[moving], force[moving])
     growth = max(coulomb, _SURELY * _slip_of_rests(position, force, moving, near, coulomb))
     recent = max(round(_RECENT / period), 1)
-    arriving = maximum_filter1d(np.abs(speed), recent, origin=(recent - 1) // 2)
+    arriving = scipy.ndimage.maximum_filter1d(np.abs(speed), recent, origin=(recent - 1) // 2)
     return growth + viscous * arriving
 
 

@@ -5,13 +5,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import stdtrit
+
+from valve_friction_ros.history.student import student_quantile
 
 __all__ = ["LEAST_ESTIMATES", "ScatteredLine", "fit_line"]
 
 LEAST_ESTIMATES = 4
 """Fewest estimates of a line: two more than it has parameters."""
+_HALVINGS = 60
 
 
 class ScatteredLine(NamedTuple):
@@ -42,7 +43,7 @@ class ScatteredLine(NamedTuple):
     @property
     def quantile(self) -> float:
         """Half width of a 95 % interval in standard errors."""
-        return float(stdtrit(self.freedom, 0.975))
+        return student_quantile(0.975, self.freedom)
 
     @property
     def slope_half_width(self) -> float:
@@ -129,9 +130,11 @@ def fit_line(
     scatter = 0.0
     if _misfit(0.0, times, values, errors)[-1] > freedom:
         highest = float(np.ptp(values)) + float(errors.max())
-        scatter = float(
-            brentq(lambda s: _misfit(s, times, values, errors)[-1] - freedom, 0.0, 2 * highest)
-        )
+        lowest, highest = 0.0, 2 * highest
+        for _ in range(_HALVINGS):  # the misfit falls with the scatter
+            scatter = 0.5 * (lowest + highest)
+            is_small = _misfit(scatter, times, values, errors)[-1] < freedom
+            lowest, highest = (lowest, scatter) if is_small else (scatter, highest)
     centre, level, slope, spread, misfit = _misfit(scatter, times, values, errors)
     total = float((1.0 / (errors**2 + scatter**2)).sum())
     scale = unit * math.sqrt(max(misfit / freedom, 1.0))

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.comparison import friction_words
 from valve_friction_ros.health.diagnosis import FrictionLimits
 from valve_friction_ros.history.entry import FrictionPoint, trended
 from valve_friction_ros.history.scattered_line import LEAST_ESTIMATES, ScatteredLine, fit_line
+from valve_friction_ros.history.student import student_quantile
 from valve_friction_ros.model.checks import require_non_negative
 
 __all__ = ["MONTH", "Crossing", "Limit", "Trend", "trend_of"]
@@ -146,7 +146,7 @@ def _robust_line(days: _Days) -> tuple[ScatteredLine, int]:
         time, error = days.times[worst], np.hypot(days.errors[worst], others.scatter)
         predicted = np.hypot(error, others.half_width(time) / others.quantile)
         surprise = abs(days.values[worst] - others.at(time)) / predicted
-        if surprise <= stdtrit(others.freedom, 1 - _OUTLIER / (2 * days.times.size)):
+        if surprise <= student_quantile(1 - _OUTLIER / (2 * days.times.size), others.freedom):
             break
         days, line, outliers = rest, others, outliers + 1
     return line, outliers

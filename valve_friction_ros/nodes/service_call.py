@@ -2,26 +2,30 @@
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import Trigger
 
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.service_request import (
+    LateError,
+    PatientRequest,
+    TriggerCall,
+    UnansweredError,
+)
 
 __all__ = ["Answer", "Caller", "caller"]
 
 _TURN = 0.05
-_SETTLING = 0.3
-"""Time from the discovery of a service to its call, s: a node that has not met the caller yet would
-answer in vain."""
 _LAST_WORD = 1.5
 """Time for the diagnosis that follows an answer, s: it is published each second."""
 
@@ -43,6 +47,7 @@ class Caller:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._levels: dict[str, Level] = {}
+        self._hears_levels = False
 
     def close(self) -> None:
         """Stop listening."""
@@ -102,31 +107,53 @@ class Caller:
 
         Raises RefusalError if there is no answer in time, or the identifier has ended.
         """
-        name = f"{identifier}/{service}"
-        client = self._node.create_client(Trigger, name)
         wants_level = service == "identify"
-        if wants_level:
+        if wants_level and not self._hears_levels:
+            self._hears_levels = True
             self._node.create_subscription(DiagnosticArray, "/diagnostics", self._note_levels, 100)
-        if not self._wait(client.service_is_ready, patience) and self._is_wanted():
-            raise RefusalError(f"no service {name} was met within {patience:g} s")
-        self._wait(lambda: False, _SETTLING)
-        self._levels.clear()
-        future = client.call_async(Trigger.Request())
-        self._wait(lambda: future.done() or not client.service_is_ready(), patience)
-        if not future.done():
-            if not self._is_wanted():
+        one = TriggerCall(self._node, identifier, service, patience, patience)
+
+        def has_answered() -> bool:
+            if not one.is_made:
+                self._levels.clear()  # of the time before
+            return one.step()
+
+        try:
+            if not self._wait(has_answered, 2 * patience):  # its own patience ends before
                 return None
-            if not client.service_is_ready():
-                raise RefusalError(f"{identifier} has ended before it answered")
-            raise RefusalError(
-                f"{name} has not answered within {patience:g} s: it goes on; give it longer by "
-                "--timeout"
-            )
+        except LateError as error:
+            raise RefusalError(f"{error}; give it longer by --timeout") from None
+        except UnansweredError as error:
+            raise RefusalError(str(error)) from None
+        finally:
+            one.close()
         status = f"{identifier}: friction"
         if wants_level:
             self._wait(lambda: status in self._levels, _LAST_WORD)
-        answer = future.result()
-        return Answer(answer.success, answer.message, self._levels.get(status))
+        return Answer(one.answer.success, one.answer.message, self._levels.get(status))
+
+    def set_parameters(self, node: str, values: Mapping[str, float], patience: float) -> None:
+        """Set parameters of a node, all at once.
+
+        Raises RefusalError if the node refuses, or does not answer in time.
+        """
+        one = PatientRequest(
+            self._node,
+            SetParametersAtomically,
+            f"{node}/set_parameters_atomically",
+            SetParametersAtomically.Request(
+                parameters=[
+                    Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
+                ]
+            ),
+        )
+        try:
+            if not self._wait(one.step, patience) and self._is_wanted():
+                raise RefusalError(f"{node} has not answered within {patience:g} s")
+        finally:
+            one.close()
+        if one.answer is not None and not one.answer.result.successful:
+            raise RefusalError(f"{node} refused: {one.answer.result.reason}")
 
 
 @contextmanager

@@ -8,19 +8,17 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.task import Future
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
-from std_srvs.srv import Trigger
 
 from valve_friction_ros.model import Recording
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
+from valve_friction_ros.nodes.service_request import PatientRequest, TriggerCall, UnansweredError
 from valve_friction_ros.streams import RecordBuffer
 from valve_friction_ros.streams.record_buffer import Snapshot
 
@@ -46,11 +44,6 @@ class BenchClient(Node):
         self._sweep: Float64MultiArray | None = None
         self._first_stamp: int | None = None
         self._last_stamp = 0
-        # Made long before their use: an answer to a client that is not yet discovered is lost.
-        self._triggers: dict[str, Client] = {
-            service: self.create_client(Trigger, f"{self._identifier}/{service}")
-            for service in ("identify", "set_baseline", "clear")
-        }
         # Taken in blocks, as the nodes do: a callback a sample would take most of a processor.
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
         self._stems = PolledSubscription(self, JointState, "stem_state", stream())
@@ -133,36 +126,34 @@ class BenchClient(Node):
             self._executor.spin_once(timeout_sec=_POLL)
             self._take()
 
-    def _result(self, future: Future, timeout: float, what: str) -> Any:
-        self.wait(future.done, timeout, f"answer of {what}")
-        return future.result()
-
     def trigger(self, service: str, timeout: float = 120.0) -> str:
         """Call a Trigger service of the identifier and return its message."""
-        if service not in self._triggers:
-            name = f"{self._identifier}/{service}"
-            self._triggers[service] = self.create_client(Trigger, name)
-        client = self._triggers[service]
-        self.wait(client.service_is_ready, timeout, f"service {service}")
-        response = self._result(client.call_async(Trigger.Request()), timeout, service)
-        if not response.success:
-            raise BenchError(f"{service}: {response.message}")
-        return str(response.message)
+        call = TriggerCall(self, self._identifier, service, timeout, timeout)
+        try:
+            self.wait(call.step, 2 * timeout, f"answer of {service}")
+        except UnansweredError as error:
+            raise BenchError(str(error)) from None
+        finally:
+            call.close()
+        if not call.answer.success:
+            raise BenchError(f"{service}: {call.answer.message}")
+        return str(call.answer.message)
 
     def set_parameters(self, node: str, values: Mapping[str, float], timeout: float = 10.0) -> None:
         """Set parameters of a node of the bench, all at once."""
         name = f"{self.get_namespace()}/{node}/set_parameters_atomically"
-        client = self.create_client(SetParametersAtomically, name)
-        self.wait(client.service_is_ready, timeout, f"service {name}")
         request = SetParametersAtomically.Request(
             parameters=[
                 Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
             ]
         )
-        response = self._result(client.call_async(request), timeout, name)
-        self.destroy_client(client)
-        if not response.result.successful:
-            raise BenchError(f"{node} refused: {response.result.reason}")
+        asked = PatientRequest(self, SetParametersAtomically, name, request)
+        try:
+            self.wait(asked.step, timeout, f"answer of {name}")
+        finally:
+            asked.close()
+        if not asked.answer.result.successful:
+            raise BenchError(f"{node} refused: {asked.answer.result.reason}")
 
     def sweep_columns(self, timeout: float = 5.0) -> dict[str, NDArray[np.float64]]:
         """Return the columns of the latest sweep by name."""

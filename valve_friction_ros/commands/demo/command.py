@@ -2,9 +2,11 @@
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import rclpy
@@ -160,9 +162,13 @@ def run(options: argparse.Namespace) -> int:
     with console.status("preparing"):  # beside each other, several nodes would compile the same
         compile_methods()
     os.environ.update(quick_discovery())
-    with free_domain() as domain:
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
-        return show_plant(console) if options.dashboard else _demonstrated(options, console)
+    # SIGTERM ends it as Ctrl-C does: the nodes have sessions of their own, and would stay.
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    with free_domain() as domain, TemporaryDirectory(prefix="valve_friction_demo") as home:
+        os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_HOME": home}  # a demo is no plant's
+        if options.dashboard:
+            return show_plant(console, Path(home))
+        return _demonstrated(options, console)
 
 
 def _demonstrated(options: argparse.Namespace, console: Console) -> int:

@@ -4,32 +4,26 @@ import contextlib
 import importlib.util
 import socket
 import subprocess
-import tempfile
 import time
 import webbrowser
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.parameter_client import AsyncParameterClient
-from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
-from std_srvs.srv import Trigger
 
 from valve_friction_ros.commands.demo.bench_client import BenchError
 from valve_friction_ros.commands.demo.bench_processes import NodeProcess, running_nodes
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.model import SquareWave
+from valve_friction_ros.nodes.service_call import Caller, caller
 
 __all__ = ["VALVES", "PlantValve", "plant_nodes", "require_dashboard", "show_plant"]
 
 _PORT = 8080
 _RATE = 200.0
 _RECORD = 2 * SquareWave().period
+_REST = _RECORD
+"""Time between a change of the packings and their identification, s: a record is new by then."""
 _FRICTION = 300.0
 _START_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 120.0
@@ -114,78 +108,31 @@ def _packing(friction: float) -> dict[str, float]:
     return {"coulomb_friction": friction, "static_friction": friction}
 
 
-class _Plant:
-    """A client of all valves."""
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
-        # Made long before their use: an answer to a client that is not yet discovered is lost.
-        self._triggers = {
-            (valve.name, service): node.create_client(
-                Trigger, f"/{valve.name}/identifier/{service}"
-            )
-            for valve in VALVES
-            for service in ("identify", "set_baseline", "clear")
-        }
-        self._simulators = {
-            valve.name: AsyncParameterClient(node, f"/{valve.name}/simulator") for valve in VALVES
-        }
-
-    def close(self) -> None:
-        self._executor.shutdown()
-        self._node.destroy_node()
-
-    def rest(self, seconds: float) -> None:
-        """Let time pass."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self._executor.spin_once(timeout_sec=0.1)
-
-    def wait_for_services(self) -> None:
-        """Wait until all have been met; raises BenchError if one is not there in time."""
-        deadline = time.monotonic() + _START_TIMEOUT
-        clients = [*self._triggers.values(), *self._simulators.values()]
-        while not all(
-            one.services_are_ready()
-            if isinstance(one, AsyncParameterClient)
-            else one.service_is_ready()
-            for one in clients
-        ):
-            if time.monotonic() > deadline:
-                raise BenchError(f"no answer of the nodes within {_START_TIMEOUT:g} s")
-            self.rest(0.1)
-
-    def call(self, valve: PlantValve, service: str) -> str:
-        """Call a service of an identifier; return its answer, also one without success."""
-        future = self._triggers[valve.name, service].call_async(Trigger.Request())
-        self._executor.spin_until_future_complete(future, _ANSWER_TIMEOUT)
-        answer = future.result()
-        return f"{service}: no answer" if answer is None else str(answer.message)
-
-    def turn(self, valve: PlantValve, values: Mapping[str, float]) -> None:
-        """Change the packing of a valve."""
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
-        future = self._simulators[valve.name].set_parameters_atomically(parameters)
-        self._executor.spin_until_future_complete(future, _ANSWER_TIMEOUT)
-
-
-def _tell(plant: _Plant, console: Console) -> None:
+def _tell(client: Caller, console: Console) -> None:
     """Identify all valves again and again, each time with the packing of the next step."""
     step = 0
     while True:
         for valve in VALVES:
-            plant.turn(valve, _packing(valve.friction(step)))
-            plant.call(valve, "clear")
-        plant.rest(_RECORD)
+            packing = _packing(valve.friction(step))
+            client.set_parameters(f"/{valve.name}/simulator", packing, _ANSWER_TIMEOUT)
+            _call(client, valve, "clear")
+        time.sleep(_REST)
         for valve in VALVES:
-            answer = plant.call(valve, "identify")
+            answer = _call(client, valve, "identify")
             if step == 0:
-                answer = plant.call(valve, "set_baseline")
+                answer = _call(client, valve, "set_baseline")
             says = f"{valve.name} ({valve.fate}, F_c {valve.friction(step):.0f} N): {answer}"
             console.print(says, highlight=False, markup=False)
         step += 1
+
+
+def _call(client: Caller, valve: PlantValve, service: str) -> str:
+    """Call a service of an identifier; return its answer, also one without success."""
+    answer = client.call(f"/{valve.name}/identifier", service, _ANSWER_TIMEOUT)
+    if answer is None:  # only where nobody wants it any more
+        raise KeyboardInterrupt
+    level = "" if answer.level is None else f"{answer.level.name}: "
+    return f"{level}{answer.message}"
 
 
 def _free_port() -> int:
@@ -211,12 +158,11 @@ def _wait_for_page(process: subprocess.Popen[bytes], port: int) -> None:
     raise BenchError(f"the dashboard did not open port {port} within {_START_TIMEOUT:g} s")
 
 
-def show_plant(console: Console) -> int:
-    """Run three valves and the dashboard until Ctrl-C."""
+def show_plant(console: Console, home: Path) -> int:
+    """Run three valves and the dashboard until Ctrl-C or SIGTERM; their history is in a folder."""
     port = _free_port()
+    history = home / "history.sqlite"
     with contextlib.ExitStack() as running, contextlib.suppress(KeyboardInterrupt):
-        folder = running.enter_context(tempfile.TemporaryDirectory(prefix="valve_friction_demo"))
-        history = Path(folder) / "history.sqlite"
         shown = NodeProcess("dashboard", {"port": port, "history_file": history})
         (dashboard,) = running.enter_context(running_nodes([shown], ""))
         for number, valve in enumerate(VALVES):
@@ -226,11 +172,8 @@ def show_plant(console: Console) -> int:
         address = f"http://127.0.0.1:{port}/"
         console.print(f"the dashboard is at {address} until Ctrl-C", highlight=False)
         webbrowser.open(address)
-        # Ctrl-C is Python's own: the handler of rclpy would end the context under the client.
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        running.callback(rclpy.try_shutdown)
-        plant = _Plant(rclpy.create_node("demo"))
-        running.callback(plant.close)
-        plant.wait_for_services()
-        _tell(plant, console)
+        client = running.enter_context(caller(lambda: True))
+        for valve in VALVES:
+            client.find(valve.name, _START_TIMEOUT)
+        _tell(client, console)
     return ExitCode.DONE

@@ -3,8 +3,11 @@
 export default {
   template: `<span hidden></span>`,
   mounted() {
-    // The socket is made after the elements. The usual 5000 ms keep a page waiting.
-    setTimeout(() => window.socket?.io?.reconnectionDelayMax?.(1500), 1000);
+    // The socket is made after the elements. The usual 1000 to 5000 ms keep a page waiting.
+    setTimeout(() => {
+      window.socket?.io?.reconnectionDelay?.(250);
+      window.socket?.io?.reconnectionDelayMax?.(500);
+    });
     this.jump = (event) => {
       const typing = /^(INPUT|TEXTAREA|SELECT)$/.test(document.activeElement?.tagName);
       const search = document.querySelector("input[type=search], .vf-search input");

@@ -5,13 +5,13 @@ from contextlib import contextmanager
 
 from nicegui import ui
 
+from valve_friction_ros.dashboard.heard.status_keys import Entry
 from valve_friction_ros.dashboard.pages.theme import element
-from valve_friction_ros.dashboard.status_keys import Entry
 
 _LONG = 40
 """Characters from which a value stands below its name."""
 
-__all__ = ["EntryList", "card", "chip", "table", "text"]
+__all__ = ["EntryList", "card", "chip", "retitle", "table", "text"]
 
 
 def text(tag: str, words: str, css: str = "") -> ui.element:
@@ -19,6 +19,13 @@ def text(tag: str, words: str, css: str = "") -> ui.element:
     with element(tag, css) as made:
         ui.label(words)
     return made
+
+
+def retitle(made: ui.element, words: str) -> None:
+    """Change the text of an element that `text` has made."""
+    label = made.default_slot.children[0]
+    if isinstance(label, ui.label):
+        label.set_text(words)
 
 
 def chip(state: str, word: str, letter: str = "") -> ui.element:

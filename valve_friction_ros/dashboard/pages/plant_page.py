@@ -8,9 +8,9 @@ from typing import Any
 from nicegui import run, ui
 
 from valve_friction_ros.dashboard.board import Board
+from valve_friction_ros.dashboard.heard.plant import Heard
 from valve_friction_ros.dashboard.pages.plant_table import PlantTable
 from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
-from valve_friction_ros.dashboard.plant import Heard
 from valve_friction_ros.dashboard.plant_rows import SIGNAL_WORDS, STATE_WORDS, RowFeed, summary
 from valve_friction_ros.dashboard.selection import (
     SIGNALS,

@@ -7,10 +7,10 @@ from typing import NamedTuple
 from nicegui import ui
 
 from valve_friction_ros.dashboard.graph import Answer, Operator
+from valve_friction_ros.dashboard.heard.status_keys import Quantity
+from valve_friction_ros.dashboard.heard.valve_view import ValveView
 from valve_friction_ros.dashboard.pages.theme import element
 from valve_friction_ros.dashboard.plant_rows import quantity_texts
-from valve_friction_ros.dashboard.status_keys import Quantity
-from valve_friction_ros.dashboard.valve_view import ValveView
 from valve_friction_ros.outside_text import printable
 
 __all__ = ["Question", "ValveActions", "question_of", "why_no_baseline"]

@@ -1,10 +1,10 @@
 """The parameters of a valve on its page, each with its interval, verdict and baseline."""
 
+from valve_friction_ros.dashboard.heard.status_keys import Quantity
+from valve_friction_ros.dashboard.heard.valve_view import ValveView
 from valve_friction_ros.dashboard.pages.parts import chip, text
 from valve_friction_ros.dashboard.pages.theme import element
 from valve_friction_ros.dashboard.plant_rows import number_and_width, quantity_texts
-from valve_friction_ros.dashboard.status_keys import Quantity
-from valve_friction_ros.dashboard.valve_view import ValveView
 
 __all__ = ["draw_parameters"]
 

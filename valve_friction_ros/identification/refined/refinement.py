@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import optimize
 
 from valve_friction_ros.identification.refined.output_error import Coordinates, OutputError
 from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
@@ -158,7 +158,7 @@ def least_squares_fit(
     """Fit the coordinates `names` by least squares, without instruments; return all."""
     units = problem.units(names, start)
     pressure = problem.record.pressure
-    fitted = optimize.least_squares(  # type: ignore[operator]  # the stubs take it for a module
+    fitted = scipy.optimize.least_squares(  # type: ignore[operator]  # the stubs take it for a module
         lambda step: problem.residual(_moved(start, units, step), pressure),
         np.zeros(len(units)),
         lambda step: problem.sensitivity(_moved(start, units, step), pressure, units),

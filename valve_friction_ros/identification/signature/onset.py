@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import optimize
 
 __all__ = ["Onset", "fit_onset"]
 
@@ -77,7 +77,7 @@ def _fit(
         return np.asarray((columns @ linear - position) / scale, dtype=np.float64)
 
     lowest, highest = np.log(shortest), np.log(span)
-    fitted = optimize.least_squares(  # type: ignore[operator]  # the stubs take it for a module
+    fitted = scipy.optimize.least_squares(  # type: ignore[operator]  # the stubs take it for a module
         misfit,
         [start[0], float(np.clip(np.log(start[1]), lowest, highest))],
         bounds=([time[0], lowest], [time[-1], highest]),

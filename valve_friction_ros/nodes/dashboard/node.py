@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.dashboard import Plant
+from valve_friction_ros.dashboard.heard.valve_view import Sources
 from valve_friction_ros.dashboard.options import INSTALL
-from valve_friction_ros.dashboard.valve_view import Sources
 from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_from
 from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
 from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls
@@ -21,7 +21,7 @@ from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
-from valve_friction_ros.nodes.plumbing.qos import stream
+from valve_friction_ros.nodes.plumbing.qos import statuses
 from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, cannot_start
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 
@@ -45,7 +45,7 @@ class Dashboard(PolledNode):
         self.calls = ServiceCalls()
         self.signals = WatchedSignals(self._sources_of)
         self._diagnostics = PolledSubscription(
-            self, DiagnosticArray, "/diagnostics", stream(), raw=True
+            self, DiagnosticArray, "/diagnostics", statuses(), raw=True
         )
 
     def _sources_of(self, identifier: str) -> Sources:
@@ -57,8 +57,8 @@ class Dashboard(PolledNode):
         now = time.monotonic()
         for taken in self._diagnostics.take():
             with contextlib.suppress(ValueError):  # anybody can publish other bytes
-                for name, read in statuses_in(taken.message):
-                    self.plant.hear(name, read, now)
+                for status in statuses_in(taken.message):
+                    self.plant.hear(status, now)
         self.calls.step(self)
         self.signals.step(self)
 
@@ -100,8 +100,30 @@ def _spare_memory() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
-    # A library for clients, 10 MB: engineio, which is imported below, does without it.
-    sys.modules.setdefault("aiohttp", None)  # type: ignore[arg-type]
+    _spare_memory()
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        node = Dashboard()
+    except (*WRONG_REQUESTS, OSError) as error:
+        rclpy.try_shutdown()
+        return cannot_start(error)
+    with contextlib.ExitStack() as limited:
+        try:
+            with _Turning(node):  # it meets the valves while the library of the pages is imported
+                return _serve(node, limited)
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+
+
+def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
+    """Serve the pages of a node; return the exit code.
+
+    Once it serves, Ctrl-C leaves a limited time to all that is within `limited`.
+    """
+    # Libraries for other uses, 10 MB: engineio, which is imported below, does without them.
+    for unused in ("aiohttp", "tornado"):
+        sys.modules.setdefault(unused, None)  # type: ignore[arg-type]
     try:
         from valve_friction_ros.dashboard.board import Board  # noqa: PLC0415
         from valve_friction_ros.dashboard.guarded_operator import GuardedOperator  # noqa: PLC0415
@@ -112,44 +134,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(_MISSING, file=sys.stderr)  # noqa: T201
         return 2
-    _spare_memory()
+    options, log = node.options, node.get_logger().info
+    stop = limited.enter_context(StopRequest())
+    try:
+        server.require_free(options.access.host, options.port)
+        visitors = server.guarded(options.access, log)
+    except (*WRONG_REQUESTS, OSError) as error:
+        stop.is_followed = True
+        return cannot_start(error)
+    board = Board(
+        options,
+        node.plant,
+        KeptHistory(options.history),
+        GuardedOperator(node.calls, visitors, log),
+        node.signals,
+        visitors,
+    )
 
-    def log(line: str) -> None:
-        node.get_logger().info(line)
+    def tell() -> None:
+        if options.access.warning:
+            node.get_logger().warning(options.access.warning)
+        log(f"ready: open {options.address}")
 
-    with StopRequest() as stop:
-        try:
-            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-            node = Dashboard()
-            options = node.options
-            server.require_free(options.access.host, options.port)
-            visitors = server.guarded(options.access, log)
-        except (*WRONG_REQUESTS, OSError) as error:
-            stop.is_followed = True
-            rclpy.try_shutdown()
-            return cannot_start(error)
-        board = Board(
-            options,
-            node.plant,
-            KeptHistory(options.history),
-            GuardedOperator(node.calls, visitors, log),
-            node.signals,
-            visitors,
-        )
-
-        def tell() -> None:
-            if options.access.warning:
-                node.get_logger().warning(options.access.warning)
-            log(f"ready: open {options.address}")
-
-        try:
-            with _Turning(node):
-                if not stop.has_come:
-                    server.serve(board, tell)
-                stop.is_followed = True
-        finally:
-            node.destroy_node()
-            rclpy.try_shutdown()
+    if not stop.has_come:
+        server.serve(board, tell)
+    stop.is_followed = True
     return 0
 
 

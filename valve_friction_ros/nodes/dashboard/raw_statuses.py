@@ -6,13 +6,13 @@ valves a second. Here the name is read as the message comes, and the rest once a
 
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message
 
-from valve_friction_ros.dashboard import Status
+from valve_friction_ros.dashboard import ESSENTIAL_KEYS, Status, Unread
 
 __all__ = ["status_of", "statuses_in"]
 
@@ -20,10 +20,12 @@ _LITTLE_ENDIAN = b"\x00\x01"
 _AFTER_STAMP = 12
 """First byte after the representation's header (4 bytes) and the stamp (8)."""
 _COUNT = struct.Struct("<I")
+_KEYS = tuple(_COUNT.pack(len(key.encode()) + 1) + key.encode() + b"\0" for key in ESSENTIAL_KEYS)
+"""The essential keys as they stand in a message: their length, their text and a zero byte."""
 
 
-def statuses_in(message: bytes) -> Iterator[tuple[str, Callable[[], Status]]]:
-    """Yield the name of each status of a diagnostic_msgs/DiagnosticArray, and what reads it.
+def statuses_in(message: bytes) -> Iterator[Unread]:
+    """Yield each status of a diagnostic_msgs/DiagnosticArray, still unread.
 
     Raises ValueError if the bytes are no such message.
     """
@@ -32,7 +34,7 @@ def statuses_in(message: bytes) -> Iterator[tuple[str, Callable[[], Status]]]:
             yield from _quickly(message)
         else:
             for one in deserialize_message(message, DiagnosticArray).status:
-                yield one.name, partial(status_of, one)
+                yield Unread(one.name, partial(status_of, one))
     except (struct.error, IndexError, MemoryError, RuntimeError) as error:
         raise ValueError(f"no diagnostics: {error}") from None
 
@@ -48,15 +50,14 @@ def status_of(message: DiagnosticStatus) -> Status:
     )
 
 
-def _quickly(message: bytes) -> Iterator[tuple[str, Callable[[], Status]]]:
+def _quickly(message: bytes) -> Iterator[Unread]:
     frame, at = _text(message, _AFTER_STAMP)
     del frame
     count, at = _count(message, at)
     for left in range(count - 1, -1, -1):
         name, _ = _text(message, at + 1)
-        yield name, partial(_status_at, message, at)
-        if left:
-            _, at = _read(message, at)
+        begin, at = at, _read(message, at)[1] if left else len(message)
+        yield Unread(name, partial(_status_at, message, begin), partial(_mark, message, begin, at))
 
 
 def _status_at(message: bytes, at: int) -> Status:
@@ -65,6 +66,24 @@ def _status_at(message: bytes, at: int) -> Status:
         return _read(message, at)[0]
     except (struct.error, IndexError) as error:
         raise ValueError(f"no status: {error}") from None
+
+
+def _mark(message: bytes, begin: int, end: int) -> tuple[object, ...]:
+    """Return level, message, tag and the values of the essential keys, a tenth of all.
+
+    The bytes between two texts are left out: they may be any.
+    """
+    try:
+        _, at = _text(message, begin + 1)
+        words, at = _text(message, at)
+        tag, at = _text(message, at)
+        values = [
+            _text(message, found + len(key))[0] if (found := message.find(key, at, end)) > 0 else ""
+            for key in _KEYS
+        ]
+    except (struct.error, IndexError) as error:
+        raise ValueError(f"no status: {error}") from None
+    return (message[begin], words, tag, *values)
 
 
 def _count(message: bytes, at: int) -> tuple[int, int]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.dashboard.live_strip import LiveStrip
-from valve_friction_ros.dashboard.valve_view import Sources
+from valve_friction_ros.dashboard.heard.live_strip import LiveStrip
+from valve_friction_ros.dashboard.heard.valve_view import Sources
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import watched

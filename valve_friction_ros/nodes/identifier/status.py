@@ -15,6 +15,7 @@ from valve_friction_ros.health import (
     StatusSignal,
     by_severity,
     dead_band,
+    dead_band_half_width,
 )
 from valve_friction_ros.history import Trend
 from valve_friction_ros.identification import SLIDING
@@ -27,8 +28,11 @@ __all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
 _EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
 
 
-def _result_values(shown: Mapping[str, Any], dead_band_share: float) -> dict[str, str]:
-    """Return what the diagnostic shows of a result, or of what is kept of one, as `to_dict`."""
+def _result_values(shown: Mapping[str, Any], band: float, half_width: float) -> dict[str, str]:
+    """Return what the diagnostic shows of a result, or of what is kept of one, as `to_dict`.
+
+    The dead band and half its interval's width are shares of the travel.
+    """
     values: dict[str, str] = {}
     for name, parameter in shown["parameters"].items():
         unit = parameter["unit"]
@@ -40,8 +44,9 @@ def _result_values(shown: Mapping[str, Any], dead_band_share: float) -> dict[str
         if parameter["published"] is not None:
             values[f"{name} published [{unit}]"] = number_text(parameter["published"])
     values["sliding_speed [m/s]"] = number_text(shown["sliding_speed"])
-    if math.isfinite(dead_band_share):
-        values["dead_band [%]"] = number_text(100 * dead_band_share)
+    if math.isfinite(band):
+        values["dead_band [%]"] = number_text(100 * band)
+        values["dead_band half width [%]"] = number_text(100 * half_width)
     if shown["rms"] is not None:
         values["fit [%]"] = number_text(100 * shown["fit"])
         values["rms [µm]"] = number_text(1e6 * shown["rms"])
@@ -126,8 +131,10 @@ def estimate_status(
     if estimate is not None and monitor.stamp is not None:
         values["estimate_time"] = _time(monitor.stamp)
         values["estimate_from"] = "this run" if monitor.earlier is None else "before the restart"
-        share = dead_band(estimate, monitor.settings.valve)
-        values |= _result_values(estimate.to_dict(), share)
+        valve = monitor.settings.valve
+        values |= _result_values(
+            estimate.to_dict(), dead_band(estimate, valve), dead_band_half_width(estimate, valve)
+        )
     values |= _baseline_values(monitor.baseline)
     values |= ratio_values(diagnosis.ratio)
     values |= trend_values(trend)

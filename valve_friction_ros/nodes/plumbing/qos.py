@@ -3,7 +3,7 @@
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-__all__ = ["LATCHED", "REQUESTS", "blocks", "qos_overrides", "stream", "watched"]
+__all__ = ["LATCHED", "REQUESTS", "blocks", "qos_overrides", "statuses", "stream", "watched"]
 
 
 def _kept_last(
@@ -38,6 +38,15 @@ def stream() -> QoSProfile:
 def blocks() -> QoSProfile:
     """Return the quality of service of a stream of blocks: deep enough for 100 s at 10 Hz."""
     return _kept_last(1_000)
+
+
+def statuses() -> QoSProfile:
+    """Return the quality of service of the statuses of a plant, each of which is soon replaced.
+
+    Deep enough for 4 s of 500 valves while the receiver is busy. The middleware keeps the memory of
+    the longest queue there was: at the depth of a stream that is 100 MB.
+    """
+    return _kept_last(2_000)
 
 
 def watched() -> QoSProfile:

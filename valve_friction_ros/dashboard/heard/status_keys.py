@@ -87,7 +87,7 @@ def _entry(key: str, text: str) -> Entry:
     name, unit = (match["name"], match["unit"] or "") if match else (key, "")
     value = number(text)
     shown = printable(text, _LONGEST) if math.isnan(value) and text != "nan" else _rounded(value)
-    unit = "" if unit in ("date", "time") else unit
+    unit = "" if unit in ("date", "time", "1") else unit
     return Entry(printable(name.replace("_", " "), _LONGEST), shown, printable(unit, 40))
 
 

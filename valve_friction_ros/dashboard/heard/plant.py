@@ -3,17 +3,16 @@
 import itertools
 import math
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from valve_friction_ros.dashboard.valve_view import (
+from valve_friction_ros.dashboard.heard.status_reading import (
     Essence,
-    Status,
-    ValveView,
     essence_of,
     identifier_in,
     view_of,
 )
+from valve_friction_ros.dashboard.heard.valve_view import Status, Unread, ValveView
 
 __all__ = ["MOST_VALVES", "Heard", "Plant"]
 
@@ -57,27 +56,37 @@ class _Valve:
     def __init__(self, number: int, view: ValveView) -> None:
         self.number = number
         self.at: float | None = None
-        self.unread: Callable[[], Status] | None = None
-        self.essence: Essence = ()
+        self.latest: Unread | None = None
         self.revision = 0
         self.is_kept = False
         self.view = view
+        self._mark: object = None
+        self._essence: Essence = ()
+        self._read: Unread | None = None
 
-    def look(self, node: str) -> None:
-        """Read what came last, if it is still unread; what is no status changes nothing."""
-        if self.unread is None:
+    def look(self, node: str, with_values: bool) -> None:
+        """Read what came last; without its values where nothing else can have changed.
+
+        What is no status changes nothing.
+        """
+        latest = self.latest
+        if latest is None or latest is self._read:
             return
-        read, self.unread = self.unread, None
         try:
-            status = read()
+            mark = None if latest.mark is None else latest.mark()
+            if mark is not None and mark == self._mark and not with_values:
+                return
+            status = latest.read()
         except ValueError:
+            self.latest = None
             return
+        self._mark = mark
         essence = essence_of(status)
-        if essence == self.essence:
-            self.view = replace(self.view, values=status.values)
-        else:
-            self.view, self.essence = view_of(node, status), essence
+        if essence != self._essence:
+            self.view, self._essence = view_of(node, status), essence
             self.revision += 1
+        self._read = latest if with_values else None
+        self.view = replace(self.view, values=status.values if with_values else {})
 
 
 class Plant:
@@ -98,19 +107,18 @@ class Plant:
         self._numbers = itertools.count()
         self._tidied = -math.inf
 
-    def hear(self, name: str, read: Callable[[], Status], at: float) -> None:
-        """Take the status of this name that came at a time, s of the monotonic clock.
+    def hear(self, status: Unread, at: float) -> None:
+        """Take a status that came at a time, s of the monotonic clock.
 
-        It is read when somebody looks; `read` raises ValueError if it is none. That of another node
-        is ignored.
+        It is read when somebody looks. That of another node than an identifier is ignored.
         """
-        node = identifier_in(name)
+        node = identifier_in(status.name)
         if node is None:
             return
         with self._lock:
             self._tidy(at)
             if (valve := self._entry(node, "")) is not None:
-                valve.at, valve.unread = at, read
+                valve.at, valve.latest = at, status
 
     def expect(self, valves: Iterable[tuple[str, str]]) -> None:
         """Show valves, (identifier, tag) each, that the history keeps, also before they are heard.
@@ -143,19 +151,22 @@ class Plant:
         return valve
 
     def valves(self, now: float) -> list[Heard]:
-        """Return all valves as they are at a time, s of the monotonic clock, in a fixed order."""
+        """Return all valves as they are at a time, s of the monotonic clock, in a fixed order.
+
+        Their views are without `values`.
+        """
         with self._lock:
             self._tidy(now)
-            return [self._heard(node, valve, now) for node, valve in self._valves.items()]
+            return [self._heard(node, valve, now, False) for node, valve in self._valves.items()]
 
     def valve(self, node: str, now: float) -> Heard | None:
         """Return the valve of an identifier, if it is known."""
         with self._lock:
             valve = self._valves.get(node)
-            return None if valve is None else self._heard(node, valve, now)
+            return None if valve is None else self._heard(node, valve, now, True)
 
-    def _heard(self, node: str, valve: _Valve, now: float) -> Heard:
-        valve.look(node)
+    def _heard(self, node: str, valve: _Valve, now: float, with_values: bool) -> Heard:
+        valve.look(node, with_values)
         age = None if valve.at is None else max(0.0, now - valve.at)
         silent = age is None or age > self._silence
         return Heard(valve.number, valve.view, age, silent, valve.revision)

@@ -1,0 +1,1 @@
+"""The dashboard under the load of a plant, as a browser meets it."""

@@ -1,0 +1,150 @@
+"""An afternoon of use, pressed into minutes: pages come and go, and the memory shall stay."""
+
+import itertools
+import random
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
+
+import numpy as np
+from playwright.sync_api import Browser, Page
+
+from benchmark.load.browser import Visit, pages_of, visit, wait_on_page
+from benchmark.load.plant import identifier_of
+from benchmark.load.stage import LIVE, Stage
+from benchmark.speed.rows import Row
+
+__all__ = ["afternoon_rows"]
+
+_LOOK = 10.0
+_SETTLED = 0.3
+"""Share of the time after which all that is kept once has been kept."""
+_GROWTH = 10.0
+"""Growth of the memory from then on, MB, that counts as steady. Chosen: 5 % of the bound."""
+_TABS = 4
+_Say = Callable[[str], None]
+
+
+class _Look(NamedTuple):
+    """What the dashboard holds at a time, s, and how many pages were opened until then."""
+
+    time: float
+    memory: float
+    threads: int
+    files: int
+    pages: int
+    heap: float
+
+
+def _heap(page: Page) -> float:
+    """Return the memory that a page's scripts hold in the browser, MB."""
+    session = page.context.new_cdp_session(page)
+    session.send("HeapProfiler.collectGarbage")
+    session.send("Performance.enable")
+    metrics = {
+        one["name"]: one["value"] for one in session.send("Performance.getMetrics")["metrics"]
+    }
+    session.detach()
+    return float(metrics["JSHeapUsedSize"]) / 1e6
+
+
+class _Visitor:
+    """Opens, uses and closes tabs."""
+
+    def __init__(self, browser: Browser, stage: Stage, seed: int) -> None:
+        self._browser, self._stage = browser, stage
+        self._chance = random.Random(seed)  # noqa: S311
+        self._tabs: list[Page] = []
+        self.pages = 0
+
+    def _draw(self) -> Visit:
+        valve = LIVE if self._chance.random() < 0.3 else identifier_of(
+            self._chance.randrange(self._stage.valves)
+        )  # fmt: skip
+        return self._chance.choice(pages_of(self._stage.valves, valve)[1:] + _searches())
+
+    def turn(self) -> None:
+        """Open a page, in a new tab or in one that is there, or use one, or close one."""
+        self.pages += 1
+        chance = self._chance.random()
+        if not self._tabs or (chance < 0.4 and len(self._tabs) < _TABS):
+            context = self._browser.new_context()
+            self._tabs.append(visit(context, self._stage.address, self._draw())[1])
+        elif chance < 0.75:
+            tab = self._chance.choice(self._tabs)
+            tab.goto(self._stage.address + self._draw().path, wait_until="commit")
+            wait_on_page(tab, "window.did_handshake")
+        elif chance < 0.85:
+            self._chance.choice(self._tabs).reload(wait_until="commit")
+        else:
+            tab = self._tabs.pop(self._chance.randrange(len(self._tabs)))
+            tab.context.close()
+
+    def close(self) -> None:
+        """Close all tabs."""
+        for tab in self._tabs:
+            tab.context.close()
+        self._tabs.clear()
+
+
+def _searches() -> tuple[Visit, ...]:
+    drawn = "document.querySelector('.vf-row, .vf-tile')"
+    return tuple(
+        Visit("search", f"/?{query}", drawn)
+        for query in (f"q={quote('12-fv')}", "show=error,warn", "ne=F&sort=-ratio", "view=tiles")
+    )
+
+
+def _looks(
+    browser: Browser, stage: Stage, seconds: float, seed: int, say: _Say, file: Path
+) -> Iterator[_Look]:
+    process, visitor = stage.dashboards[-1], _Visitor(browser, stage, seed)
+    with browser.new_context() as context, file.open("w", encoding="utf-8") as written:
+        wall = visit(context, stage.address, pages_of(stage.valves, LIVE)[0])[1]
+        begin = time.monotonic()
+        for due in itertools.count(1):
+            while time.monotonic() < begin + due * _LOOK:
+                visitor.turn()
+            look = _Look(
+                time.monotonic() - begin,
+                process.memory(),
+                process.threads(),
+                process.open_files(),
+                visitor.pages,
+                _heap(wall),
+            )
+            print(*look, sep=",", file=written, flush=True)
+            say(f"{look.time:.0f} s: {look.pages} pages, {look.memory:.1f} MB")
+            yield look
+            if look.time > seconds:
+                break
+        visitor.close()
+
+
+def _growth(times: np.ndarray, values: np.ndarray) -> float:
+    """Return by how much a straight line through the values grows over the times."""
+    return float(np.polyfit(times, values, 1)[0] * (times[-1] - times[0]))
+
+
+def afternoon_rows(
+    stage: Stage, browser: Browser, minutes: float, seed: int, say: _Say
+) -> Iterator[Row]:
+    """Use the dashboard for some minutes, and compare what it holds early and late."""
+    file = stage.folder / "afternoon.csv"
+    looks = np.array(list(_looks(browser, stage, 60 * minutes, seed, say, file)))
+    late = looks[looks[:, 0] > _SETTLED * looks[-1, 0]]
+    times = late[:, 0]
+    yield Row("pages opened, used and closed", looks[-1, 4], "")
+    grown = _growth(times, late[:, 1])
+    goal = f"under {_GROWTH:g} MB"
+    yield Row("memory at the end", late[-1, 1], "MB", late[0, 1], "once settled")
+    yield Row("growth of the memory since then", grown, "MB", goal=goal, met=grown < _GROWTH)
+    for name, column in (("threads", 2), ("open files and sockets", 3)):
+        grown = _growth(times, late[:, column])
+        yield Row(name, late[:, column].max(), "", late[0, column], "once settled")
+        yield Row(f"growth of the {name}", grown, "", goal="under 5", met=grown < 5)
+    grown = _growth(times, late[:, 5])
+    yield Row("the wall screen's own memory", late[-1, 5], "MB", late[0, 5], "once settled")
+    yield Row("growth of that", grown, "MB", goal="under 5 MB", met=grown < 5)

@@ -1,0 +1,101 @@
+"""`demo --dashboard` as a person meets it: a process, a browser, and Ctrl-C."""
+
+import contextlib
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from browser import Tab, chromium
+
+pytest.importorskip("nicegui", reason="NiceGUI is not installed")
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+HERE = Path(__file__).parent
+PATIENCE = 180.0
+
+
+def processes_of(session_home):
+    """The processes that run in a demo's folder, by their environment."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if str(session_home).encode() in (place / "environ").read_bytes():
+                found.append(int(place.name))
+    return found
+
+
+@pytest.fixture
+def demo(ros_environment, tmp_path):
+    """The running demo, whose temporary files are in `tmp_path`, and the address it opens."""
+    log = tmp_path / "demo.log"
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    more = {"TMPDIR": str(folder), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"}
+    environment = ros_environment | more
+    environment.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI behaves otherwise within a test
+    with log.open("w") as stream:
+        process = subprocess.Popen(
+            [sys.executable, HERE / "quick_plant.py", "demo", "--dashboard"],
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            cwd=tmp_path,
+            env=environment,
+        )
+    process.log, process.folder = log, folder
+
+    def said(words):
+        deadline = time.monotonic() + PATIENCE
+        while not (match := re.search(words, log.read_text())):
+            assert process.poll() is None, log.read_text()
+            assert time.monotonic() < deadline, f"no {words!r} in {log.read_text()}"
+            time.sleep(0.05)
+        return match[1]
+
+    process.said = said
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(60)
+        process.kill()
+
+
+def ends_clean(demo, request):
+    nodes = processes_of(demo.folder)
+    assert len(nodes) > 10  # itself, the dashboard, and three nodes a valve
+    demo.send_signal(request)
+    assert demo.wait(60) == 0
+    assert processes_of(demo.folder) == []
+    assert list(demo.folder.iterdir()) == []
+    assert "Traceback" not in demo.log.read_text()
+
+
+def test_three_valves_their_verdicts_and_a_clean_end(demo):
+    address = demo.said(r"the dashboard is at (http://127\.0\.0\.1:\d+)/")
+    with chromium() as browser, contextlib.closing(Tab(browser, address)) as tab:
+        page = tab.open("/")
+        page.set_default_timeout(1e3 * PATIENCE)
+        for tag, state in (("FV-101", "good"), ("FV-102", "failure"), ("FV-103", "out of spec")):
+            row = page.locator(".vf-row").filter(has_text=tag)
+            row.locator(".vf-chip").get_by_text(state).wait_for()
+        words = page.locator(".vf-row").all_inner_texts()
+        assert "FV-101" in words[-1]  # the worst come first
+        row = page.locator(".vf-row").filter(has_text="FV-102")
+        assert float(row.locator(".vf-c-ratio b").inner_text()) > 2
+        row.locator("a").click()
+        page.locator(".vf-sentence").get_by_text("excessive friction").wait_for()
+        page.locator(".vf-chart-trend canvas").wait_for()
+        page.get_by_text("No sample has come yet.").wait_for(state="hidden")
+    assert demo.said(r"(fv_103) \(leaking, F_c 90 N\): ERROR: friction has collapsed")
+    ends_clean(demo, signal.SIGINT)
+
+
+def test_sigterm_while_it_starts_leaves_nothing_behind(demo):
+    demo.said(r"the dashboard is at (\S+)")
+    ends_clean(demo, signal.SIGTERM)

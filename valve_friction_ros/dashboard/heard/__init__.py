@@ -1,0 +1,1 @@
+"""The valves and their signals as they were heard."""
