@@ -9,6 +9,7 @@ stderr any more, so that the stacks cannot be written, the system's alarm signal
 """
 
 import faulthandler
+import itertools
 import signal
 import time
 from collections.abc import Sequence
@@ -51,6 +52,7 @@ class Deadman:
 
     def __init__(self, nodes: Sequence[PolledNode]) -> None:
         self._nodes = nodes
+        self._next = itertools.cycle(nodes)
         self._armed = self._asked = time.monotonic()
 
     def turned(self) -> None:
@@ -71,6 +73,6 @@ class Deadman:
         A middleware that hangs never returns from this, and rclpy holds Python's lock meanwhile.
         """
         arm(_ANSWER)
-        node = self._nodes[0]
+        node = next(self._next)
         node.destroy_publisher(node.create_publisher(Empty, "~/alive", 1))
         arm()
