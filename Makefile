@@ -9,6 +9,7 @@ BENCH_ARGS ?=
 REALITY_ARGS ?=
 SERVICE_ARGS ?=
 CHURN_ARGS ?=
+HOSTS_ARGS ?=
 MUTANTS_ARGS ?=
 
 SHELL := /bin/bash
@@ -119,6 +120,10 @@ bench: venv  ## what each item costs beside its peers; BENCH_ARGS="--parts sweep
 .PHONY: churn
 churn: venv  ## nodes under clients that come and go for an hour; CHURN_ARGS="--minutes 5" for less
 	@"$(VENV)/bin/python" -m benchmark.churn $(CHURN_ARGS)
+
+.PHONY: hosts
+hosts: venv  ## a plant of five hosts, one of which dies and one is cut off, in network namespaces, as root; HOSTS_ARGS="--valves 100 --server"
+	@"$(VENV)/bin/python" -m benchmark.hosts $(HOSTS_ARGS)
 
 .PHONY: mutants
 mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some

@@ -11,6 +11,8 @@ import sys
 
 __all__ = ["main"]
 
+_IDENTIFIERS = ("-m", "valve_friction_ros.nodes.identifiers", "--ros-args", "--log-level", "error")
+
 
 def main() -> int:
     """Start both, and end them with the input."""
@@ -22,7 +24,7 @@ def main() -> int:
     parameters = [f"valves:=[{','.join(options.valves)}]", "history_file:=''", "window:=3600.0"]
     given = [word for one in parameters for word in ("-p", one)]
     identifiers = subprocess.Popen(
-        [sys.executable, "-m", "valve_friction_ros.nodes.identifiers", "--ros-args", *given],
+        [sys.executable, *_IDENTIFIERS, *given],
         stdin=subprocess.DEVNULL,
         stdout=sys.stderr,
     )
