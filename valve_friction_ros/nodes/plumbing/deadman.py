@@ -55,12 +55,17 @@ class Deadman:
         self._next = itertools.cycle(nodes)
         self._armed = self._asked = time.monotonic()
 
-    def turned(self) -> None:
-        """Note that the loop has turned; ask the middleware now and then."""
+    def goes_on(self) -> None:
+        """Note that the loop has done something."""
         now = time.monotonic()
         if now - self._armed >= _ARM:
             self._armed = now
             arm()
+
+    def turned(self) -> None:
+        """Note that the loop has turned; ask the middleware now and then."""
+        self.goes_on()
+        now = time.monotonic()
         heard = max((node.last_heard for node in self._nodes), default=now)
         pause = _AGAIN if now - heard >= _SILENCE else _RARELY
         if now - self._asked >= pause:

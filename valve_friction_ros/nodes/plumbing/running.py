@@ -62,9 +62,14 @@ def _run(
         is_lively = False
         for executor in executors:
             is_lively |= executor.turn()
+            deadman.goes_on()
         for node in nodes:
             node.poll_guarded()
-        watchdog.turned()
+            # Where hundreds of nodes get little of a core, their whole turn may last long.
+            watchdog.turned()
+            deadman.goes_on()
+            if stop.has_come:
+                return
         deadman.turned()
         now = time.monotonic()
         if is_lively:
