@@ -9,7 +9,9 @@ BENCH_ARGS ?=
 REALITY_ARGS ?=
 SERVICE_ARGS ?=
 CHURN_ARGS ?=
+SOAK_ARGS ?=
 LOAD_ARGS ?=
+HOSTS_ARGS ?=
 MUTANTS_ARGS ?=
 
 SHELL := /bin/bash
@@ -148,6 +150,10 @@ soak: venv  ## a month of a plant in an hour, each sample accounted for; SOAK_AR
 .PHONY: load
 load: venv-test browser  ## the dashboard before 500 valves in a real browser, 45 minutes; LOAD_ARGS="--parts bounds" for some
 	@"$(VENV)/bin/python" -m benchmark.load $(LOAD_ARGS)
+
+.PHONY: hosts
+hosts: venv  ## a plant of five hosts, one of which dies and one is cut off, in network namespaces, as root; HOSTS_ARGS="--valves 100 --server"
+	@"$(VENV)/bin/python" -m benchmark.hosts $(HOSTS_ARGS)
 
 .PHONY: mutants
 mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="--room trust --sample 100" for some

@@ -42,7 +42,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config", files("config/*.[jxy]*")),
+        (f"share/{NAME}/config", files("config/*.[jsxy]*")),
         (f"share/{NAME}/launch", files("launch/*.launch.py")),
     ],
     install_requires=[  # the oldest versions that `make test-oldest` tests

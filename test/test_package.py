@@ -383,7 +383,7 @@ def test_installed_tree(installed):
     share = installed / "share"
     assert (share / "ament_index/resource_index/packages" / NAME).is_file()
     assert (share / NAME / "package.xml").is_file()
-    for folder, pattern in (("config", "*.[jxy]*"), ("launch", "*.launch.py")):
+    for folder, pattern in (("config", "*.[jsxy]*"), ("launch", "*.launch.py")):
         wanted = {path.name for path in (PROJECT / folder).glob(pattern)}
         assert wanted
         assert {path.name for path in (share / NAME / folder).iterdir()} == wanted

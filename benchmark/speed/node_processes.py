@@ -11,7 +11,9 @@ from typing import IO
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from benchmark.process_usage import processor_seconds, resident_megabytes
@@ -19,7 +21,9 @@ from benchmark.process_usage import processor_seconds, resident_megabytes
 __all__ = ["DOMAIN", "Observer", "Process"]
 
 DOMAIN = 77
-_PATIENCE = 60.0
+_PATIENCE = 120.0
+_SETTLING = 0.5
+"""Time, s, after which a service that was found has met its client, too."""
 _SILENCE = 5.0
 """Time without new samples after which no more are expected, s."""
 _DEMO = Path(__file__).resolve().parents[2] / "valve_friction_ros" / "commands" / "demo"
@@ -35,18 +39,22 @@ class Process:
         Its name.
     arguments : sequence of str
         Its arguments.
+    own_profile : bool
+        Whether it brings a profile of Fast DDS itself, in place of that for a quick discovery.
     """
 
-    def __init__(self, module: str, arguments: Sequence[str] = ()) -> None:
+    def __init__(
+        self, module: str, arguments: Sequence[str] = (), own_profile: bool = False
+    ) -> None:
+        profile = {} if own_profile else {"FASTRTPS_DEFAULT_PROFILES_FILE": str(_PROFILE)}
+        inherited = dict(os.environ)
+        inherited.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
         self.begin = time.time()
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
-            env=os.environ
-            | {
-                "ROS_DOMAIN_ID": str(DOMAIN),
-                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-                "FASTRTPS_DEFAULT_PROFILES_FILE": str(_PROFILE),
-            },
+            env=inherited
+            | profile
+            | {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -97,6 +105,7 @@ class Observer:
         self._executor.add_node(self._node)
         self.buffered: dict[str, int] = {}
         self.first_seen: dict[str, float] = {}
+        self._clients: dict[str, Client] = {}
         self._node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 1000)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -123,7 +132,7 @@ class Observer:
             self.spin(0.1)
             if all(self.buffered.get(valve, -1) >= buffered for valve in valves):
                 return True
-            held = sum(self.buffered.values())
+            held = sum(self.buffered.values()) + len(self.buffered)
             if held > most:
                 most, end = held, time.monotonic() + _SILENCE
         return False
@@ -142,12 +151,23 @@ class Observer:
             self.spin(0.02)
         raise TimeoutError(f"/{valve}/identifier does not answer")
 
+    def ask(self, valve: str, service: str) -> Future:
+        """Call a service of a valve; return what becomes its answer."""
+        name = f"/{valve}/identifier/{service}"
+        if name not in self._clients:
+            self._clients[name] = self._node.create_client(Trigger, name)
+            self._clients[name].wait_for_service(_PATIENCE)
+            self.spin(_SETTLING)
+        return self._clients[name].call_async(Trigger.Request())
+
+    def wait(self, future: Future) -> None:
+        """Listen until an answer has come."""
+        self._executor.spin_until_future_complete(future, _PATIENCE)
+
     def identify(self, valve: str) -> tuple[bool, str]:
         """Call the identification of a valve; return whether it succeeded, and its message."""
-        client = self._node.create_client(Trigger, f"/{valve}/identifier/identify")
-        client.wait_for_service(_PATIENCE)
-        future = client.call_async(Trigger.Request())
-        self._executor.spin_until_future_complete(future, _PATIENCE)
+        future = self.ask(valve, "identify")
+        self.wait(future)
         response = future.result()
         return (False, "no answer") if response is None else (response.success, response.message)
 

@@ -26,7 +26,7 @@ _START = 1_700_000_000
 """Stamp of the first sample, s."""
 _TURN = 1e-3
 """Time between two looks at what is due, s."""
-_PATIENCE = 30.0
+_PATIENCE = 300.0
 _DEPTH = 20_000
 _STAMP = struct.Struct("<iI")
 _NUMBER = struct.Struct("<d")

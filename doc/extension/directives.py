@@ -56,7 +56,7 @@ def _skip_aliases(*event: Any) -> bool | None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Add the directives."""
-    app.add_directive("node-parameters", _directive(parameters_as_markdown, 1, 1))
+    app.add_directive("node-parameters", _directive(parameters_as_markdown, 1, 3))
     for name, write, arguments in (
         ("node-graph", graph_as_markdown, 2),
         ("diagnostic-keys", keys_as_markdown, 1),

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import rclpy
 from live_nodes import PATIENCE, SECOND, Client, Domain
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64
@@ -141,7 +140,7 @@ class TestTurn:
             answered.append(1)
             return ""
 
-        create_trigger_service(node, "~/work", work, ReentrantCallbackGroup())
+        create_trigger_service(node, "~/work", work)
         for _ in range(10):  # clients, each of which sends up to ten requests at once
             self.requests(client, 5)
         time.sleep(0.5)
@@ -162,7 +161,7 @@ class TestTurn:
 
     def test_others_go_on_while_work_is_awaited(self, bench):
         node, executor, client = bench
-        finish, group = threading.Event(), ReentrantCallbackGroup()
+        finish = threading.Event()
         with ThreadPoolExecutor(max_workers=1) as pool:
 
             async def work():
@@ -171,8 +170,8 @@ class TestTurn:
             async def quick():
                 return "quick"
 
-            create_trigger_service(node, "~/work", work, group)
-            create_trigger_service(node, "~/quick", quick, group)
+            create_trigger_service(node, "~/work", work)
+            create_trigger_service(node, "~/quick", quick)
             (slow,) = self.requests(client, 1)
             wait_until(executor.turn, "the request")
             assert executor.turn()  # it is awaited
@@ -197,7 +196,7 @@ class TestTurn:
                 async def in_pool(work=work):
                     return await done_in(pool, work)
 
-                create_trigger_service(node, f"~/{name}", in_pool, ReentrantCallbackGroup())
+                create_trigger_service(node, f"~/{name}", in_pool)
             refusal, failure = (
                 self.answers(executor, client, self.requests(client, 1, f"/polled/{name}"))[0]
                 for name in ("refuse", "fail")

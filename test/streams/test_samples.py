@@ -124,3 +124,18 @@ def test_single_samples_and_blocks_make_the_same(period):
     for buffer in (whole, single):
         np.testing.assert_array_equal(buffer.samples().stamps, stamps[-3001:])
         np.testing.assert_array_equal(buffer.samples().values, values[-3001:])
+
+
+def test_even_stamps_take_no_memory():
+    """One stamp that is 1 ns late costs its chunk of 1024 samples their 4 bytes each."""
+    stamps, values = START + 1_000_000 * np.arange(4096), np.zeros(4096)
+    uneven = stamps.copy()
+    uneven[2000] += 1
+    sizes = []
+    for some in (stamps, uneven):
+        buffer = SampleBuffer(10.0)
+        buffer.extend(Samples(some, values))
+        np.testing.assert_array_equal(buffer.samples().stamps, some)
+        sizes.append(buffer.nbytes)
+    opened = 1024 * 16
+    assert sizes == [opened + 8 * 4096, opened + 8 * 4096 + 4 * 1024]

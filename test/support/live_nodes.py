@@ -98,6 +98,10 @@ class NodeProcess:
         self._may_show_tracebacks = False
 
     @property
+    def pid(self):
+        return self._process.pid
+
+    @property
     def errors(self):
         return self._errors.read_text()
 

@@ -36,6 +36,10 @@ class RefusedRecordError(RefusalError):
         super().__init__(message)
         self.numbers = numbers
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let it pass from process to process."""
+        return type(self), (str(self), self.numbers)
+
 
 def numbers_of_refused(
     recording: Recording, valve: Valve, settings: IdentificationSettings

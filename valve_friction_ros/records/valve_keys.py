@@ -70,6 +70,8 @@ _IDENTIFIER_ONLY = (
 )
 _OTHER_NODES = (
     "valves",
+    "identification_processes",
+    "parameter_services",
     "position_noise",
     "noise_seed",
     "time_jitter",

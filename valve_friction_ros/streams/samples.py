@@ -34,34 +34,51 @@ class Samples(NamedTuple):
         )
 
 
+def _array(numbers: range) -> NDArray[np.int64]:
+    return np.arange(numbers.start, numbers.stop, numbers.step, dtype=np.int64)
+
+
 class _Chunk(NamedTuple):
-    """Consecutive samples, their stamps as offsets (ns) from the first."""
+    """Consecutive samples, their stamps as offsets (ns) from the first; a step alone if even."""
 
     first: int
     last: int
-    offsets: NDArray[np.uint32] | NDArray[np.int64]
+    offsets: range | NDArray[np.uint32] | NDArray[np.int64]
     values: NDArray[np.float64]
 
     @classmethod
     def of(cls, stamps: NDArray[np.int64], values: NDArray[np.float64]) -> "_Chunk":
         first, last = int(stamps[0]), int(stamps[-1])
-        offsets = stamps - first
+        offsets, kept = stamps - first, values.copy()
+        step = int(offsets[1])
+        even = range(0, step * stamps.size, step)
+        if np.array_equal(offsets, _array(even)):
+            return cls(first, last, even, kept)
         fits = last - first <= _LONGEST_OFFSET
-        return cls(first, last, offsets.astype(np.uint32) if fits else offsets, values.copy())
+        return cls(first, last, offsets.astype(np.uint32) if fits else offsets, kept)
 
     @property
     def nbytes(self) -> int:
-        return self.offsets.nbytes + self.values.nbytes
+        offsets = self.offsets
+        return self.values.nbytes + (0 if isinstance(offsets, range) else offsets.nbytes)
+
+    @property
+    def stamps(self) -> NDArray[np.int64]:
+        offsets = self.offsets
+        if isinstance(offsets, range):
+            return self.first + _array(offsets)
+        return self.first + offsets.astype(np.int64)
 
     def count_before(self, stamp: int) -> int:
-        return int(np.searchsorted(self.offsets, max(stamp - self.first, 0)))
+        return int(np.searchsorted(self.stamps, stamp))
 
 
 class SampleBuffer:
     """The last `window` seconds of one signal, in bounded memory.
 
-    A sample takes 12 bytes, or 16 where 1024 samples last longer than the 4.29 s that 32 bits of
-    nanoseconds hold; at most 1024 samples older than the window are still in memory.
+    A sample takes 8 bytes where 1024 stamps are evenly spaced to the nanosecond, else 12, or 16
+    where they last longer than the 4.29 s that 32 bits of nanoseconds hold; at most 1024 samples
+    older than the window are still in memory.
     """
 
     def __init__(self, window: float) -> None:
@@ -140,7 +157,7 @@ class SampleBuffer:
         """Copy the samples of the last window."""
         outside = self._outside()
         filled = slice(self._filled)
-        stamps = [chunk.first + chunk.offsets.astype(np.int64) for chunk in self._closed]
+        stamps = [chunk.stamps for chunk in self._closed]
         values = [chunk.values for chunk in self._closed]
         return Samples(
             np.concatenate((*stamps, self._open.stamps[filled]))[outside:],

@@ -16,14 +16,14 @@ from benchmark.speed.rows import Row, Settings
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import RecordBuffer, rows_arrived
 
-__all__ = ["measure"]
+__all__ = ["Outcome", "fed", "fleet", "measure"]
 
 _OURS = "valve_friction_ros.nodes.identifier.node"
 _PEER = "benchmark.speed.typed_identifier"
 _PEER_NAME = "typed, default executor"
 _VALVE = "fv_1"
 _NO_HISTORY = ("-p", "history_file:=''")
-_VALVES = [f"fv_{number}" for number in range(100)]
+_VALVES = [f"fv_{number}" for number in range(500)]
 _SETTLING = 3.0
 _LONGEST_REPEAT = 20.0
 _UNIT = "cores"
@@ -37,6 +37,7 @@ class Outcome(NamedTuple):
     sent: int
     arrived: int
     seconds_to_start: float
+    cpu_to_start: float
     megabytes: float
 
 
@@ -52,7 +53,8 @@ def _identifier(module: str, window: float) -> Process:
     return Process(module, arguments)
 
 
-def _fleet(count: int, window: float) -> Process:
+def fleet(count: int, window: float) -> Process:
+    """Start the identifiers of some valves in one process."""
     valves = ",".join(_VALVES[:count])
     arguments = [
         "--ros-args",
@@ -62,7 +64,7 @@ def _fleet(count: int, window: float) -> Process:
         "-p",
         f"window:={window:.1f}",
     ]
-    return Process("valve_friction_ros.nodes.identifiers", arguments)
+    return Process("valve_friction_ros.nodes.identifiers", arguments, own_profile=True)
 
 
 def _cost(process: Process, listener: Observer, seconds: float) -> float:
@@ -75,7 +77,7 @@ def _nothing(_: Observer) -> None:
     pass
 
 
-def _stream(
+def fed(
     start: Callable[[float], Process],
     valves: Sequence[str],
     rate: int,
@@ -87,7 +89,7 @@ def _stream(
     with observer() as listener, start(2 * seconds + 60) as process:
         if not listener.wait_for(valves, process):
             raise RuntimeError("the identifiers do not publish their diagnostics")
-        started = max(listener.first_seen.values()) - process.begin
+        started, spent = max(listener.first_seen.values()) - process.begin, process.cpu()
         listener.spin(_SETTLING)
         idle = _cost(process, listener, 5.0)
         stream = ["--rate", str(rate), "--seconds", str(seconds), *options]
@@ -98,7 +100,7 @@ def _stream(
             sent = 2 * int(source.output.readline())
             listener.wait_for(valves, process, sent)
         arrived = min(listener.buffered.values())
-        return Outcome(idle, busy, sent, arrived, started, process.resident())
+        return Outcome(idle, busy, sent, arrived, started, spent, process.resident())
 
 
 def _one_valve(settings: Settings) -> Iterator[Row]:
@@ -107,7 +109,7 @@ def _one_valve(settings: Settings) -> Iterator[Row]:
     for repeat in range(settings.repeats):
         for module, outcomes in found.items():
             settings.say(f"1 kHz × 2 topics, {module}, {repeat + 1} of {settings.repeats}")
-            outcomes.append(_stream(lambda w, m=module: _identifier(m, w), [_VALVE], 1000, seconds))
+            outcomes.append(fed(lambda w, m=module: _identifier(m, w), [_VALVE], 1000, seconds))
     busy, idle = (
         [statistics.median(getattr(one, name) for one in found[which]) for which in (_OURS, _PEER)]
         for name in ("busy", "idle")
@@ -135,10 +137,10 @@ def _share(outcome: Outcome) -> float:
 
 def _ten_kilohertz(settings: Settings) -> Iterator[Row]:
     settings.say(f"10 kHz × 2 topics for {settings.seconds:g} s")
-    ours = _stream(lambda w: _identifier(_OURS, w), [_VALVE], 10_000, settings.seconds)
+    ours = fed(lambda w: _identifier(_OURS, w), [_VALVE], 10_000, settings.seconds)
     settings.say("10 kHz × 2 topics, typed")
     seconds = min(settings.seconds, _LONGEST_REPEAT)
-    peer = _stream(lambda w: _identifier(_PEER, w), [_VALVE], 10_000, seconds)
+    peer = fed(lambda w: _identifier(_PEER, w), [_VALVE], 10_000, seconds)
     item = f"10 kHz × 2 topics for {settings.seconds:g} s"
     yield Row(item, ours.busy, _UNIT, peer.busy, f"{_PEER_NAME}, {seconds:g} s")
     goal, met = "nothing lost", ours.arrived == ours.sent
@@ -154,7 +156,7 @@ def _while_identifying(settings: Settings) -> Iterator[Row]:
         while len(answers) < 3:
             answers.append(listener.identify(_VALVE)[0])
 
-    ours = _stream(lambda w: _identifier(_OURS, w), [_VALVE], 1000, 2 * seconds, meanwhile=identify)
+    ours = fed(lambda w: _identifier(_OURS, w), [_VALVE], 1000, 2 * seconds, meanwhile=identify)
     goal, met = "nothing lost", ours.arrived == ours.sent and all(answers)
     yield Row("arrived during three identifications", _share(ours), "%", None, "", goal, met)
 
@@ -162,11 +164,11 @@ def _while_identifying(settings: Settings) -> Iterator[Row]:
 def _many_valves(settings: Settings) -> Iterator[Row]:
     settings.say("10 valves in one process, 1 kHz × 2 topics each")
     seconds = min(settings.seconds, _LONGEST_REPEAT)
-    topics = _stream(lambda w: _fleet(10, w), _VALVES[:10], 1000, seconds)
+    topics = fed(lambda w: fleet(10, w), _VALVES[:10], 1000, seconds)
     yield Row("10 valves in one process, 1 kHz × 2 topics", topics.busy, _UNIT)
     yield Row("of that arrived at the valve with the least", _share(topics), "%")
     settings.say("100 valves, blocks of 100 samples")
-    blocks = _stream(lambda w: _fleet(100, w), _VALVES, 1000, settings.seconds, ["--blocks"])
+    blocks = fed(lambda w: fleet(100, w), _VALVES[:100], 1000, settings.seconds, ["--blocks"])
     goal, met = "under one core, nothing lost", blocks.busy < 1 and blocks.arrived == blocks.sent
     yield Row("100 valves, blocks of 100 at 10 Hz", blocks.busy, _UNIT, None, "", goal, met)
     yield Row("of that arrived at the valve with the least", _share(blocks), "%")

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -85,12 +86,18 @@ class Identifier(PolledNode):
         Namespace of the valve, where it is not given by a ROS argument.
     number_topics : bool, optional
         Default of the parameter of this name.
+    **named
+        What else `PolledNode` takes.
     """
 
     def __init__(
-        self, workers: Workers, namespace: str | None = None, number_topics: bool = True
+        self,
+        workers: Workers,
+        namespace: str | None = None,
+        number_topics: bool = True,
+        **named: Any,
     ) -> None:
-        super().__init__("identifier", namespace=namespace)
+        super().__init__("identifier", namespace=namespace, **named)
         own = replace(NUMBER_TOPICS, default=number_topics)
         declare_parameters(self, [own if one is NUMBER_TOPICS else one for one in PARAMETERS])
         warn_of_columns(self)
@@ -110,8 +117,7 @@ class Identifier(PolledNode):
         self._estimate_topic = EstimateTopic(self)
         results = NumberTopics(self)
         self._identification = Identification(self, self._monitor, results, workers.identify)
-        waiting = ReentrantCallbackGroup()
-        self._schedule = Schedule(self, self._identify_as_scheduled, waiting)
+        self._schedule = Schedule(self, self._identify_as_scheduled, ReentrantCallbackGroup())
         self._history = HistoryWriter(self, self._monitor, tag)
         earlier = self._history.prepare()
         self._evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
@@ -150,7 +156,7 @@ class Identifier(PolledNode):
             ("clear", self._clear, ""),
             ("reset_usage", self._reset_usage, ""),
         ):
-            create_trigger_service(self, f"~/{name}", work, waiting, failure)
+            create_trigger_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
         self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
         self._jump_handle = self.get_clock().create_jump_callback(
@@ -160,14 +166,13 @@ class Identifier(PolledNode):
             post_callback=self._on_time_jump,
         )
 
-    def destroy_node(self) -> None:
-        """Stop the clock's callback, write what waits, then stop the node."""
+    def close(self) -> None:
+        """Stop the clock's callback, and write what waits."""
         self._jump_handle.unregister()
         self._usage.close()
         self._evidence.close()
         self._response.close()
         self._history.close()
-        super().destroy_node()
 
     def poll(self) -> None:
         """Take the samples that have arrived."""

@@ -80,8 +80,8 @@ class ValveInputs:
                 stems = self._readable(self._stem, stems, JointState)
                 arrivals = arrivals_of(pressures, stems, self._joint)
             self._hand_on(arrivals)
-        for block in self._blocks.take():
-            self._take_block(block.message)
+        if blocks := [taken.message for taken in self._blocks.take()]:
+            self._take_blocks(blocks)
 
     def _readable(
         self, source: _Input, taken: Sequence[TakenMessage], kind: type
@@ -97,14 +97,24 @@ class ValveInputs:
         return found
 
     def follow_publishers(self) -> None:
-        """Take from best-effort and from reliable publishers; to be called now and then."""
+        """Take from best-effort and from reliable publishers; to be called now and then.
+
+        While blocks come nobody is asked for topics: the middleware looks through its whole graph.
+        """
+        if self._blocks.watch.silence() <= _SILENCE:
+            return
         for one in (self._pressure, self._stem, self._blocks):
             one.follow_publishers()
 
-    def _take_block(self, message: Float64MultiArray) -> None:
+    def _take_blocks(self, blocks: Sequence[Float64MultiArray]) -> None:
+        """Hand all blocks on together: each look at samples costs as much as a thousand of them."""
         try:
-            arrivals = rows_of(message)
+            arrivals = rows_of(blocks)
         except ValueError as error:
+            if len(blocks) > 1:
+                for block in blocks:
+                    self._take_blocks([block])
+                return
             self._bad_block = f"a block on {self._blocks.watch.topic}: {error}"
             self._node.get_logger().warning(self._bad_block, throttle_duration_sec=5.0)
         else:

@@ -9,6 +9,7 @@ stderr any more, so that the stacks cannot be written, the system's alarm signal
 """
 
 import faulthandler
+import itertools
 import signal
 import time
 from collections.abc import Sequence
@@ -51,14 +52,20 @@ class Deadman:
 
     def __init__(self, nodes: Sequence[PolledNode]) -> None:
         self._nodes = nodes
+        self._next = itertools.cycle(nodes)
         self._armed = self._asked = time.monotonic()
 
-    def turned(self) -> None:
-        """Note that the loop has turned; ask the middleware now and then."""
+    def goes_on(self) -> None:
+        """Note that the loop has done something."""
         now = time.monotonic()
         if now - self._armed >= _ARM:
             self._armed = now
             arm()
+
+    def turned(self) -> None:
+        """Note that the loop has turned; ask the middleware now and then."""
+        self.goes_on()
+        now = time.monotonic()
         heard = max((node.last_heard for node in self._nodes), default=now)
         pause = _AGAIN if now - heard >= _SILENCE else _RARELY
         if now - self._asked >= pause:
@@ -71,6 +78,6 @@ class Deadman:
         A middleware that hangs never returns from this, and rclpy holds Python's lock meanwhile.
         """
         arm(_ANSWER)
-        node = self._nodes[0]
+        node = next(self._next)
         node.destroy_publisher(node.create_publisher(Empty, "~/alive", 1))
         arm()

@@ -1,10 +1,11 @@
 """Conversion between messages and plain numbers."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
@@ -34,11 +35,20 @@ def position_of(message: JointState, joint: str) -> float | None:
     return joint_position(message.name, message.position, joint)
 
 
-def rows_of(message: Float64MultiArray) -> Arrivals:
-    """Take the samples out of a block: a row each of s, Pa and m.
+def rows_of(messages: Sequence[Float64MultiArray]) -> Arrivals:
+    """Take the samples out of blocks that follow each other: a row each of s, Pa and m.
 
-    Raises ValueError if the layout is not that of such a block; the message says what it should be.
+    Raises ValueError if the layout of one is not that of such a block; the message says what it
+    should be.
     """
+    tables, labels = zip(*map(_table_of, messages), strict=True)
+    if any(one != labels[0] for one in labels):
+        raise ValueError("the columns are not the same in all blocks")
+    return rows_arrived(np.concatenate(tables), labels[0])
+
+
+def _table_of(message: Float64MultiArray) -> tuple[NDArray[np.float64], list[str]]:
+    """Return the numbers of a block, a row each sample, and what its columns are labelled."""
     dimensions = message.layout.dim
     if len(dimensions) != 2:
         raise ValueError(f"the layout has {len(dimensions)} dimensions, not sample × columns")
@@ -52,7 +62,7 @@ def rows_of(message: Float64MultiArray) -> Arrivals:
             f"not {rows.size} × {columns.size} from 0"
         )
     table = np.asarray(message.data, dtype=np.float64).reshape(rows.size, columns.size)
-    return rows_arrived(table, columns.label.split(","))
+    return table, columns.label.split(",")
 
 
 def sweep_message(sweep: Sweep | None) -> Float64MultiArray:

@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -50,8 +51,9 @@ class ParameterSpec:
     read_only: bool = False
     choices: tuple[str, ...] = ()
 
+    @cached_property
     def descriptor(self) -> ParameterDescriptor:
-        """Return the ROS description of this parameter."""
+        """The ROS description of this parameter, which all nodes of the process share."""
         descriptor = ParameterDescriptor(
             description=self.description,
             additional_constraints=f"one of {', '.join(self.choices)}" if self.choices else "",
@@ -81,7 +83,7 @@ def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
     declared = tuple(specs)
     _require_known(node, {spec.name for spec in declared})
     for spec in declared:
-        node.declare_parameter(spec.name, spec.default, spec.descriptor())
+        node.declare_parameter(spec.name, spec.default, spec.descriptor)
     numbers = {spec.name for spec in declared if isinstance(spec.default, float)}
 
     def read_numbers(changes: list[Parameter]) -> list[Parameter]:

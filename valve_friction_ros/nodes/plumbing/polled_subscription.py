@@ -12,12 +12,11 @@ rclpy offers no public method that takes a message. Its own executors and ``wait
 import time
 from typing import Any, NamedTuple
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.polled_node import NeverReady, PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
 
 __all__ = ["PolledSubscription", "TakenMessage"]
@@ -32,19 +31,6 @@ class TakenMessage(NamedTuple):
 
     message: Any
     received: int
-
-
-class _NeverReady(CallbackGroup):
-    """A callback group from which no executor waits for anything."""
-
-    def can_execute(self, entity: object) -> bool:  # noqa: ARG002 - rclpy's signature
-        return False
-
-    def beginning_execution(self, entity: object) -> bool:  # noqa: ARG002
-        return False
-
-    def ending_execution(self, entity: object) -> None:
-        pass
 
 
 class PolledSubscription:
@@ -71,7 +57,7 @@ class PolledSubscription:
             topic,
             self._refuse,
             quality,
-            callback_group=_NeverReady(),
+            callback_group=NeverReady(),
             qos_overriding_options=overrides,
             raw=self._raw,
         )

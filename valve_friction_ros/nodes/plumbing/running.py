@@ -4,9 +4,10 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import rclpy
+from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -18,7 +19,7 @@ from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
 from valve_friction_ros.nodes.plumbing.worker import workers_have_ended
 
-__all__ = ["WRONG_REQUESTS", "cannot_start", "run_node", "run_nodes"]
+__all__ = ["WRONG_REQUESTS", "cannot_start", "join_graph", "run_node", "run_nodes"]
 
 _PAUSE = 0.1
 _LIVELY_PAUSE = 0.02
@@ -48,7 +49,7 @@ def cannot_start(error: Exception) -> int:
 
 def _run(
     nodes: Sequence[PolledNode],
-    executor: TurnExecutor,
+    executors: Sequence[TurnExecutor],
     pause: float,
     stop: StopRequest,
     watchdog: Watchdog,
@@ -58,15 +59,27 @@ def _run(
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
     while rclpy.ok() and not stop.has_come:
-        is_lively = executor.turn()
+        is_lively = False
+        for executor in executors:
+            is_lively |= executor.turn()
+            deadman.goes_on()
         for node in nodes:
             node.poll_guarded()
-        watchdog.turned()
+            # Where hundreds of nodes get little of a core, their whole turn may last long.
+            watchdog.turned()
+            deadman.goes_on()
+            if stop.has_come:
+                return
         deadman.turned()
         now = time.monotonic()
         if is_lively:
             lively_until = now + _LIVELY_TIME
         time.sleep(max(least, min(pause, _LIVELY_PAUSE) if now < lively_until else pause))
+
+
+def join_graph(arguments: Sequence[str] | None, context: Context | None = None) -> None:
+    """Make the process a participant of the ROS graph, or one more for another context."""
+    rclpy.init(args=arguments, context=context, signal_handler_options=SignalHandlerOptions.NO)
 
 
 def run_nodes(
@@ -106,10 +119,10 @@ def _run_until(
     pause: float,
 ) -> int:
     nodes: list[Node] = []
-    executor = None
+    executors: dict[Context, TurnExecutor] = {}
     arm()
     try:
-        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        join_graph(arguments)
     except WRONG_REQUESTS as error:
         disarm()
         return cannot_start(error)
@@ -122,25 +135,39 @@ def _run_until(
                     return 0
         except WRONG_REQUESTS as error:
             return cannot_start(error)
-        executor = TurnExecutor()
         for node in nodes:
-            executor.add_node(node)
+            if node.context not in executors:
+                executors[node.context] = TurnExecutor(context=node.context)
+            executors[node.context].add_node(node)
         polled = [node for node in nodes if isinstance(node, PolledNode)]
         with Watchdog(polled) as watchdog:
-            _run(polled, executor, pause, stop, watchdog, Deadman(polled))
+            _run(polled, [*executors.values()], pause, stop, watchdog, Deadman(polled))
     except ExternalShutdownException:
         pass
     finally:
         stop.is_followed = True
         arm(_CLEAN_UP)
-        # An executor that still holds the node's entities would keep them alive.
-        if executor is not None:
-            executor.shutdown()
-        for node in nodes:
-            node.destroy_node()
-        rclpy.try_shutdown()
+        _close(nodes, executors)
         disarm()
     return 0
+
+
+def _close(nodes: Sequence[Node], executors: Mapping[Context, TurnExecutor]) -> None:
+    """Destroy the nodes and leave the graph.
+
+    All write first: the middleware takes more time for hundreds of nodes than is left to the end.
+    """
+    for node in nodes:
+        if isinstance(node, PolledNode):
+            node.close()
+    # An executor that still holds the node's entities would keep them alive.
+    for executor in executors.values():
+        executor.shutdown()
+    for node in nodes:
+        node.destroy_node()
+    for context in executors:
+        context.try_shutdown()
+    rclpy.try_shutdown()
 
 
 def run_node(

@@ -1,5 +1,6 @@
 """Threads for work that takes its time: how long it has lasted, and how the process ends."""
 
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,26 +16,33 @@ _PAUSE = 0.02
 
 
 class Worker(ThreadPoolExecutor):
-    """One thread that does one thing after the other.
+    """A thread that does one thing after the other, or some threads that share what is to be done.
 
     Parameters
     ----------
     name : str
         Name of the thread.
     prepare : callable, optional
-        What it does first.
+        What each thread does first.
     finishes : bool
         Whether the end of the process waits a little for what has been submitted.
+    threads : int
+        Number of threads.
     """
 
     def __init__(
-        self, name: str, prepare: Callable[[], object] | None = None, finishes: bool = False
+        self,
+        name: str,
+        prepare: Callable[[], object] | None = None,
+        finishes: bool = False,
+        threads: int = 1,
     ) -> None:
-        super().__init__(max_workers=1, thread_name_prefix=name)
+        super().__init__(max_workers=threads, thread_name_prefix=name)
         self.finishes = finishes
-        self._last: Future[Any] | None = None
-        self._begun: float | None = None
-        self._preparation = None if prepare is None else self.submit(prepare)
+        self._unfinished: set[Future[Any]] = set()
+        self._begun: dict[int, float] = {}
+        wanted = () if prepare is None else (prepare,) * threads
+        self._preparations = [self.submit(one) for one in wanted]
         _workers.add(self)
 
     def submit(
@@ -44,33 +52,34 @@ class Worker(ThreadPoolExecutor):
         *arguments: _Arguments.args,
         **named: _Arguments.kwargs,
     ) -> Future[_Result]:
-        """Do some work when all that was submitted before is done."""
+        """Do some work when all that was submitted before is done, or begun by other threads."""
 
         def timed() -> _Result:
-            self._begun = time.monotonic()
+            self._begun[threading.get_ident()] = time.monotonic()
             try:
                 return work(*arguments, **named)
             finally:
-                self._begun = None
+                del self._begun[threading.get_ident()]
 
         future = super().submit(timed)
-        self._last = future
+        self._unfinished.add(future)
+        future.add_done_callback(self._unfinished.discard)
         return future
 
     @property
     def is_busy(self) -> bool:
         """Whether something is being done, or waits to be."""
-        return self._last is not None and not self._last.done()
+        return bool(self._unfinished)
 
     @property
     def is_preparing(self) -> bool:
-        """Whether what it does first is not done yet."""
-        return self._preparation is not None and not self._preparation.done()
+        """Whether what the threads do first is not done yet."""
+        return not all(one.done() for one in self._preparations)
 
     def busy_for(self) -> float:
-        """Return how long the work under way has lasted, s; 0 if there is none."""
-        begun = self._begun
-        return 0.0 if begun is None else time.monotonic() - begun
+        """Return how long the longest work under way has lasted, s; 0 if there is none."""
+        begun = [*self._begun.values()]
+        return time.monotonic() - min(begun) if begun else 0.0
 
 
 _workers: WeakSet[Worker] = WeakSet()

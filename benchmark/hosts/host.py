@@ -1,0 +1,49 @@
+"""The processes of one host: `identifiers` and the source of its samples.
+
+It prints their numbers as JSON, then how many samples of a signal each valve was sent, and ends
+with its input.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+
+__all__ = ["main"]
+
+_IDENTIFIERS = ("-m", "valve_friction_ros.nodes.identifiers", "--ros-args", "--log-level", "error")
+
+
+def main() -> int:
+    """Start both, and end them with the input."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("valves", nargs="+")
+    parser.add_argument("--rate", type=int, required=True)
+    parser.add_argument("--seconds", type=float, required=True)
+    options = parser.parse_args()
+    parameters = [f"valves:=[{','.join(options.valves)}]", "history_file:=''", "window:=3600.0"]
+    given = [word for one in parameters for word in ("-p", one)]
+    identifiers = subprocess.Popen(
+        [sys.executable, *_IDENTIFIERS, *given],
+        stdin=subprocess.DEVNULL,
+        stdout=sys.stderr,
+    )
+    stream = ["--rate", str(options.rate), "--seconds", str(options.seconds), "--blocks"]
+    source = subprocess.Popen(
+        [sys.executable, "-m", "benchmark.speed.stream_source", *options.valves, *stream],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    print(json.dumps({"identifiers": identifiers.pid, "source": source.pid}), flush=True)  # noqa: T201
+    print(source.stdout.readline() if source.stdout else "", end="", flush=True)  # noqa: T201
+    sys.stdin.read()
+    for process in (identifiers, source):
+        process.terminate()
+    for process in (identifiers, source):
+        process.wait(20)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

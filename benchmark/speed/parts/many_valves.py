@@ -1,0 +1,76 @@
+"""Hundreds of valves in one process: start, memory, cost and answers.
+
+The peer of 500 valves is five times what 100 valves take, so a ratio below one is growth beyond
+proportion.
+"""
+
+import time
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from benchmark.speed.node_processes import Observer
+from benchmark.speed.parts.streams import Outcome, fed, fleet
+from benchmark.speed.rows import Row, Settings
+
+__all__ = ["measure"]
+
+_FEW, _MANY = 100, 500
+_RATE = 1000
+_IDENTIFIED = 5
+
+
+class _Found(NamedTuple):
+    outcome: Outcome
+    answer: float
+
+
+def _found(count: int, settings: Settings) -> _Found:
+    """Stream to some valves for longer than a window; ask one while others identify."""
+    settings.say(f"{count} valves, 1 kHz in blocks of 100")
+    valves = [f"fv_{number}" for number in range(count)]
+    answers = [0.0]
+
+    def ask(listener: Observer) -> None:
+        listener.wait(listener.ask(valves[-1], "restore_baseline"))
+        working = [listener.ask(valve, "identify") for valve in valves[:_IDENTIFIED]]
+        while not all(one.done() for one in working):
+            begin = time.monotonic()
+            listener.wait(listener.ask(valves[-1], "restore_baseline"))  # refused, at once
+            answers.append(time.monotonic() - begin)
+            listener.spin(0.1)
+
+    outcome = fed(
+        lambda _: fleet(count, 60.0), valves, _RATE, settings.seconds + 30, ["--blocks"], ask
+    )
+    return _Found(outcome, max(answers))
+
+
+def _rows(few: _Found, many: _Found) -> Iterable[Row]:
+    times, peer = _MANY // _FEW, f"{_MANY // _FEW} × {_FEW} valves"
+    (one, _), (all_of, answer) = few, many
+    wall, cpu = all_of.seconds_to_start, all_of.cpu_to_start
+    yield Row("start to the last diagnostic", wall, "s", None, "", "under 10 s", wall < 10)
+    yield Row("processor time until then", cpu, "CPU s", times * one.cpu_to_start, peer)
+    memory, goal = all_of.megabytes, "under 1500 MB"
+    yield Row(
+        "memory, windows of 60 s", memory, "MB", times * one.megabytes, peer, goal, memory < 1500
+    )
+    busy, goal = all_of.busy, "under one core"
+    yield Row("1 kHz in blocks of 100", busy, "cores", times * one.busy, peer, goal, busy < 1)
+    yield Row("no stream", all_of.idle, "cores", times * one.idle, peer)
+    goal = "under 1 s"
+    yield Row(
+        "longest answer while others identify",
+        answer,
+        "s",
+        few.answer,
+        f"{_FEW} valves",
+        goal,
+        answer < 1,
+    )
+
+
+def measure(settings: Settings) -> Iterable[Row]:
+    """Measure a process of 100 valves and one of 500."""
+    few, many = (_found(count, settings) for count in (_FEW, _MANY))
+    return _rows(few, many)
