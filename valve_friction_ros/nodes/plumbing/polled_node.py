@@ -29,8 +29,6 @@ __all__ = ["NeverReady", "PolledNode", "TurnExecutor"]
 
 _LONGEST_TURN = 0.5
 """Time, s, after which what is still ready waits for the next turn."""
-_MOST_REQUESTS = 100
-"""Requests of a service that are taken at once."""
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
 """The types are those of ROS 2, which everybody has; the service would be two endpoints more."""
 
@@ -169,16 +167,14 @@ class TurnExecutor(SingleThreadedExecutor):
         for node in self.get_nodes():
             for service in node.services:
                 if isinstance(service.callback_group, NeverReady):
-                    self._take_requests_of(service)
+                    self._take_request_of(service)
         return len(self._answers) > before
 
-    def _take_requests_of(self, service: Service) -> None:
-        handle, kind = service.handle, service.srv_type.Request
-        for _ in range(_MOST_REQUESTS):
-            with handle:  # so that nothing destroys it meanwhile
-                request, header = handle.service_take_request(kind)
-            if header is None:
-                return
+    def _take_request_of(self, service: Service) -> None:
+        # One at a time, as rclpy runs the newest of its tasks first.
+        with service.handle:  # so that nothing destroys it meanwhile
+            request, header = service.handle.service_take_request(service.srv_type.Request)
+        if header is not None:
             self._answers.append(self.create_task(_answer, service, request, header))
 
     def _run_ready(self) -> None:
