@@ -56,9 +56,13 @@ def _run(
     deadman: Deadman,
 ) -> None:
     """Take turns until the stop is requested."""
+
+    def goes_on() -> bool:
+        return rclpy.ok() and not stop.has_come
+
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
-    while rclpy.ok() and not stop.has_come:
+    while goes_on():
         is_lively = False
         for executor in executors:
             is_lively |= executor.turn()
@@ -68,7 +72,7 @@ def _run(
             # Where hundreds of nodes get little of a core, their whole turn may last long.
             watchdog.turned()
             deadman.goes_on()
-            if stop.has_come:
+            if not goes_on():
                 return
         deadman.turned()
         now = time.monotonic()
