@@ -62,7 +62,7 @@ def _run(
 
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
-    while goes_on():
+    while not _is_over(stop):
         is_lively = False
         for executor in executors:
             is_lively |= executor.turn()
@@ -72,13 +72,17 @@ def _run(
             # Where hundreds of nodes get little of a core, their whole turn may last long.
             watchdog.turned()
             deadman.goes_on()
-            if not goes_on():
+            if _is_over(stop):
                 return
         deadman.turned()
         now = time.monotonic()
         if is_lively:
             lively_until = now + _LIVELY_TIME
         time.sleep(max(least, min(pause, _LIVELY_PAUSE) if now < lively_until else pause))
+
+
+def _is_over(stop: StopRequest) -> bool:
+    return stop.has_come or not rclpy.ok()
 
 
 def join_graph(arguments: Sequence[str] | None, context: Context | None = None) -> None:
