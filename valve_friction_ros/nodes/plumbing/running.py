@@ -56,10 +56,6 @@ def _run(
     deadman: Deadman,
 ) -> None:
     """Take turns until the stop is requested."""
-
-    def goes_on() -> bool:
-        return rclpy.ok() and not stop.has_come
-
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
     while not _is_over(stop):
