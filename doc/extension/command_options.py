@@ -64,5 +64,8 @@ def command_as_markdown(command: str) -> str:
 
 def list_as_markdown() -> str:
     """Return the sub-commands, each with what it does."""
-    rows = (f"| [`{name}`](#{name}) | {escaped(text)} |" for name, text in command_names().items())
+    rows = (
+        f"| [`{name}`](#{name.replace(' ', '-')}) | {escaped(text)} |"
+        for name, text in command_names().items()
+    )
     return "\n".join(["| sub-command | what it does |", "| --- | --- |", *rows])

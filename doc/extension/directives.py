@@ -26,6 +26,7 @@ def _directive(write: Callable[..., str], arguments: int, more: int = 0) -> type
     class Written(SphinxDirective):
         required_arguments = arguments
         optional_arguments = more
+        final_argument_whitespace = not more  # a command of two words
 
         def run(self) -> list[nodes.Node]:
             try:
