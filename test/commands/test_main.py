@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -97,12 +98,13 @@ class TestChoice:
     @pytest.mark.parametrize("name", SUB_COMMANDS)
     def test_each_describes_itself(self, command, capsys, name):
         with pytest.raises(SystemExit) as end:
-            command(name, "--help")
+            command(*name.split(), "--help")
         assert end.value.code == 0
         out = capsys.readouterr().out
         assert out.startswith(f"usage: valve_friction {name} ")
         assert "exit code 2" in " ".join(out.lower().replace("; 2:", " exit code 2").split())
-        module = importlib.import_module(f"valve_friction_ros.commands.{name.replace('-', '_')}")
+        file = re.sub("[- ]", "_", name)
+        module = importlib.import_module(f"valve_friction_ros.commands.{file}")
         assert all(issubclass(error, Exception) for error in module.REFUSALS)
 
     def test_an_unknown_option_names_the_sub_command(self, command, capsys):
