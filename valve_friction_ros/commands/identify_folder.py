@@ -155,7 +155,9 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
         rest = f" and {more} more" if more > 0 else ""
         print(f"skipped, no recordings: {shown}{rest}", file=sys.stderr)
     if not findings.recordings:
-        raise ValueError(f"{options.folder}: there are no tables and no bags in it")
+        raise ValueError(
+            f"{options.folder}: there are no tables (CSV, xlsx, Parquet) and no bags in it"
+        )
     baselines = _baselines(options, [found.name for found in findings.recordings])
     wanted = any(map(is_page, options.output)) and not options.no_reports
     plans = make_plan(findings, options, baselines, reports if wanted else None)

@@ -49,8 +49,8 @@ export default {
           <td class="vf-c-fc vf-n" data-label="friction, N"><b>{{ row.fc }}</b><small>{{ row.fcw }}</small><small class="vf-of">{{ row.fcof }}</small></td>
           <td class="vf-c-trend"><svg v-if="row.spark" viewBox="0 0 100 24" preserveAspectRatio="none"
               role="img" :aria-label="'friction ratio of the last ' + row.days + ' days'">
-              <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg></td>
-          <td class="vf-c-drift vf-n" data-label="drift, N a month"><b>{{ row.drift }}</b><small>{{ row.expected }}</small></td>
+              <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg><small>{{ row.expected }}</small></td>
+          <td class="vf-c-drift vf-n" data-label="drift, N a month"><b>{{ row.drift }}</b></td>
           <td class="vf-c-age vf-n" data-label="identified">{{ since(row) }}</td>
           <td class="vf-c-heard vf-n" data-label="heard">{{ heard(row) }}</td>
         </tr>
