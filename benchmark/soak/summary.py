@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from benchmark.churn.processes import CODES
 from benchmark.speed.rows import Row
 
 __all__ = ["rows"]
@@ -107,7 +108,8 @@ def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
     yield _none("silent sensors that nobody told", sum(not one["told"] for one in of("silence")))
     yield _none("full disks that nobody told", sum(not one["told"] for one in of("full disk")))
     for end in of("ending"):
-        if end["code"] != 0:
-            yield Row(f"{end['name']} ended with code", end["code"] or -1, "", goal="0", met=False)
+        if end["code"] not in CODES:
+            item, code = f"{end['name']} ended with code", end["code"] or -1
+            yield Row(item, code, "", goal="that of its signal", met=False)
     yield _none("processes that ended by themselves", len(of("died")))
     yield from _memory(of("memory"))
