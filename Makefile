@@ -102,8 +102,9 @@ browser:  ## Chromium for the tests of pages, by apt-get where root runs make; t
 	@if command -v chromium >/dev/null; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	    echo "Installing Chromium: once, about a minute ..."; \
-	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
-	        apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null; \
+	    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+	        apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null; } \
+	    || echo "make: tests of pages in a browser are skipped: \`apt-get install chromium\` has failed"; \
 	else echo "make: tests of pages in a browser are skipped: run \`apt install chromium\`"; fi
 
 .PHONY: postgres
