@@ -39,6 +39,7 @@ def write(path, server, number, most):
             keep_told_level(history, valve, Level(k % 3))
         sys.stdout.write(f"{k}\n")
         sys.stdout.flush()
+    unsent.follow(history.path)  # before the sender has done so, nothing is counted
     while unsent.count_unsent(history.path).waiting:
         time.sleep(0.02)
     sends.end()
