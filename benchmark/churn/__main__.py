@@ -2,27 +2,22 @@
 
 import argparse
 import contextlib
-import random
 import signal
 import sys
-import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from rich.console import Console
-
 from benchmark.churn.crowd import Crowd
-from benchmark.churn.domain import quiet_domain
+from benchmark.churn.endurance import add_run_arguments, endured
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import nodes, process_of
 from benchmark.churn.processes import FROZEN, NodeProcess, Usage
 from benchmark.churn.summary import hung_services, rows
-from benchmark.speed.table import machine_shape, rows_table
+from benchmark.speed.rows import Row
 
 __all__ = ["main"]
 
-_WIDTH_OF_A_FILE = 120
 _TURN = 0.05
 _LOOK = 10.0
 _SETTLED = 60.0
@@ -33,10 +28,8 @@ _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where Fast DDS has its files
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="churn", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=60.0, help="how long (%(default)g)")
+    add_run_arguments(parser)
     parser.add_argument("--at-once", type=int, default=4, help="visitors at a time (%(default)s)")
-    parser.add_argument("--seed", type=int, help="of all chance; default: drawn, and printed")
-    parser.add_argument("--folder", type=Path, help="of ledger and logs; default: a new one")
     return parser
 
 
@@ -117,21 +110,12 @@ def _have_died(processes: dict[str, NodeProcess], folder: Path, ledger: Ledger) 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the churn; return 1 if a goal is missed."""
     options = _parser().parse_args(arguments)
-    seed = random.SystemRandom().randrange(2**31) if options.seed is None else options.seed
-    folder = options.folder or Path(tempfile.mkdtemp(prefix="churn_"))
-    folder.mkdir(parents=True, exist_ok=True)
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
-    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
-    with quiet_domain() as domain:
-        console.print(f"seed {seed}, domain {domain}, ledger and logs in {folder}", soft_wrap=True)
-        ledger = Ledger(folder / "ledger.jsonl")
-        _run(folder, 60 * options.minutes, Crowd(ledger, seed, options.at_once), ledger)
-    found = list(rows(list(ledger.events())))
-    console.print(rows_table(f"{options.minutes:g} minutes of churn", found))
-    missed = [row for row in found if row.met is False]
-    for row in missed:
-        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
-    return 1 if missed else 0
+
+    def live(folder: Path, seconds: float, seed: int, ledger: Ledger) -> Iterator[Row]:
+        _run(folder, seconds, Crowd(ledger, seed, options.at_once), ledger)
+        return rows(list(ledger.events()))
+
+    return endured("churn", f"{options.minutes:g} minutes of churn", options, live)
 
 
 if __name__ == "__main__":

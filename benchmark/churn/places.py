@@ -13,6 +13,7 @@ __all__ = [
     "STREAMS",
     "Node",
     "nodes",
+    "parameter_words",
     "process_of",
 ]
 
@@ -41,7 +42,8 @@ class Node(NamedTuple):
     arguments: Sequence[str]
 
 
-def _parameters(**values: object) -> list[str]:
+def parameter_words(**values: object) -> list[str]:
+    """Return the arguments that set parameters of a node."""
     return [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
 
 
@@ -50,7 +52,7 @@ def nodes(folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS) ->
 
     The valve streams as its bench does; the others, in one process, hear the same streams.
     """
-    files = _parameters(
+    files = parameter_words(
         history_file=folder / "history.sqlite",
         save_folder=folder / "saved",
         report_folder=folder / "reports",
@@ -69,13 +71,13 @@ def nodes(folder: Path, valve: str = _VALVE, others: Sequence[str] = _OTHERS) ->
             *heard,
             "--params-file",
             str(_BENCH),
-            *_parameters(valves=f"[{','.join(others)}]"),
+            *parameter_words(valves=f"[{','.join(others)}]"),
             *files,
         ],
-        "simulator": [*place, *_parameters(position_noise=5e-6)],
+        "simulator": [*place, *parameter_words(position_noise=5e-6)],
         "pressure_source": [
             *place,
-            *_parameters(sample_rate=float(RATE)),
+            *parameter_words(sample_rate=float(RATE)),
         ],
     }
     return {name: Node(name, arguments) for name, arguments in found.items()}

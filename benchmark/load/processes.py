@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from benchmark.churn.places import parameter_words
 from benchmark.process_usage import processor_seconds, resident_megabytes
 
 __all__ = ["Process", "node_arguments", "running"]
@@ -22,9 +23,7 @@ def node_arguments(namespace: str, parameters: Mapping[str, object]) -> list[str
     words = ["--ros-args", "--log-level", "info"]
     if namespace:
         words += ["-r", f"__ns:={namespace}"]
-    for name, value in parameters.items():
-        words += ["-p", f"{name}:={value}"]
-    return words
+    return words + parameter_words(**parameters)
 
 
 class Process:

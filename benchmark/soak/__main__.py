@@ -5,22 +5,19 @@ import math
 import random
 import signal
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from rich.console import Console
-
-from benchmark.churn.domain import quiet_domain
+from benchmark.churn.endurance import add_run_arguments, endured
 from benchmark.churn.ledger import Ledger
-from benchmark.churn.places import Node
+from benchmark.churn.places import Node, parameter_words
 from benchmark.soak.disk import small_disk
 from benchmark.soak.faults import FAULTS, Site, settled
 from benchmark.soak.feed import Feed, Piece
 from benchmark.soak.plant import Plant, Process
 from benchmark.soak.summary import rows
-from benchmark.speed.table import machine_shape, rows_table
+from benchmark.speed.rows import Row
 from valve_friction_ros.history import HistoryFile
 
 __all__ = ["main"]
@@ -28,7 +25,6 @@ __all__ = ["main"]
 _MONTH = 30 * 86_400 * 10**9
 _BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
 _GROWTH = {"/fv_101": 1.0, "/fv_102": 1.6, "/fv_201": 1.0, "/fv_202": 2.5}
-_WIDTH_OF_A_FILE = 120
 _TURN = 0.02
 _PAUSE = 3.0
 """Mean time between two records of a valve, s."""
@@ -41,26 +37,20 @@ _LOOKS = (0.1, 0.25, 0.5, 0.75)
 """Shares of the month at which the memory is looked at, besides its end."""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="soak", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=60.0, help="how long (%(default)g)")
-    parser.add_argument("--seed", type=int, help="of all chance; default: drawn, and printed")
-    parser.add_argument("--folder", type=Path, help="of ledger and logs; default: a new one")
-    return parser
-
-
 def _processes(folder: Path, disk: Path) -> tuple[Process, ...]:
     """Start two identifiers of one valve each, and a process of two that lives through all."""
-    common = ["--params-file", str(_BENCH)]
-    for name, value in {
-        "history_file": disk / "history.sqlite",
-        "save_folder": folder / "saved",
-        "report_folder": folder / "reports",
-        "window": 10.0,
-        "input_timeout": 8.0,
-        "alarm_recordings": 3,
-    }.items():
-        common += ["-p", f"{name}:={value}"]
+    common = [
+        "--params-file",
+        str(_BENCH),
+        *parameter_words(
+            history_file=disk / "history.sqlite",
+            save_folder=folder / "saved",
+            report_folder=folder / "reports",
+            window=10.0,
+            input_timeout=8.0,
+            alarm_recordings=3,
+        ),
+    ]
     *single, first, second = _GROWTH
     found = [
         Process(
@@ -71,7 +61,7 @@ def _processes(folder: Path, disk: Path) -> tuple[Process, ...]:
         )
         for valve in single
     ]
-    many = Node("identifiers", [*common, "-p", f"valves:=[{first},{second}]"])
+    many = Node("identifiers", [*common, *parameter_words(valves=f"[{first},{second}]")])
     return (*found, Process("identifiers", many, (first, second), folder / "identifiers.log"))
 
 
@@ -183,11 +173,11 @@ def _live(month: _Month, plant: Plant) -> None:
     while month.share < 1.0:
         month.turn()
         if month.share > look:
-            memory = plant.usage(lasting).memory
+            memory = lasting.life.process.usage().memory
             plant.ledger.add("memory", name=lasting.name, share=look, megabytes=memory)
             look = next(looks, math.inf)
     month.finish()
-    memory = plant.usage(lasting).memory
+    memory = lasting.life.process.usage().memory
     plant.ledger.add("memory", name=lasting.name, share=1.0, megabytes=memory)
     for process in plant.processes:
         plant.end_life(process, signal.SIGINT)
@@ -195,22 +185,15 @@ def _live(month: _Month, plant: Plant) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the soak; return 1 if a goal is missed."""
-    options = _parser().parse_args(arguments)
-    seed = random.SystemRandom().randrange(2**31) if options.seed is None else options.seed
-    folder = options.folder or Path(tempfile.mkdtemp(prefix="soak_"))
-    folder.mkdir(parents=True, exist_ok=True)
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
-    console.print(", ".join(f"{name} {value}" for name, value in machine_shape().items()))
-    with quiet_domain() as domain:
-        console.print(f"seed {seed}, domain {domain}, ledger and logs in {folder}", soft_wrap=True)
-        ledger = Ledger(folder / "ledger.jsonl")
-        stored = _run(folder, 60 * options.minutes, random.Random(seed), ledger)
-    found = list(rows(list(ledger.events()), stored))
-    console.print(rows_table(f"a month in {options.minutes:g} minutes", found))
-    missed = [row for row in found if row.met is False]
-    for row in missed:
-        console.print(f"[red]missed[/] {row.item}: {row.goal}", soft_wrap=True)
-    return 1 if missed else 0
+    parser = argparse.ArgumentParser(prog="soak", description=__doc__)
+    add_run_arguments(parser)
+    options = parser.parse_args(arguments)
+
+    def live(folder: Path, seconds: float, seed: int, ledger: Ledger) -> Iterator[Row]:
+        stored = _run(folder, seconds, random.Random(seed), ledger)
+        return rows(list(ledger.events()), stored)
+
+    return endured("soak", f"a month in {options.minutes:g} minutes", options, live)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import Node
-from benchmark.churn.processes import NodeProcess, Usage
+from benchmark.churn.processes import NodeProcess
 from benchmark.soak.feed import Piece
 from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
@@ -285,7 +285,3 @@ class Plant:
                 causes=values.get("samples_rejected causes", ""),
                 unsaved=life.unsaved,
             )
-
-    def usage(self, process: Process) -> Usage:
-        """Return what a process uses."""
-        return process.life.process.usage()

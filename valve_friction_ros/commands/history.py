@@ -12,7 +12,7 @@ from valve_friction_ros.commands.arguments.history_place import (
     history_place,
     usual_history,
 )
-from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
+from valve_friction_ros.commands.arguments.kept_valves import add_valve_argument, chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
 from valve_friction_ros.commands.output.usage_output import (
@@ -80,13 +80,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="the identifiers' history_file, or the server of their history_url "
         f"(that of {URL_VARIABLE}, else {history_file()})",
     )
-    parser.add_argument(
-        "--valve",
-        action="append",
-        metavar="NAME",
-        help="only this valve: its tag, its namespace, or the name of its identifier; "
-        "may be repeated",
-    )
+    add_valve_argument(parser)
     parser.add_argument(
         "--since", type=_time, default=_FIRST, metavar="TIME", help="only from this time on"
     )

@@ -4,7 +4,7 @@ import argparse
 import json
 
 from valve_friction_ros.commands.arguments.history_place import PLACE, history_place
-from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
+from valve_friction_ros.commands.arguments.kept_valves import add_valve_argument, chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.history import CopiedPart, History, HistoryError, copied
 
@@ -31,13 +31,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "target", type=history_place, metavar="TO", help="where to; it is made if it is missing"
     )
-    parser.add_argument(
-        "--valve",
-        action="append",
-        metavar="NAME",
-        help="only this valve: its tag, its namespace, or the name of its identifier; "
-        "may be repeated",
-    )
+    add_valve_argument(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

@@ -3,7 +3,6 @@
 import threading
 import time
 from collections import OrderedDict, defaultdict, deque
-from pathlib import Path
 
 from valve_friction_ros.dashboard.sparkline import Sparkline, sparkline
 from valve_friction_ros.history import (
@@ -19,6 +18,7 @@ from valve_friction_ros.history import (
     ratios_after,
     valve_histories,
 )
+from valve_friction_ros.history.file_state import file_state
 from valve_friction_ros.streams import DAY
 
 __all__ = ["KeptHistory"]
@@ -32,15 +32,6 @@ _CACHED = 8
 """Valves whose histories are kept in memory."""
 _PAUSE = 2.0
 """Time, s, between two questions to a server."""
-
-
-def _stamp_of(path: Path) -> tuple[int, int, int]:
-    """Return time, size and number of a file, zeros where it is not there."""
-    try:
-        status = path.stat()
-    except OSError:
-        return (0, 0, 0)
-    return (status.st_mtime_ns, status.st_size, status.st_ino)
 
 
 class KeptHistory:
@@ -82,7 +73,7 @@ class KeptHistory:
         path = self._file.place
         if isinstance(path, HistoryServer):
             return (time.monotonic(),)
-        return tuple(map(_stamp_of, (path, path.with_name(path.name + "-wal"))))
+        return file_state(path)
 
     def refresh(self) -> bool:
         """Read what is new, if the file has changed; return whether it has.
@@ -112,7 +103,7 @@ class KeptHistory:
                     self._begin_anew()
                 if mark == self._mark and mark.settled and self.problem is None:
                     return False
-                self.valves = self._file.valves()
+                valves = self._file.valves()
                 found = ratios_after(self._file, self._row, since)
             except HistoryError as error:
                 is_new, self.problem = str(error) != self.problem, str(error)
@@ -130,6 +121,7 @@ class KeptHistory:
                 ratios = list(self._ratios[valve])
                 self._sparks[valve] = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
             self._histories.clear()
+            self.valves = valves  # last, as others look meanwhile: all else is there with them
             self.revision += 1
             return True
 
@@ -137,7 +129,7 @@ class KeptHistory:
         """Forget what was read where another file stands at the path: its rows count from 1."""
         if self._file is None or isinstance(self._file.place, HistoryServer):
             return
-        number = _stamp_of(self._file.place)[2]
+        number = file_state(self._file.place)[0].number
         if number and self._number and number != self._number:
             self._begin_anew()
         self._number = number or self._number

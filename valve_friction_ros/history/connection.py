@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-__all__ = ["Connection", "Cursor", "has_table"]
+__all__ = ["Connection", "Cursor", "has_table", "without_nul"]
 
 
 class Cursor(Protocol):
@@ -27,6 +27,11 @@ class Connection(Protocol):
 
     def executemany(self, statement: str, rows: Sequence[Sequence[Any]], /) -> object:
         """Do a statement once for each row of values."""
+
+
+def without_nul(value: Any) -> Any:
+    """Return a value as both engines hold it: no text of PostgreSQL has a NUL."""
+    return value.replace("\0", "\u2400") if isinstance(value, str) else value
 
 
 def has_table(connection: Connection, name: str) -> bool:

@@ -8,19 +8,17 @@ from typing import NamedTuple
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.service_request import (
     LateError,
-    PatientRequest,
     TriggerCall,
     UnansweredError,
+    set_parameters_request,
 )
 
 __all__ = ["Answer", "Caller", "caller"]
@@ -137,16 +135,7 @@ class Caller:
 
         Raises RefusalError if the node refuses, or does not answer in time.
         """
-        one = PatientRequest(
-            self._node,
-            SetParametersAtomically,
-            f"{node}/set_parameters_atomically",
-            SetParametersAtomically.Request(
-                parameters=[
-                    Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
-                ]
-            ),
-        )
+        one = set_parameters_request(self._node, node, values)
         try:
             if not self._wait(one.step, patience) and self._is_wanted():
                 raise RefusalError(f"{node} has not answered within {patience:g} s")

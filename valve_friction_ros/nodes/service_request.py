@@ -8,13 +8,21 @@ order in which they were made.
 """
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-__all__ = ["LateError", "PatientRequest", "TriggerCall", "UnansweredError"]
+__all__ = [
+    "LateError",
+    "PatientRequest",
+    "TriggerCall",
+    "UnansweredError",
+    "set_parameters_request",
+]
 
 _AGAIN = 0.5
 """Time without an answer, s, after which a harmless request is made again."""
@@ -74,6 +82,17 @@ class PatientRequest:
     def close(self) -> None:
         """Forget it."""
         self._node.destroy_client(self._client)
+
+
+def set_parameters_request(node: Node, target: str, values: Mapping[str, float]) -> PatientRequest:
+    """Return the request that sets parameters of the node `target`, all at once."""
+    request = SetParametersAtomically.Request(
+        parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+        ]
+    )
+    name = f"{target}/set_parameters_atomically"
+    return PatientRequest(node, SetParametersAtomically, name, request)
 
 
 class TriggerCall:

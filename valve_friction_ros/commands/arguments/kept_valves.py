@@ -1,10 +1,22 @@
 """Valves of a history, chosen by what people call them."""
 
+import argparse
 from collections.abc import Sequence
 
 from valve_friction_ros.history import KeptValve
 
-__all__ = ["chosen_valves"]
+__all__ = ["add_valve_argument", "chosen_valves"]
+
+
+def add_valve_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--valve``, which chooses some."""
+    parser.add_argument(
+        "--valve",
+        action="append",
+        metavar="NAME",
+        help="only this valve: its tag, its namespace, or the name of its identifier; "
+        "may be repeated",
+    )
 
 
 def _is_called(valve: KeptValve, name: str) -> bool:

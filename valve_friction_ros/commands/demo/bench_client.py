@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from numpy.typing import NDArray
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -18,7 +16,11 @@ from valve_friction_ros.model import Recording
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import LATCHED, stream
-from valve_friction_ros.nodes.service_request import PatientRequest, TriggerCall, UnansweredError
+from valve_friction_ros.nodes.service_request import (
+    TriggerCall,
+    UnansweredError,
+    set_parameters_request,
+)
 from valve_friction_ros.streams import RecordBuffer
 from valve_friction_ros.streams.record_buffer import Snapshot
 
@@ -141,15 +143,10 @@ class BenchClient(Node):
 
     def set_parameters(self, node: str, values: Mapping[str, float], timeout: float = 10.0) -> None:
         """Set parameters of a node of the bench, all at once."""
-        name = f"{self.get_namespace()}/{node}/set_parameters_atomically"
-        request = SetParametersAtomically.Request(
-            parameters=[
-                Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
-            ]
-        )
-        asked = PatientRequest(self, SetParametersAtomically, name, request)
+        target = f"{self.get_namespace()}/{node}"
+        asked = set_parameters_request(self, target, values)
         try:
-            self.wait(asked.step, timeout, f"answer of {name}")
+            self.wait(asked.step, timeout, f"answer of {target}/set_parameters_atomically")
         finally:
             asked.close()
         if not asked.answer.result.successful:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from valve_friction_ros.history.connection import Connection
+from valve_friction_ros.history.connection import Connection, without_nul
 from valve_friction_ros.history.copying.parts import Part
 from valve_friction_ros.history.rows import settings_id
 
@@ -43,24 +43,26 @@ class CopiedRow:
     def checksum(self) -> bytes:
         """Sum of all that it holds, the same in each history."""
         children = {
-            table: sorted(repr(sorted(_plain(one).items())) for one in rows)
+            table: sorted(repr(_plain(one)) for one in rows)
             for table, rows in self.children.items()
             if rows
         }
-        content = repr((sorted(_plain(self.values).items()), sorted(children.items())))
+        content = repr((_plain(self.values), sorted(children.items())))
         return hashlib.sha256(content.encode("utf-8", "surrogatepass")).digest()
 
 
-def _plain(values: _Values) -> dict[str, Any]:
-    """Return values as both engines hold them: no server takes a NUL."""
-    return {
-        name: one.replace("\0", "\u2400") if isinstance(one, str) else one
-        for name, one in values.items()
-    }
+def _plain(values: _Values) -> list[tuple[str, Any]]:
+    """Return columns in one order, with values as both engines hold them."""
+    return sorted((name, without_nul(one)) for name, one in values.items())
+
+
+def _cells(row: Any) -> dict[str, Any]:
+    """Return the cells of a row of either engine by their columns."""
+    return {name: row[name] for name in row.keys()}  # noqa: SIM118 - a row is no mapping
 
 
 def _copied(part: Part, row: Any, contents: Mapping[int, str]) -> dict[str, Any]:
-    values = {name: row[name] for name in row.keys()}  # noqa: SIM118 - a row is no mapping
+    values = _cells(row)
     values.pop("id", None)
     del values["valve_id"]
     if part.table == "identification":
@@ -89,7 +91,7 @@ def _children(
             f"SELECT * FROM {table} WHERE {part.parent_column} IN ({marks})",  # noqa: S608
             numbers,
         ):
-            values = {name: row[name] for name in row.keys()}  # noqa: SIM118
+            values = _cells(row)
             found[values.pop(part.parent_column)][table].append(values)
     return found
 
@@ -108,9 +110,8 @@ def _whole(connection: Connection, part: Part, rows: Sequence[Any]) -> Iterator[
 def rows_of(connection: Connection, part: Part, valve: int) -> Iterator[CopiedRow]:
     """Read the rows of a part, of the valve of this row, in the order in which they were kept."""
     if not part.children:
-        order = "id" if part.table == "answer" else ", ".join(("valve_id", *part.key))
         rows = connection.execute(
-            f"SELECT * FROM {part.table} WHERE valve_id = ? ORDER BY {order}",  # noqa: S608
+            f"SELECT * FROM {part.table} WHERE valve_id = ? ORDER BY {part.order}",  # noqa: S608
             (valve,),
         ).fetchall()
         yield from _whole(connection, part, rows)

@@ -19,12 +19,20 @@ class Part:
         Whether a row stays as it is once it was written, so that it is never sent again.
     children : tuple of str
         Tables whose rows belong to a row of this one, and came with it.
+    is_numbered : bool
+        Whether its rows have numbers, ``id``, in the order in which they were kept.
     """
 
     table: str
     key: tuple[str, ...]
     is_kept: bool = False
     children: tuple[str, ...] = ()
+    is_numbered: bool = False
+
+    @property
+    def order(self) -> str:
+        """The columns by which its rows stand in the order in which they were kept, or sorted."""
+        return "id" if self.is_numbered else ", ".join(("valve_id", *self.key))
 
     @property
     def parent_column(self) -> str:
@@ -33,8 +41,8 @@ class Part:
 
 
 PARTS = (
-    Part("identification", ("uid",), True, ("parameter", "identification_number")),
-    Part("baseline", ("uid",), True, ("baseline_number", "baseline_record")),
+    Part("identification", ("uid",), True, ("parameter", "identification_number"), True),
+    Part("baseline", ("uid",), True, ("baseline_number", "baseline_record"), True),
     Part("packing_renewal", ("time_ns",), True),
     Part("usage", ("renewal_ns", "day", "run")),
     Part("alarm_recording", ("path",)),
@@ -42,7 +50,7 @@ PARTS = (
     Part("move", ("end_ns",)),
     Part("evidence_reference", ()),
     Part("evidence_change", ()),
-    Part("answer", ("stamp",)),
+    Part("answer", ("stamp",), is_numbered=True),
 )
 """All parts, in the order in which they are copied."""
 

@@ -12,6 +12,7 @@ from valve_friction_ros.history.copying.delivery import Delivery
 from valve_friction_ros.history.copying.unsent import UnsentCount, count_unsent, follow
 from valve_friction_ros.history.entry import KeptValve
 from valve_friction_ros.history.errors import HistoryError
+from valve_friction_ros.history.file_state import file_state
 from valve_friction_ros.history.server.address import HistoryServer
 
 __all__ = ["Sender", "SentState", "sender_of"]
@@ -58,15 +59,6 @@ class _Taking:
         self.valve = valve
         self.done: Future[None] = Future()
         self.is_over = False
-
-
-def _stamp_of(path: Path) -> tuple[int, int]:
-    """Return time and size of a file, zeros where it is not there."""
-    try:
-        status = path.stat()
-    except OSError:
-        return 0, 0
-    return status.st_mtime_ns, status.st_size
 
 
 class Sender:
@@ -147,12 +139,12 @@ class Sender:
         failures, looked, seen = 0, -_LONGEST_PAUSE, None
         while True:
             ends, problem = self._ends.is_set(), None
-            stamp, now = self._stamp(), time.monotonic()
-            if stamp == seen and now - looked < _LONGEST_PAUSE and not ends and not self._has_work:
+            state, now = file_state(self._path), time.monotonic()
+            if state == seen and now - looked < _LONGEST_PAUSE and not ends and not self._has_work:
                 self._wake.wait(_PAUSE)
                 self._wake.clear()
                 continue
-            seen, looked = stamp, now
+            seen, looked = state, now
             try:
                 self._cycle()
                 failures = 0
@@ -174,11 +166,6 @@ class Sender:
         state = self.state
         waits = state.count.waiting > 0 or not self._takings.empty()
         return waits or state.problem is not None or not state.is_sending
-
-    def _stamp(self) -> tuple[tuple[int, int], ...]:
-        """Return what changes when the file does, its journal included."""
-        journal = self._path.with_name(f"{self._path.name}-wal")
-        return _stamp_of(self._path), _stamp_of(journal)
 
     def _cycle(self) -> None:
         follow(self._path)

@@ -44,6 +44,8 @@ CREATE TABLE IF NOT EXISTS unsent (
 """A row for each row that was added, changed or deleted, and not sent since. A row that changes
 again gets a new number, so that what is acknowledged meanwhile is the change before."""
 
+_NOW = "CAST(strftime('%s', 'now') AS INTEGER)"
+
 _INDEX = "CREATE INDEX IF NOT EXISTS unsent_row ON unsent (valve_id, part, key)"
 
 
@@ -80,31 +82,28 @@ def _triggers() -> list[str]:
 def _trigger(part: Part, event: str, row: str, valve: str = "valve_id") -> str:
     key = f"json_array({', '.join(f'{row}.{name}' for name in part.key)})"
     same = f"valve_id = {row}.{valve} AND part = '{part.table}' AND key = {key}"
-    now = "CAST(strftime('%s', 'now') AS INTEGER)"
     return (
         f"CREATE TRIGGER IF NOT EXISTS unsent_{part.table}_{event.lower()} "  # noqa: S608
         f"AFTER {event} ON {part.table} BEGIN "
         "INSERT INTO unsent (valve_id, part, key, since) "
         f"SELECT {row}.{valve}, '{part.table}', {key}, "
-        f"coalesce((SELECT min(since) FROM unsent WHERE {same}), {now}); "
+        f"coalesce((SELECT min(since) FROM unsent WHERE {same}), {_NOW}); "
         f"DELETE FROM unsent WHERE {same} AND number < (SELECT max(number) FROM unsent); END"
     )
 
 
 def _fill(connection: sqlite3.Connection) -> None:
     """Have all rows wait."""
-    now = "CAST(strftime('%s', 'now') AS INTEGER)"
     connection.execute("DELETE FROM unsent")
     connection.execute(  # no user's text in either statement
         "INSERT INTO unsent (valve_id, part, key, since) "  # noqa: S608
-        f"SELECT id, '{VALVE}', '[]', {now} FROM valve"
+        f"SELECT id, '{VALVE}', '[]', {_NOW} FROM valve"
     )
     for part in PARTS:
-        order = "id" if part.children or part.table == "answer" else "valve_id"
         connection.execute(
             "INSERT INTO unsent (valve_id, part, key, since) "  # noqa: S608
-            f"SELECT valve_id, '{part.table}', json_array({', '.join(part.key)}), {now} "
-            f"FROM {part.table} ORDER BY {order}"
+            f"SELECT valve_id, '{part.table}', json_array({', '.join(part.key)}), {_NOW} "
+            f"FROM {part.table} ORDER BY {part.order}"
         )
 
 

@@ -9,9 +9,14 @@ from typing import Any
 import psycopg
 from psycopg.conninfo import conninfo_to_dict
 
+from valve_friction_ros.history.connection import without_nul
 from valve_friction_ros.history.errors import HistoryError, RowRefusedError
 from valve_friction_ros.history.server.address import HistoryServer
-from valve_friction_ros.history.server.tables import prepared, require_readable
+from valve_friction_ros.history.server.tables import (
+    has_tables_of_now,
+    make_tables,
+    require_readable,
+)
 
 __all__ = ["ServerConnection", "ServerRow", "connected", "reading_server"]
 
@@ -92,11 +97,6 @@ def _in_postgres(statement: str) -> str:
     return statement.replace(" IS ?", " IS NOT DISTINCT FROM ?").replace("?", "%s")
 
 
-def _sent(value: Any) -> Any:
-    """Return a value as PostgreSQL takes it: its texts hold no NUL."""
-    return value.replace("\0", "\u2400") if isinstance(value, str) else value
-
-
 class ServerConnection:
     """A connection to a server; an answer that does not come in time breaks it.
 
@@ -167,7 +167,9 @@ class ServerConnection:
         with self._in_time():
             if not values:
                 return self._connection.execute(statement.encode())
-            return self._connection.execute(_in_postgres(statement).encode(), [*map(_sent, values)])
+            return self._connection.execute(
+                _in_postgres(statement).encode(), [*map(without_nul, values)]
+            )
 
     def executemany(self, statement: str, rows: Sequence[Sequence[Any]], /) -> object:
         """Do a statement once for each row of values."""
@@ -175,7 +177,7 @@ class ServerConnection:
             return None
         with self._in_time(), self._connection.cursor() as cursor:
             cursor.executemany(
-                _in_postgres(statement).encode(), [[*map(_sent, row)] for row in rows]
+                _in_postgres(statement).encode(), [[*map(without_nul, row)] for row in rows]
             )
         return None
 
@@ -209,7 +211,9 @@ def connected(server: HistoryServer, patience: float = _PATIENCE) -> Iterator[Se
     """
     connection = ServerConnection(server, patience)
     with contextlib.closing(connection), connection.explained():
-        prepared(connection, server)
+        if not has_tables_of_now(connection):
+            with connection.transaction():
+                make_tables(connection, server)
         yield connection
 
 

@@ -7,7 +7,7 @@ from valve_friction_ros.history.connection import Connection
 from valve_friction_ros.history.errors import HistoryError
 from valve_friction_ros.history.tables import SCHEMA_VERSION, statements_from
 
-__all__ = ["prepared", "require_readable", "statement_for_postgres"]
+__all__ = ["has_tables_of_now", "make_tables", "require_readable", "statement_for_postgres"]
 
 _LOCK = 0x56465248
 """Number of the lock under which one process at a time changes the tables."""
@@ -62,34 +62,31 @@ def require_readable(connection: Connection, place: object) -> int:
     return version
 
 
-def prepared(connection: Connection, place: object) -> None:
+def has_tables_of_now(connection: Connection) -> bool:
+    """Return whether the tables are those of this version."""
+    return _version(connection) == SCHEMA_VERSION
+
+
+def make_tables(connection: Connection, place: object) -> None:
     """Make the tables if they are missing, and change those of an older version to the present.
 
-    It is one transaction, which two processes do one after the other. Raises HistoryError if the
+    Within a transaction, which two processes do one after the other. Raises HistoryError if the
     tables are newer than this version.
     """
-    if _version(connection) == SCHEMA_VERSION:
-        return
-    connection.execute("BEGIN")
-    try:
-        connection.execute("SELECT pg_advisory_xact_lock(?)", (_LOCK,))
-        version = _version(connection)
-        if version:
-            require_readable(connection, place)
-        for statement in statements_from(version):
-            connection.execute(statement_for_postgres(statement))
-        if not version:
-            for statement in _ADDED:
-                connection.execute(statement)
-            connection.execute(
-                "INSERT INTO mark (name, value) VALUES ('identity', ?)", (uuid.uuid4().hex,)
-            )
+    connection.execute("SELECT pg_advisory_xact_lock(?)", (_LOCK,))
+    version = _version(connection)
+    if version:
+        require_readable(connection, place)
+    for statement in statements_from(version):
+        connection.execute(statement_for_postgres(statement))
+    if not version:
+        for statement in _ADDED:
+            connection.execute(statement)
         connection.execute(
-            "INSERT INTO mark (name, value) VALUES ('schema', ?) "
-            "ON CONFLICT (name) DO UPDATE SET value = excluded.value",
-            (str(SCHEMA_VERSION),),
+            "INSERT INTO mark (name, value) VALUES ('identity', ?)", (uuid.uuid4().hex,)
         )
-    except BaseException:
-        connection.execute("ROLLBACK")
-        raise
-    connection.execute("COMMIT")
+    connection.execute(
+        "INSERT INTO mark (name, value) VALUES ('schema', ?) "
+        "ON CONFLICT (name) DO UPDATE SET value = excluded.value",
+        (str(SCHEMA_VERSION),),
+    )
