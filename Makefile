@@ -148,6 +148,10 @@ churn: venv  ## nodes under clients that come and go for an hour; CHURN_ARGS="--
 soak: venv  ## a month of a plant in an hour, each sample accounted for; SOAK_ARGS="--minutes 5" for less
 	@"$(VENV)/bin/python" -m benchmark.soak $(SOAK_ARGS)
 
+.PHONY: load
+load: venv-test browser  ## the dashboard before 500 valves in a real browser, 45 minutes; LOAD_ARGS="--parts bounds" for some
+	@"$(VENV)/bin/python" -m benchmark.load $(LOAD_ARGS)
+
 .PHONY: hosts
 hosts: venv  ## a plant of five hosts, one of which dies and one is cut off, in network namespaces, as root; HOSTS_ARGS="--valves 100 --server"
 	@"$(VENV)/bin/python" -m benchmark.hosts $(HOSTS_ARGS)

@@ -151,3 +151,14 @@ def test_links_lead_somewhere(page, target):
     assert found.exists()
     if anchor:
         assert anchor in anchors(found)
+
+
+def test_make_has_each_target_that_is_named():
+    makefile = (PROJECT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    pages = [*PROJECT.glob("*.md"), *PROJECT.glob("*.rst"), *PROJECT.glob("doc/**/*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    named = set(re.findall(r"(?:`|^)make ([a-z-]+)", text, re.MULTILINE))
+    assert {"demo", "test", "load", "soak"} <= named <= targets
+    declared = re.findall(r"^([A-Z]+_ARGS) \?=", makefile, re.MULTILINE)
+    assert [name for name in declared if f"$({name})" not in makefile] == []
