@@ -12,11 +12,13 @@ from pathlib import Path
 from benchmark.churn.endurance import add_run_arguments, endured
 from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import Node, parameter_words
+from benchmark.postgres_server import why_no_server
+from benchmark.soak.database import Kept, own_database
 from benchmark.soak.disk import small_disk
 from benchmark.soak.faults import FAULTS, Site, settled
 from benchmark.soak.feed import Feed, Piece
 from benchmark.soak.plant import Plant, Process
-from benchmark.soak.summary import rows
+from benchmark.soak.summary import database_rows, rows
 from benchmark.speed.rows import Row
 from valve_friction_ros.history import HistoryFile
 
@@ -37,7 +39,7 @@ _LOOKS = (0.1, 0.25, 0.5, 0.75)
 """Shares of the month at which the memory is looked at, besides its end."""
 
 
-def _processes(folder: Path, disk: Path) -> tuple[Process, ...]:
+def _processes(folder: Path, disk: Path, url: str) -> tuple[Process, ...]:
     """Start two identifiers of one valve each, and a process of two that lives through all."""
     common = [
         "--params-file",
@@ -49,6 +51,7 @@ def _processes(folder: Path, disk: Path) -> tuple[Process, ...]:
             window=10.0,
             input_timeout=8.0,
             alarm_recordings=3,
+            **({"history_url": url} if url else {}),
         ),
     ]
     *single, first, second = _GROWTH
@@ -136,6 +139,13 @@ class _Month:
         for process in plant.processes:
             for _ in settled(process):
                 plant.turn(_TURN)
+        plant.wait(lambda: not any(map(_is_waiting, plant.processes)), _START_LIMIT)
+
+
+def _is_waiting(process: Process) -> bool:
+    """Tell whether rows of a process wait for the server."""
+    waiting = [one.get("history_server waiting", "0") for one in process.life.told.values()]
+    return any(count != "0" for count in waiting)
 
 
 def _stored(path: Path, valves: Sequence[str]) -> Mapping[str, int]:
@@ -144,20 +154,26 @@ def _stored(path: Path, valves: Sequence[str]) -> Mapping[str, int]:
     return {valve: len(file.entries([f"{valve}/identifier"], 0, 2**63 - 1)) for valve in valves}
 
 
-def _run(folder: Path, seconds: float, chance: random.Random, ledger: Ledger) -> Mapping[str, int]:
-    """Run the plant for some seconds; return what is in its history then."""
+def _run(
+    folder: Path, seconds: float, chance: random.Random, ledger: Ledger
+) -> tuple[Mapping[str, int], Kept | None]:
+    """Run the plant for some seconds; return what is in its history then, and on its server."""
     disk = folder / "disk"
-    with small_disk(disk) as is_small:
+    with small_disk(disk) as is_small, own_database() as database:
         if not is_small:
             ledger.add("left out", what="full disk: no rights to mount one")
-        plant = Plant(ledger, _processes(folder, disk))
+        if database is None:
+            ledger.add("left out", what=f"database: {why_no_server()}")
+        plant = Plant(ledger, _processes(folder, disk, database.url if database else ""))
         try:
             feeds = {valve: Feed(growth) for valve, growth in _GROWTH.items()}
-            site = Site(plant, feeds, disk if is_small else None, chance)
+            site = Site(plant, feeds, disk if is_small else None, database, chance)
             if not plant.wait(lambda: all(map(plant.is_ready, plant.valves)), _START_LIMIT):
                 raise RuntimeError(f"the plant is not ready: see the logs in {folder}")
             _live(_Month(site, seconds), plant)
-            return _stored(disk / "history.sqlite", plant.valves)
+            history = disk / "history.sqlite"
+            stored = _stored(history, plant.valves)
+            return stored, None if database is None else database.compared_with(history)
         finally:
             for process in plant.processes:
                 if process.life.process.exit_code() is None:
@@ -190,8 +206,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
 
     def live(folder: Path, seconds: float, seed: int, ledger: Ledger) -> Iterator[Row]:
-        stored = _run(folder, seconds, random.Random(seed), ledger)
-        return rows(list(ledger.events()), stored)
+        stored, kept = _run(folder, seconds, random.Random(seed), ledger)
+        yield from rows(list(ledger.events()), stored)
+        if kept is not None:
+            yield from database_rows(kept)
 
     return endured("soak", f"a month in {options.minutes:g} minutes", options, live)
 

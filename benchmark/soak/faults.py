@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from benchmark.soak.database import Database
 from benchmark.soak.disk import filled
 from benchmark.soak.feed import Feed
 from benchmark.soak.plant import Plant, Process
@@ -28,14 +29,22 @@ class Site:
         Feed of each valve.
     disk : Path or None
         Folder of the history, if its disk is small.
+    database : Database or None
+        Where the history is sent to, if there is one.
     chance : Random
         Of all that is drawn.
     """
 
     def __init__(
-        self, plant: Plant, feeds: Mapping[str, Feed], disk: Path | None, chance: random.Random
+        self,
+        plant: Plant,
+        feeds: Mapping[str, Feed],
+        disk: Path | None,
+        database: Database | None,
+        chance: random.Random,
     ) -> None:
-        self.plant, self.feeds, self.disk, self.chance = plant, feeds, disk, chance
+        self.plant, self.feeds, self.chance = plant, feeds, chance
+        self.disk, self.database = disk, database
         self.silent: set[str] = set()
         """Valves whose sensors say nothing."""
 
@@ -149,6 +158,48 @@ def full_disk(site: Site) -> Iterator[None]:
     site.plant.ledger.add("full disk", seconds=time.monotonic() - begin, told=bool(told))
 
 
+def _missed(site: Site, fault: str) -> Iterator[None]:
+    """Wait until a node says that it cannot send its history, and some time more; note both."""
+    told: set[str] = set()
+
+    def is_told() -> bool:
+        for process in site.plant.processes:
+            told.update(
+                valve
+                for valve, values in process.life.told.items()
+                if values.get("history_server problem")
+            )
+        return bool(told)
+
+    begin = time.monotonic()
+    yield from _until(is_told)
+    yield from _for(site.chance.uniform(0.0, 20.0))
+    site.plant.ledger.add(fault, seconds=time.monotonic() - begin, told=bool(told))
+
+
+def database_killed(site: Site) -> Iterator[None]:
+    """Kill the server of the history with all its processes, and start it again."""
+    database = site.database
+    if database is None or database.is_away:
+        return
+    database.is_away = True
+    database.server.kill()
+    yield from _missed(site, "database away")
+    yield from _until(database.server.launch)
+    database.is_away = False
+
+
+def database_silent(site: Site) -> Iterator[None]:
+    """Let the server of the history take packets and answer none, as a cut network does."""
+    database = site.database
+    if database is None or database.is_away:
+        return
+    database.is_away = True
+    with database.server.paused():
+        yield from _missed(site, "database away")
+    database.is_away = False
+
+
 FAULTS: Mapping[str, tuple[Callable[[Site], Iterator[None]], float]] = {
     "restart": (restart, 3.0),
     "kill": (kill, 3.0),
@@ -157,5 +208,7 @@ FAULTS: Mapping[str, tuple[Callable[[Site], Iterator[None]], float]] = {
     "bad samples": (bad_samples, 3.0),
     "frozen": (frozen, 1.0),
     "full disk": (full_disk, 1.0),
+    "database killed": (database_killed, 1.0),
+    "database silent": (database_silent, 1.0),
 }
 """Faults by their names, each with its weight when the next one is drawn."""

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from benchmark.churn.processes import CODES
+from benchmark.soak.database import Kept
 from benchmark.speed.rows import Row
 
-__all__ = ["rows"]
+__all__ = ["database_rows", "rows"]
 
 _Events = Sequence[Mapping[str, Any]]
 _KILLED = "SIGKILL"
@@ -107,9 +108,23 @@ def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
     yield _none("other calls never answered", never)
     yield _none("silent sensors that nobody told", sum(not one["told"] for one in of("silence")))
     yield _none("full disks that nobody told", sum(not one["told"] for one in of("full disk")))
+    yield _none(
+        "databases away that nobody told", sum(not one["told"] for one in of("database away"))
+    )
     for end in of("ending"):
         if end["code"] not in CODES:
             item, code = f"{end['name']} ended with code", end["code"] or -1
             yield Row(item, code, "", goal="that of its signal", met=False)
     yield _none("processes that ended by themselves", len(of("died")))
     yield from _memory(of("memory"))
+
+
+def database_rows(kept: Kept) -> Iterator[Row]:
+    """Yield what the file and the server of the history hold at the end."""
+    yield Row("identifications in the file", kept.in_file, "")
+    is_same = kept.on_server == kept.in_file
+    yield Row("identifications on the server", kept.on_server, "", goal="as many", met=is_same)
+    yield Row("rows that wait for the next start", kept.waiting, "")
+    # One that was sent may wait still, until the node has heard that it arrived.
+    lost = max(kept.lacking - kept.waiting, 0)
+    yield _none("rows that the server lacks and that do not wait", lost)

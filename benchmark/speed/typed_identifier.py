@@ -56,6 +56,10 @@ class TypedInputs:
     def take(self) -> None:
         """Do nothing: every message has been taken."""
 
+    def values(self) -> dict[str, str]:
+        """Return nothing: samples are not counted."""
+        return {}
+
     def problems(self, timeout: float) -> list[str]:
         """Say what is wrong with the inputs."""
         return [told for watch in self._watches if (told := watch.problem(timeout))]

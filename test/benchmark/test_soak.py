@@ -4,9 +4,13 @@ import itertools
 
 import numpy as np
 import pytest
+from histories import SECOND, START, success
 
+from benchmark.soak.database import Database, Kept
 from benchmark.soak.feed import PIECE, Feed
-from benchmark.soak.summary import rows
+from benchmark.soak.summary import database_rows, rows
+from valve_friction_ros.history import HistoryFile, copied
+from valve_friction_ros.history.server.address import HistoryServer
 
 NOW = 1_700_000_000_000_000_000
 
@@ -54,6 +58,7 @@ def test_what_adds_up_misses_nothing():
         ([*GOOD, call(None, None, service="save")], 1, "other calls never answered"),
         ([*GOOD, {"kind": "silence", "told": False}], 1, "silent sensors that nobody told"),
         ([*GOOD, {"kind": "full disk", "told": False}], 1, "full disks that nobody told"),
+        ([*GOOD, {"kind": "database away", "told": False}], 1, "databases away that nobody told"),
         ([*GOOD, {"kind": "died"}], 1, "processes that ended by themselves"),
         ([*GOOD, {"kind": "ending", "name": "a", "code": None}], 1, "a ended with code"),
         ([*GOOD, memory(0.5, 100), memory(1.0, 106)], 1, "memory after 100 % of the month"),
@@ -84,3 +89,18 @@ def test_the_friction_grows_over_the_month():
         for share in (0.0, 1.0)
     ]
     assert swings[1] < swings[0]
+
+
+def test_a_server_that_holds_less_than_the_file_misses_its_goals(postgres, tmp_path):
+    postgres.start()
+    file = HistoryFile(tmp_path / "history.sqlite")
+    file.add(success())
+    database = Database(postgres)
+    copied(file.path, HistoryServer(database.url))
+    assert database.compared_with(file.path) == Kept(1, 1, 0, 0)
+    file.add(success(START + SECOND))
+    lacking = database.compared_with(file.path)
+    assert (lacking.in_file, lacking.on_server) == (2, 1)
+    assert lacking.lacking > 0
+    assert [one.met for one in database_rows(lacking)] == [None, False, None, False]
+    assert all(one.met is not False for one in database_rows(Kept(2, 2, 1, 1)))

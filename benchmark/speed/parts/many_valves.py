@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from benchmark.speed.node_processes import Observer
+from benchmark.speed.node_processes import Observer, observer
 from benchmark.speed.parts.streams import Outcome, fed, fleet
 from benchmark.speed.rows import Row, Settings
 
@@ -30,17 +30,20 @@ def _found(count: int, settings: Settings) -> _Found:
     valves = [f"fv_{number}" for number in range(count)]
     answers = [0.0]
 
-    def ask(listener: Observer) -> None:
-        listener.wait(listener.ask(valves[-1], "restore_baseline"))
-        working = [listener.ask(valve, "identify") for valve in valves[:_IDENTIFIED]]
-        while not all(one.done() for one in working):
-            begin = time.monotonic()
-            listener.wait(listener.ask(valves[-1], "restore_baseline"))  # refused, at once
-            answers.append(time.monotonic() - begin)
-            listener.spin(0.1)
+    def ask(_: Observer) -> None:
+        with observer(listens=False) as client:
+            for valve in valves[:_IDENTIFIED]:
+                client.meet(valve, "identify")
+            client.wait(client.ask(valves[-1], "restore_baseline"))
+            working = [client.ask(valve, "identify") for valve in valves[:_IDENTIFIED]]
+            while not all(one.done() for one in working):
+                begin = time.monotonic()
+                client.wait(client.ask(valves[-1], "restore_baseline"))  # refused, at once
+                answers.append(time.monotonic() - begin)
+                client.spin(0.1)
 
     outcome = fed(
-        lambda _: fleet(count, 60.0), valves, _RATE, settings.seconds + 30, ["--blocks"], ask
+        lambda _: fleet(count, 60.0), valves, _RATE, settings.seconds + 50, ["--blocks"], ask
     )
     return _Found(outcome, max(answers))
 

@@ -24,6 +24,9 @@ from valve_friction_ros.dashboard.times import moment
 __all__ = ["plant_page"]
 
 _PERIOD = 1.0
+_FIRST_PERIOD, _FIRST_TIME = 0.25, 10.0
+"""Period, s, in which a page looks at first, and for how long: after a restart of the dashboard the
+valves are heard then."""
 _COLUMNS = [
     {"key": key, "title": title, "unit": unit, "sort": sort, "css": f"vf-c-{key}"}
     for key, title, unit, sort in (
@@ -82,13 +85,16 @@ class _PlantPage:
         self._table.on("sort", lambda event: self._sort(event.args))
         self._note = ui.label("").classes("vf-note")
         self._count(heard)
-        ui.timer(_PERIOD, self._tick)
+        self._timer = ui.timer(_FIRST_PERIOD, self._tick)
+        self._drawn = time.monotonic()
 
     def _heard(self) -> list[Heard]:
         self._board.plant.expect(self._board.kept.valves)
         return self._board.plant.valves(time.monotonic())
 
     async def _tick(self) -> None:
+        if time.monotonic() > self._drawn + _FIRST_TIME:
+            self._timer.interval = _PERIOD
         await run.io_bound(self._board.kept.refresh)
         self._show({})
 

@@ -110,11 +110,9 @@ def draw_files(files: list[OfferedFile], zone: ZoneInfo) -> None:
     with element("table", "vf-list"), element("tbody"):
         for one in files:
             when = datetime.fromtimestamp(one.time, timezone.utc).astimezone(zone)
-            with element("tr"):
-                with element("td", "vf-words"):
-                    address = f"/files/{quote(one.kind)}/{quote(one.path)}"
-                    with element("a", "vf-link", href=address, target="_blank", rel="noopener"):
-                        ui.label(one.label)
-                text("td", one.kind)
-                text("td", f"{one.size / 1e6:.2f} MB", "vf-n")
-                text("td", f"{when:%Y-%m-%d %H:%M} {when.tzname()}", "vf-when")
+            with element("tr"), element("td", "vf-words"):
+                address = f"/files/{quote(one.kind)}/{quote(one.path)}"
+                with element("a", "vf-link", href=address, target="_blank", rel="noopener"):
+                    ui.label(one.label)
+                about = f"{one.kind}, {one.size / 1e6:.2f} MB"
+                text("small", f"{about}, {when:%Y-%m-%d %H:%M} {when.tzname()}", "vf-about")

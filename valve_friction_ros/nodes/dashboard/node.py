@@ -1,7 +1,6 @@
 """A plant's valves in a browser: their diagnosis, history and signals, and their services."""
 
 import contextlib
-import ctypes
 import sys
 import threading
 import time
@@ -18,6 +17,7 @@ from valve_friction_ros.nodes.dashboard.parameters import PARAMETERS, options_fr
 from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
 from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls
 from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
+from valve_friction_ros.nodes.plumbing.memory import keep_little_memory
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
@@ -27,8 +27,6 @@ from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 
 __all__ = ["PARAMETERS", "Dashboard", "main"]
 
-_MALLOC = {-8: 2, -3: 131_072, -1: 131_072}
-"""M_ARENA_MAX, M_MMAP_THRESHOLD (bytes) and M_TRIM_THRESHOLD (bytes) of malloc.h."""
 _PAUSE = 0.05
 """Time between two turns, s: for so long messages gather."""
 _MISSING = f"cannot start: the dashboard needs NiceGUI, which is not installed: run `{INSTALL}`"
@@ -87,20 +85,9 @@ class _Turning:
         self._executor.shutdown(0.1)
 
 
-def _spare_memory() -> None:
-    """Let all threads share two arenas of glibc's memory, and give back what is free.
-
-    An arena a thread takes 50 MB more, and kept pages of the browser 10 MB.
-    """
-    with contextlib.suppress(AttributeError, OSError):
-        mallopt = ctypes.CDLL(None).mallopt
-        for option, value in _MALLOC.items():
-            mallopt(option, value)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node and the server of its pages until Ctrl-C or SIGTERM; return the exit code."""
-    _spare_memory()
+    keep_little_memory()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = Dashboard()

@@ -15,6 +15,7 @@ from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import done_in
+from valve_friction_ros.nodes.plumbing.memory import give_back_memory
 from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
 from valve_friction_ros.streams import utc
 
@@ -96,6 +97,7 @@ class ReportWriter:
                 response=response,
             )
             reports.write_report(reports.identification_report(record), path)
+            give_back_memory()
 
         return write
 

@@ -161,6 +161,14 @@ class TurnExecutor(SingleThreadedExecutor):
             if not asked or time.monotonic() > until:
                 return is_lively
 
+    def answer(self) -> None:
+        """Answer what has been asked of services; timers wait for the next turn."""
+        self._take_requests()
+        for task in self._answers:
+            task()
+            if task.done():
+                task.result()  # raises what the callback has raised
+
     def _take_requests(self) -> bool:
         """Begin to answer the requests that have come; return whether there are any."""
         before = len(self._answers)

@@ -26,6 +26,12 @@ _LIVELY_PAUSE = 0.02
 """Times between two turns, s: while nothing is asked, and while services are in use."""
 _LIVELY_TIME = 2.0
 """Time, s, for which services count as in use after the start and after each answer."""
+_LONGEST_WAIT = 0.2
+"""Time, s, for which the nodes of a process work before its services are looked at again. Hundreds
+of valves that move at once have work for seconds."""
+_SWITCH = 5e-4
+"""Time, s, after which a thread that computes lets the turns go on. Python's 5 ms are lost at each
+message while an identification runs: seconds for hundreds of valves."""
 _PAUSE_OF_A_NODE = 1e-3
 """Time, s, by which each node of a process lengthens the pause: ten times what its turn costs, so
 that a hundred nodes without any messages take a tenth of a core."""
@@ -47,6 +53,21 @@ def cannot_start(error: Exception) -> int:
     return 2
 
 
+class _Answering:
+    """Looks at the services also within a turn, where it lasts."""
+
+    def __init__(self, executors: Sequence[TurnExecutor]) -> None:
+        self._executors = executors
+        self._looked = time.monotonic()
+
+    def go_on(self) -> None:
+        """Answer what is asked, if the last look is long ago."""
+        if time.monotonic() > self._looked + _LONGEST_WAIT:
+            for executor in self._executors:
+                executor.answer()
+            self._looked = time.monotonic()
+
+
 def _run(
     nodes: Sequence[PolledNode],
     executors: Sequence[TurnExecutor],
@@ -58,13 +79,16 @@ def _run(
     """Take turns until the stop is requested."""
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
+    answering = _Answering(executors)
     while not _is_over(stop):
         is_lively = False
         for executor in executors:
             is_lively |= executor.turn()
+            answering.go_on()
             deadman.goes_on()
         for node in nodes:
             node.poll_guarded()
+            answering.go_on()
             # Where hundreds of nodes get little of a core, their whole turn may last long.
             watchdog.turned()
             deadman.goes_on()
@@ -101,6 +125,7 @@ def run_nodes(
     Where a worker is still busy at the end, the process ends here, without it. Where the loop or
     the middleware hangs for good, the process ends with exit code 1.
     """
+    sys.setswitchinterval(_SWITCH)
     with StopRequest() as stop:
         try:
             exit_code = _run_until(stop, create, arguments, pause)

@@ -1,0 +1,209 @@
+"""A PostgreSQL server of a run's own, which the run may kill, stop and start again."""
+
+import contextlib
+import itertools
+import os
+import pwd
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+__all__ = ["PostgresServer", "why_no_server"]
+
+_FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda one: one.parent.name)
+_PATIENCE = 60.0
+
+
+def _program(name: str) -> str | None:
+    return str(_FOLDERS[-1] / name) if _FOLDERS else shutil.which(name)
+
+
+def _somebody() -> dict[str, Any] | None:
+    """Return the user that the server runs as, as root may not; None if there is none."""
+    if os.geteuid():
+        return {}
+    for name in ("postgres", "nobody"):
+        with contextlib.suppress(KeyError):
+            entry = pwd.getpwnam(name)
+            return {"user": entry.pw_uid, "group": entry.pw_gid, "extra_groups": []}
+    return None
+
+
+def why_no_server() -> str | None:
+    """Return why no server can be started here, and what to do; None if one can."""
+    try:
+        import psycopg  # noqa: F401, PLC0415
+    except ImportError:
+        return "no library to speak to PostgreSQL: run `make venv-test`"
+    if _program("postgres") is None:
+        return "no PostgreSQL server: run `make postgres`, or `apt install postgresql`"
+    if _somebody() is None:
+        return "root may not run PostgreSQL, and there is no user `postgres` or `nobody`"
+    return None
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+class PostgresServer:
+    """A server at 127.0.0.1, with the superuser `owner`; other roles need a password.
+
+    Attributes
+    ----------
+    data : Path
+        Its data directory.
+    folder : Path
+        Its folder, with its log.
+    settings : dict
+        Settings with which it is started.
+
+    Raises
+    ------
+    RuntimeError
+        If no server can be started here, see `why_no_server`.
+    """
+
+    def __init__(self) -> None:
+        if (reason := why_no_server()) is not None:
+            raise RuntimeError(reason)
+        self.folder = Path(tempfile.mkdtemp(prefix="vf-postgres-"))
+        self._who = _somebody() or {}
+        if self._who:
+            os.chown(self.folder, self._who["user"], self._who["group"])
+        self.data = self.folder / "data"
+        self._make()
+        (self.data / "pg_hba.conf").write_text(
+            "host all owner 127.0.0.1/32 trust\nhost all all 127.0.0.1/32 scram-sha-256\n"
+        )
+        self.port = _free_port()
+        self.settings: dict[str, object] = {
+            "port": self.port,
+            "unix_socket_directories": self.folder,
+            "listen_addresses": "127.0.0.1",
+            "fsync": "off",
+        }
+        self._process: subprocess.Popen[bytes] | None = None
+        self._databases = itertools.count()
+        self.start()
+
+    def _make(self) -> None:
+        command = [_program("initdb"), "-D", self.data, "-U", "owner", "-A", "trust"]
+        done = subprocess.run(
+            [*map(str, command), "-N", "-E", "UTF8"],
+            cwd=self.folder,
+            env={"PATH": os.environ["PATH"], "LC_ALL": "C"},
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE,
+            check=False,
+            **self._who,
+        )
+        if done.returncode:
+            raise RuntimeError(f"initdb: {done.stderr}")
+
+    def launch(self) -> bool:
+        """Start it if it does not run; return whether it answers."""
+        import psycopg  # noqa: PLC0415
+
+        options = [f"--{name}={value}" for name, value in self.settings.items()]
+        if self._process is None or self._process.poll() is not None:
+            # One that was killed leaves processes that end a little later.
+            with (self.folder / "log").open("ab") as log:
+                self._process = subprocess.Popen(
+                    [str(_program("postgres")), "-D", str(self.data), *options],
+                    cwd=self.folder,
+                    env={"PATH": os.environ["PATH"], "LC_ALL": "C"},
+                    stdout=log,
+                    stderr=log,
+                    **self._who,
+                )
+        try:
+            psycopg.connect(self.url("postgres"), connect_timeout=2).close()
+        except psycopg.OperationalError:
+            return False
+        return True
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        deadline = time.monotonic() + _PATIENCE
+        while not self.launch():
+            if time.monotonic() > deadline:
+                raise RuntimeError((self.folder / "log").read_text())
+            time.sleep(0.05)
+
+    def url(
+        self, database: str, user: str = "owner", password: str | None = None, **parameters: object
+    ) -> str:
+        """Return the address of a database for a role."""
+        secret = "" if password is None else f":{password}"
+        query = "&".join(f"{name}={value}" for name, value in parameters.items())
+        place = f"{user}{secret}@127.0.0.1:{self.port}/{database}"
+        return f"postgresql://{place}{'?' * bool(query)}{query}"
+
+    def database(self) -> str:
+        """Make a new database; return its name."""
+        name = f"plant_{next(self._databases)}"
+        self.do("postgres", f"CREATE DATABASE {name}")
+        return name
+
+    def do(self, database: str, statement: str, values: Sequence[object] = ()) -> list[Any]:
+        """Do a statement as its owner; return the rows that it finds."""
+        import psycopg  # noqa: PLC0415
+
+        with psycopg.connect(self.url(database), autocommit=True) as connection:
+            cursor = connection.execute(statement.encode(), values or None)
+            return cursor.fetchall() if cursor.description else []
+
+    def _signal(self, number: signal.Signals) -> None:
+        """Send a signal to the server and all that it has started."""
+        if self._process is None:
+            return
+        found = [self._process.pid]
+        for path in Path("/proc").glob("[0-9]*/stat"):
+            with contextlib.suppress(OSError):
+                fields = path.read_text().rpartition(")")[2].split()
+                if int(fields[1]) == self._process.pid:
+                    found.append(int(path.parent.name))
+        for one in found:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(one, number)
+
+    def _end(self, number: signal.Signals) -> None:
+        if self._process is not None:
+            self._process.send_signal(number)
+            self._process.wait()
+
+    def kill(self) -> None:
+        """Kill it and all that it has started, as a power cut does."""
+        self._signal(signal.SIGKILL)
+        if self._process is not None:
+            self._process.wait()
+
+    def stop(self) -> None:
+        """Stop it orderly; connections end."""
+        self._end(signal.SIGINT)
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """Have it stand still."""
+        self._signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._signal(signal.SIGCONT)
+
+    def remove(self) -> None:
+        """End it, and delete what it has kept."""
+        self._signal(signal.SIGCONT)
+        self._end(signal.SIGQUIT)
+        shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,0 +1,76 @@
+"""A server of the history of the plant's own, and whether it holds what the file holds."""
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmark.postgres_server import PostgresServer, why_no_server
+from valve_friction_ros.history import copied
+from valve_friction_ros.history.copying.unsent import count_unsent
+from valve_friction_ros.history.server.address import HistoryServer
+
+__all__ = ["Database", "Kept", "own_database"]
+
+_COUNT = "SELECT count(*) FROM identification"
+
+
+class Kept(NamedTuple):
+    """What a history file and a server hold at the end.
+
+    Attributes
+    ----------
+    in_file, on_server : int
+        Identifications, counted by the engines' own clients.
+    waiting : int
+        Rows that wait in the file for the server, as it counts them: what a process writes as it
+        ends is sent at its next start.
+    lacking : int
+        Rows of all tables that the server lacked, or had otherwise, as a comparison finds them.
+    """
+
+    in_file: int
+    on_server: int
+    waiting: int
+    lacking: int
+
+
+class Database:
+    """A database on a server that may be ended and held.
+
+    Parameters
+    ----------
+    server : PostgresServer
+        The server.
+    """
+
+    def __init__(self, server: PostgresServer) -> None:
+        self.server = server
+        self._name = server.database()
+        self.url = server.url(self._name)
+        self.is_away = False
+        """Whether a fault has it now."""
+
+    def compared_with(self, file: Path) -> Kept:
+        """Return what a file and the server hold; then the server holds everything."""
+        ((on_server,),) = self.server.do(self._name, _COUNT)
+        with contextlib.closing(sqlite3.connect(file)) as connection:
+            (in_file,) = connection.execute(_COUNT).fetchone()
+        waiting = count_unsent(file).waiting
+        parts = copied(file, HistoryServer(self.url))
+        lacking = sum(one.written + (not one.is_same) for one in parts)
+        return Kept(in_file, on_server, waiting, lacking)
+
+
+@contextlib.contextmanager
+def own_database() -> Iterator[Database | None]:
+    """Provide a new database on a new server; None where no server can be started."""
+    if why_no_server() is not None:
+        yield None
+        return
+    server = PostgresServer()
+    try:
+        yield Database(server)
+    finally:
+        server.remove()
