@@ -18,23 +18,37 @@ from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 __all__ = ["main"]
 
 _TURN = 0.05
-_EVERY = 0.2
+_EVERY, _COUNTED_EVERY = 0.2, 3.0
+_Groups = dict[str, dict[str, int]]
 
 
-def _picture(node: Dashboard) -> dict[str, dict[str, int]]:
-    groups: dict[str, dict[str, int]] = defaultdict(lambda: {"heard": 0, "silent": 0})
+def _group_of(identifier: str) -> str:
+    return identifier.strip("/").partition("_")[0]
+
+
+def _picture(node: Dashboard) -> _Groups:
+    """Return what the page of the plant reads, at its pace."""
+    groups: _Groups = defaultdict(lambda: {"heard": 0, "silent": 0})
     for valve in node.plant.valves(time.monotonic()):
-        group = groups[valve.view.node.strip("/").partition("_")[0]]
-        group["silent" if valve.is_silent else "heard"] += 1
-        held = int(valve.view.values.get("buffered_samples", "0"))
-        group["fewest"] = min(group.get("fewest", held), held)
-    return dict(groups)
+        groups[_group_of(valve.view.node)]["silent" if valve.is_silent else "heard"] += 1
+    return groups
+
+
+def _fewest(node: Dashboard) -> dict[str, int]:
+    """Return what the page of a valve reads, of all valves: it takes longer."""
+    now, fewest = time.monotonic(), dict[str, int]()
+    for one in node.plant.valves(now):
+        valve, group = node.plant.valve(one.view.node, now), _group_of(one.view.node)
+        held = 0 if valve is None else int(valve.view.values.get("buffered_samples", "0"))
+        fewest[group] = min(fewest.get(group, held), held)
+    return fewest
 
 
 def main() -> int:
     """Listen and print until the process is told to end."""
     rclpy.init(args=sys.argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
-    node, executor, due = Dashboard(), TurnExecutor(), 0.0
+    node, executor, due, counted = Dashboard(), TurnExecutor(), 0.0, 0.0
+    fewest: dict[str, int] = {}
     executor.add_node(node)
     with StopRequest() as stop:
         while not stop.has_come:
@@ -42,7 +56,11 @@ def main() -> int:
             node.poll_guarded()
             if time.monotonic() >= due:
                 due = time.monotonic() + _EVERY
-                print(json.dumps({"time": time.time(), "groups": _picture(node)}), flush=True)  # noqa: T201
+                if due >= counted:
+                    fewest, counted = _fewest(node), due + _COUNTED_EVERY
+                shown = _picture(node)
+                groups = {name: {**shown[name], "fewest": fewest.get(name, 0)} for name in shown}
+                print(json.dumps({"time": time.time(), "groups": groups}), flush=True)  # noqa: T201
             time.sleep(_TURN)
         stop.is_followed = True
     executor.shutdown()
