@@ -1,5 +1,6 @@
 """Shared by all tests: the bench valves and their simulated records."""
 
+import signal
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +25,10 @@ from valve_friction_ros.model import (
 )
 
 SAMPLE_PERIOD = 1e-3
+
+# A shell that runs the tests in the background has Ctrl-C ignored, by all that they start too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same examples in every run, and no deadline: the first call of a kernel compiles it.
 settings.register_profile("project", deadline=None, derandomize=True)
