@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Any
 
@@ -48,15 +49,20 @@ def why_no_server() -> str | None:
     return None
 
 
-def _free_port() -> int:
+def _free_port(address: str) -> int:
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
+        probe.bind((address, 0))
         port: int = probe.getsockname()[1]
         return port
 
 
 class PostgresServer:
-    """A server at 127.0.0.1, with the superuser `owner`; other roles need a password.
+    """A server, with the superuser `owner`; other roles need a password.
+
+    Parameters
+    ----------
+    address : str
+        Where it listens; others of its network of 256 addresses may come too.
 
     Attributes
     ----------
@@ -73,7 +79,7 @@ class PostgresServer:
         If no server can be started here, see `why_no_server`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, address: str = "127.0.0.1") -> None:
         if (reason := why_no_server()) is not None:
             raise RuntimeError(reason)
         self.folder = Path(tempfile.mkdtemp(prefix="vf-postgres-"))
@@ -82,14 +88,15 @@ class PostgresServer:
             os.chown(self.folder, self._who["user"], self._who["group"])
         self.data = self.folder / "data"
         self._make()
+        near = ip_network(f"{address}/24", strict=False)
         (self.data / "pg_hba.conf").write_text(
-            "host all owner 127.0.0.1/32 trust\nhost all all 127.0.0.1/32 scram-sha-256\n"
+            f"host all owner {near} trust\nhost all all {near} scram-sha-256\n"
         )
-        self.port = _free_port()
+        self.address, self.port = address, _free_port(address)
         self.settings: dict[str, object] = {
             "port": self.port,
             "unix_socket_directories": self.folder,
-            "listen_addresses": "127.0.0.1",
+            "listen_addresses": address,
             "fsync": "off",
         }
         self._process: subprocess.Popen[bytes] | None = None
@@ -147,7 +154,7 @@ class PostgresServer:
         """Return the address of a database for a role."""
         secret = "" if password is None else f":{password}"
         query = "&".join(f"{name}={value}" for name, value in parameters.items())
-        place = f"{user}{secret}@127.0.0.1:{self.port}/{database}"
+        place = f"{user}{secret}@{self.address}:{self.port}/{database}"
         return f"postgresql://{place}{'?' * bool(query)}{query}"
 
     def database(self) -> str:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 
+from benchmark.hosts.database import Database, plant_database
 from benchmark.hosts.network import Host, Traffic, network
 from benchmark.hosts.picture import Picture
 from benchmark.process_usage import processor_seconds, resident_megabytes
@@ -30,16 +31,26 @@ _TRUTH = 6.0
 """Time, s, within which the dashboard shall show what has happened: its silence of 5 s, and the
 second between two messages of a valve."""
 _BLOCKS_A_SECOND = 10
+_ASKED = 5
+"""Valves of a host that are identified while it is cut off, and before it dies."""
 
 
 class _Running:
     """What runs on one host with valves."""
 
-    def __init__(self, host: Host, name: str, options: argparse.Namespace, seconds: float) -> None:
+    def __init__(
+        self,
+        host: Host,
+        name: str,
+        options: argparse.Namespace,
+        seconds: float,
+        database: Database | None,
+    ) -> None:
         self.host, self.name, self.valves = host, name, options.valves
         valves = [f"{name}_{number}" for number in range(options.valves)]
         stream = ["--rate", str(options.rate), "--seconds", str(round(seconds))]
-        self.process = host.start("benchmark.hosts.host", [*valves, *stream])
+        kept = [] if database is None else database.arguments(name)
+        self.process = host.start("benchmark.hosts.host", [*valves, *stream, *kept])
         self.pids: dict[str, int] = json.loads(self.line())
 
     def line(self) -> str:
@@ -52,6 +63,14 @@ class _Running:
 
     def is_silent(self, picture: Picture) -> bool:
         return picture.group(self.name).silent == self.valves
+
+    def ask(self) -> int:
+        """Have some of its valves identified, by somebody on the host; return the answers."""
+        asker = self.host.start(
+            "benchmark.hosts.asker", [f"{self.name}_{number}" for number in range(_ASKED)]
+        )
+        told, _ = asker.communicate()
+        return int(told or 0)
 
     def cpu(self) -> float:
         return processor_seconds(self.pids["identifiers"])
@@ -67,6 +86,7 @@ class _Plant(NamedTuple):
     picture: Picture
     at: Host
     hosts: list[_Running]
+    database: Database | None
 
     def is_complete(self, picture: Picture) -> bool:
         return all(one.is_shown(picture) for one in self.hosts)
@@ -92,15 +112,16 @@ def _started(options: argparse.Namespace) -> Iterator[tuple[_Plant, float]]:
             stack.callback(server.wait)
             stack.callback(server.kill)
             os.environ["ROS_DISCOVERY_SERVER"] = f"{office.address}:{_SERVER_PORT}"
+        database = stack.enter_context(plant_database())
         begin = time.monotonic()
         dashboard = office.start(
             "benchmark.hosts.dashboard", ["--ros-args", "-p", "history_file:=''"]
         )
         hosts = [
-            _Running(host, f"h{number}", options, _seconds(options))
+            _Running(host, f"h{number}", options, _seconds(options), database)
             for number, host in enumerate(others)
         ]
-        yield _Plant(dashboard, Picture(dashboard), office, hosts), begin
+        yield _Plant(dashboard, Picture(dashboard), office, hosts, database), begin
 
 
 class _Use(NamedTuple):
@@ -161,15 +182,18 @@ def _in_service(plant: _Plant, seconds: float) -> Iterator[Row]:
 
 def _death(plant: _Plant, options: argparse.Namespace) -> Iterator[Row]:
     """Kill a host, and start it again."""
-    dead, others = plant.hosts[0], plant.hosts[1:]
-    dead.host.kill()
+    dead, others, database = plant.hosts[0], plant.hosts[1:], plant.database
+    answered = dead.ask() if database else 0
+    dead.host.kill()  # a second after the last answer at most: what it has kept may wait still
     dead.process.wait()
     yield _truth("a host dies: its valves are silent", _until(plant, dead.is_silent))
     rest = all(one.is_shown(plant.picture) for one in others)
     yield Row(
         "hosts that are still shown then", float(rest * len(others)), "", None, "", "all", rest
     )
-    plant.hosts[0] = _Running(dead.host, dead.name, options, _seconds(options))
+    plant.hosts[0] = _Running(dead.host, dead.name, options, _seconds(options), database)
+    if database:
+        yield from database.rows(dead.name, "that died, and is back", answered, _START)
     took = plant.picture.time_until(plant.is_complete, _START)
     yield Row(
         "it returns: start to the complete picture", took, "s", None, "", "shown", took < _START
@@ -182,9 +206,18 @@ def _partition(plant: _Plant, seconds: float) -> Iterator[Row]:
     begin = time.monotonic()
     cut.host.plug(False)
     yield _truth("a host is cut off: its valves are silent", _until(plant, cut.is_silent))
+    answered = cut.ask() if plant.database else 0
+    if plant.database:
+        yield Row("of its identifications meanwhile, answered there", answered, "")
+        kept = plant.database.count(cut.name)
+        yield Row("of them on the server while it is cut off", kept, "", None, "", "0", not kept)
     time.sleep(max(0.0, begin + seconds - time.monotonic()))
     cut.host.plug(True)
+    plugged = time.monotonic()
     yield _truth("plugged in again: its valves are heard", _until(plant, cut.is_shown))
+    if plant.database:
+        words = "that was cut off"
+        yield from plant.database.rows(cut.name, words, answered, _PATIENCE, plugged)
     yield _truth("and the complete picture", _until(plant, plant.is_complete))
 
 

@@ -20,8 +20,15 @@ def main() -> int:
     parser.add_argument("valves", nargs="+")
     parser.add_argument("--rate", type=int, required=True)
     parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--history", default="''")
+    parser.add_argument("--history-url", default="''")
     options = parser.parse_args()
-    parameters = [f"valves:=[{','.join(options.valves)}]", "history_file:=''", "window:=3600.0"]
+    parameters = [
+        f"valves:=[{','.join(options.valves)}]",
+        f"history_file:={options.history}",
+        f"history_url:={options.history_url}",
+        "window:=3600.0",
+    ]
     given = [word for one in parameters for word in ("-p", one)]
     identifiers = subprocess.Popen(
         [sys.executable, *_IDENTIFIERS, *given],

@@ -10,10 +10,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["Host", "Traffic", "network"]
+__all__ = ["OUTSIDE", "Host", "Traffic", "network"]
 
 _BRIDGE = "vfbridge"
 _NETWORK = "10.77.0"
+OUTSIDE = f"{_NETWORK}.254"
+"""Address at which the hosts reach this machine, and its database."""
 _IP = shutil.which("ip") or "/sbin/ip"
 _OWN_SHARED_MEMORY = 'mount -t tmpfs tmpfs /dev/shm; exec "$@"'
 """Processes of two hosts would otherwise meet in the shared memory of the machine."""
@@ -98,10 +100,11 @@ class Host:
 
 @contextlib.contextmanager
 def network(count: int) -> Iterator[list[Host]]:
-    """Provide hosts that see nothing but each other; needs root."""
+    """Provide hosts that see nothing but each other and `OUTSIDE`; needs root."""
     hosts = [Host(number) for number in range(count)]
     _ip("link", "add", _BRIDGE, "type", "bridge", "mcast_snooping", "0")
     try:
+        _ip("address", "add", f"{OUTSIDE}/24", "dev", _BRIDGE)
         _ip("link", "set", _BRIDGE, "up")
         for host in hosts:
             host.make()
