@@ -481,10 +481,16 @@ class TestRetention:
         """Pages of what was forgotten are used again."""
         sizes = []
         for day in range(200):
-            history.add(success(START + day * DAY), days=20)
+            history.add(success(START + (day - 200) * DAY), days=20)
             sizes.append(history.path.stat().st_size)
         assert len(history.entries()) == 21
         assert sizes[-1] == sizes[60]
+
+    def test_a_time_ahead_of_the_clock_ages_nothing(self, history):
+        """As where a clock was set wrong by a century."""
+        history.add(success(START), days=10_000)
+        history.add(success(START + 36_525 * DAY), days=10_000)
+        assert len(history.entries()) == 2
 
     def test_settings_are_kept_once_and_as_long_as_needed(self, history):
         history.add(success(START, settings='{"window": 1.0}'))

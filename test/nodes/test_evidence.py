@@ -103,7 +103,7 @@ def test_the_newer_of_identification_and_moves_leads_and_is_the_baseline(live, t
     serve(client, 1 + MOVES, 450.0)
     status = client.next_status(lambda status: "has grown" in status.message, "the growth")
     assert status.message.startswith("friction has grown: sliding friction")
-    dated = " (identified 2023-11-14 22:13 UTC, before the latest of these moves)"
+    dated = " (identified earlier, 2023-11-14 22:13 UTC)"
     _, _, before = status.message.partition("; friction normal: coulomb friction is 1.00")
     assert dated in before
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful

@@ -8,9 +8,9 @@ from pathlib import Path
 from valve_friction_ros.history.entry import HistoryEntry, KeptBaseline, KeptValve
 from valve_friction_ros.history.errors import HistoryError
 from valve_friction_ros.history.reader import History
+from valve_friction_ros.history.retention import oldest_kept
 from valve_friction_ros.history.rows import insert_baseline, insert_entry, valve_id
 from valve_friction_ros.history.schema import is_current, writing
-from valve_friction_ros.streams import DAY
 
 __all__ = ["HistoryError", "HistoryFile"]
 
@@ -57,7 +57,7 @@ class HistoryFile(History):
             valve = valve_id(connection, entry.valve)
             insert_entry(connection, valve, entry)
             if days > 0:
-                _forget(connection, valve, entry.time - round(days * DAY))
+                _forget(connection, valve, oldest_kept(entry.time, days))
 
     def set_baseline(self, valve: KeptValve, kept: KeptBaseline) -> None:
         """Make this the baseline of a valve."""

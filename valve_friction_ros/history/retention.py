@@ -5,7 +5,15 @@ import time
 
 from valve_friction_ros.streams import DAY
 
-__all__ = ["forget_beyond", "forget_older"]
+__all__ = ["forget_beyond", "forget_older", "oldest_kept"]
+
+
+def oldest_kept(newest: int, days: float) -> int:
+    """Return the time, ns, before which rows leave that are `days` older than the newest one.
+
+    A newest row that is ahead of the clock of this machine ages none.
+    """
+    return min(newest, time.time_ns()) - round(days * DAY)
 
 
 def forget_older(
@@ -13,13 +21,12 @@ def forget_older(
 ) -> None:
     """Delete the rows of a valve that are `days` older than a stamp, ns; none for 0.
 
-    The stamps are in `column`. One ahead of the clock of this machine ages none.
+    The stamps are in `column`.
     """
     if days > 0:
-        oldest = min(newest, time.time_ns()) - round(days * DAY)
         connection.execute(
             f"DELETE FROM {table} WHERE valve_id = ? AND {column} < ?",  # noqa: S608
-            (row, oldest),
+            (row, oldest_kept(newest, days)),
         )
 
 

@@ -152,7 +152,7 @@ def _sentences(
     leading = [one.message for one in findings if one.leads]
     told = diagnosis.message
     if leading and monitor.seen_until is not None:
-        told += f" (identified {utc_minute(monitor.seen_until)}, before the latest of these moves)"
+        told += f" (identified earlier, {utc_minute(monitor.seen_until)})"
     return [*leading, told, *(one.message for one in findings if not one.leads)]
 
 
