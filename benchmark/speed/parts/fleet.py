@@ -10,7 +10,7 @@ import os
 import statistics
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,14 +30,14 @@ from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSett
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise
 from valve_friction_ros.records.recordings import ReadingOptions
 
-__all__ = ["measure"]
+__all__ = ["Cost", "cost_of", "measure", "recordings", "timed", "write_recordings"]
 
 _FILES = 4
 _RECORDINGS_A_PROCESS = 12
 _SHARE = 0.8
 
 
-def _write(folder: Path) -> list[Path]:
+def write_recordings(folder: Path) -> list[Path]:
     """Write the records that take turns as recordings."""
     paths = []
     for seed in range(_FILES):
@@ -61,38 +61,46 @@ def _never() -> bool:
 
 
 class _Answer(NamedTuple):
-    """When a recording was finished, and by whom."""
+    """When a recording was finished, s since 1970, and by whom."""
 
+    ended: float
     process: int
     processor_time: float
     error: object
 
 
-class _Cost(NamedTuple):
+class Cost(NamedTuple):
     """Seconds a recording."""
 
     wall: float
     processor: float
 
 
-def _timed(job: Job) -> _Answer:
+def timed(job: Job) -> _Answer:
+    """Identify a recording."""
     (row,) = identify_job(job)
-    return _Answer(os.getpid(), time.process_time(), row.get("error"))
+    return _Answer(time.time(), os.getpid(), time.process_time(), row.get("error"))
 
 
-def _cost(paths: Sequence[Path], processes: int) -> _Cost:
+def recordings(paths: Sequence[Path], processes: int) -> list[Job]:
+    """Return what so many processes shall do: the recordings in turn."""
     options = Options(BENCH_VALVE, ReadingOptions(), DEFAULT_METHOD, IdentificationSettings(), None)
     count = processes * (_RECORDINGS_A_PROCESS + 1)
-    jobs = [Job(paths[number % len(paths)], options) for number in range(count)]
+    return [Job(paths[number % len(paths)], options) for number in range(count)]
+
+
+def cost_of(answers: Iterable[tuple[Job, _Answer | DeadWorker]], processes: int) -> Cost:
+    """Return what a recording costs so many processes, once each has given an answer."""
     ends: list[float] = []
     processor_times: dict[int, list[float]] = {}
-    for _, answer in in_processes(_timed, jobs, processes, _never):
+    for _, answer in answers:
         if isinstance(answer, DeadWorker) or answer.error:
             raise RuntimeError(f"a recording was not identified: {answer}")
-        ends.append(time.monotonic())
+        ends.append(answer.ended)
         processor_times.setdefault(answer.process, []).append(answer.processor_time)
-    return _Cost(
-        (ends[-1] - ends[processes - 1]) / (count - processes),
+    over = time.time()  # with all answers; they may come several at once
+    return Cost(
+        (over - sorted(ends)[processes - 1]) / (len(ends) - processes),
         sum(times[-1] - times[0] for times in processor_times.values())
         / sum(len(times) - 1 for times in processor_times.values()),
     )
@@ -101,15 +109,16 @@ def _cost(paths: Sequence[Path], processes: int) -> _Cost:
 def measure(settings: Settings) -> Iterator[Row]:
     """Measure one process and one on each core, in turn."""
     cores = usable_cores()
-    costs: dict[int, list[_Cost]] = {1: [], cores: []}
+    costs: dict[int, list[Cost]] = {1: [], cores: []}
     with tempfile.TemporaryDirectory() as folder:
-        paths = _write(Path(folder))
+        paths = write_recordings(Path(folder))
         for repeat in range(settings.repeats):
             for processes, found in costs.items():
                 settings.say(f"{processes} processes, {repeat + 1} of {settings.repeats}")
-                found.append(_cost(paths, processes))
+                answers = in_processes(timed, recordings(paths, processes), processes, _never)
+                found.append(cost_of(answers, processes))
     one, every = (
-        _Cost(*(statistics.median(column) for column in zip(*costs[processes], strict=True)))
+        Cost(*(statistics.median(column) for column in zip(*costs[processes], strict=True)))
         for processes in (1, cores)
     )
     wanted = _SHARE * cores
