@@ -141,7 +141,7 @@ def test_what_was_before_an_alarm_outlives_a_kill(live, tmp_path):
 
 
 def test_the_whole_recording_takes_the_place_of_its_first_part(live, tmp_path):
-    baseline_set(live, {"alarm_recording": 3.0, "alarm_recordings": 1})
+    baseline_set(live, {"alarm_recording": 10.0, "alarm_recordings": 1})
     client, folder = live.client, tmp_path / "valve_friction_ros" / "alarms"
     client.identified(TIGHT)
     client.wait_until(lambda: [*folder.glob("alarm_*")], "the first part")
