@@ -1,7 +1,7 @@
 """A gateway from Modbus TCP: two values of a device become the inputs of a valve's identifier.
 
 ``python examples/modbus_gateway.py --ros-args -r __ns:=/fv_101 -p host:=plc ...``; Ctrl-C ends it.
-It needs pymodbus (``pip install pymodbus``). Copy it, and change what differs.
+It needs pymodbus (``pip install 'pymodbus>=3.16,<4'``). Copy it, and change what differs.
 """
 
 import contextlib

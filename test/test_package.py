@@ -21,6 +21,8 @@ import rclpy
 import yaml
 from documentation import TEXT
 
+from valve_friction_ros import __version__
+
 PROJECT = Path(__file__).resolve().parents[1]
 NAME = "valve_friction_ros"
 EXECUTABLES = {
@@ -45,8 +47,8 @@ def entry_points():
     return {name: (module, function) for name, module, function in found}
 
 
-def test_the_version_stands_in_one_place():
-    """What setup.py gives is that of package.xml, and the change log knows it."""
+def test_there_is_one_version():
+    """What setup.py gives is that of package.xml, so is the module's; the change log knows it."""
     declared = ET.parse(PROJECT / "package.xml").getroot().findtext("version")
     given = subprocess.run(
         [sys.executable, "setup.py", "--version"],
@@ -56,6 +58,7 @@ def test_the_version_stands_in_one_place():
         check=True,
     )
     assert given.stdout.split()[-1] == declared
+    assert __version__ == declared
     assert not re.search(r'version="', setup_text())
     assert re.search(rf"^{re.escape(declared)}\b", (PROJECT / "CHANGELOG.rst").read_text(), re.M)
 

@@ -63,7 +63,9 @@ class ActuatorData:
             _ATMOSPHERE if self.is_absolute else 0.0,
             f"Pa, {'absolute' if self.is_absolute else 'gauge'} sensor",
         )
-        yield "travel", self.travel, f"m, {self.travel * 1e3:.4g} mm"
+        yield "travel", self.travel, f"m, {self.travel * 1e3:.6g} mm"
+        if self.is_air_to_close:
+            yield "air_to", "close", "which end of the travel is the seat"
         if self.sensor_range is not None:
             low, high = self.sensor_range
             yield "pressure_minimum", low, f"Pa, {low / 1e5:.4g} bar: range of the sensor"
