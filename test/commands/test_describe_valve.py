@@ -57,10 +57,12 @@ def test_units_of_people(described):
     [("open", "plug", False), ("open", "stem", False), ("close", "stem", False)],
 )
 def test_only_the_opening_of_an_air_to_close_valve_is_inverted(
-    described, air_to, position, inverted
+    described, air_to, position, inverted, tmp_path
 ):
     found = described(*options(SINGLE | {"air_to": air_to, "position": position}))
     assert found.columns.inverted_position == inverted
+    written = yaml.safe_load((tmp_path / "fv_101.yaml").read_text())["/**"]["ros__parameters"]
+    assert written.get("air_to", "open") == air_to  # where a node looks for the seat
 
 
 def test_double_acting_without_a_spring(described):
