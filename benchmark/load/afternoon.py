@@ -11,7 +11,7 @@ from urllib.parse import quote
 import numpy as np
 from playwright.sync_api import Browser, Page
 
-from benchmark.load.browser import Visit, pages_of, visit, wait_on_page
+from benchmark.load.browser import Visit, pages_of, visit
 from benchmark.load.plant import identifier_of
 from benchmark.load.stage import LIVE, Stage
 from benchmark.speed.rows import Row
@@ -24,6 +24,8 @@ _SETTLED = 0.3
 _GROWTH = 10.0
 """Growth of the memory from then on, MB, that counts as steady. Chosen: 5 % of the bound."""
 _TABS = 4
+_PATIENCE = 60_000.0
+"""Longest time until a page is connected, ms."""
 _Say = Callable[[str], None]
 
 
@@ -75,7 +77,8 @@ class _Visitor:
         elif chance < 0.75:
             tab = self._chance.choice(self._tabs)
             tab.goto(self._stage.address + self._draw().path, wait_until="commit")
-            wait_on_page(tab, "window.did_handshake")
+            # An evaluation of a page that is just being left may never come back.
+            tab.wait_for_function("window.did_handshake", polling=50, timeout=_PATIENCE)
         elif chance < 0.85:
             self._chance.choice(self._tabs).reload(wait_until="commit")
         else:
