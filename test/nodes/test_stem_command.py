@@ -82,7 +82,11 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
     commander(live)(TRAVEL)
     stamps, pressure, position = answer(1.0, 0.5)
     client.send((stamps, pressure), (stamps, position))
-    before = values_of(client.next_status(lambda one: one.level == WARN, "a late stem"))
+
+    def is_late(status):  # after the last of its moves
+        return status.level == WARN and values_of(status)["moves"] == "6"
+
+    before = values_of(client.next_status(is_late, "a late stem"))
     file = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     client.wait_until(lambda: len(read_answers(file, NODE)) == 6, "the moves in the history")
     live.kill(node)
