@@ -84,9 +84,10 @@ def timed(job: Job) -> _Answer:
 
 def recordings(paths: Sequence[Path], processes: int) -> list[Job]:
     """Return what so many processes shall do: the recordings in turn."""
-    options = Options(BENCH_VALVE, ReadingOptions(), DEFAULT_METHOD, IdentificationSettings(), None)
+    options = Options(BENCH_VALVE, ReadingOptions(), DEFAULT_METHOD, IdentificationSettings())
     count = processes * (_RECORDINGS_A_PROCESS + 1)
-    return [Job(paths[number % len(paths)], options) for number in range(count)]
+    turns = (paths[number % len(paths)] for number in range(count))
+    return [Job(path, path.name, options) for path in turns]
 
 
 def cost_of(answers: Iterable[tuple[Job, _Answer | DeadWorker]], processes: int) -> Cost:
