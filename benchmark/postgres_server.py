@@ -15,7 +15,7 @@ from ipaddress import ip_network
 from pathlib import Path
 from typing import Any
 
-__all__ = ["PostgresServer", "why_no_server"]
+__all__ = ["PostgresServer", "running_server", "why_no_server"]
 
 _FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda one: one.parent.name)
 _PATIENCE = 60.0
@@ -214,3 +214,16 @@ class PostgresServer:
         self._signal(signal.SIGCONT)
         self._end(signal.SIGQUIT)
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def running_server(address: str = "127.0.0.1") -> Iterator[PostgresServer | None]:
+    """Provide a new server at an address; None where no server can be started."""
+    if why_no_server() is not None:
+        yield None
+        return
+    server = PostgresServer(address)
+    try:
+        yield server
+    finally:
+        server.remove()

@@ -184,7 +184,7 @@ def _death(plant: _Plant, options: argparse.Namespace) -> Iterator[Row]:
     """Kill a host, and start it again."""
     dead, others, database = plant.hosts[0], plant.hosts[1:], plant.database
     answered = dead.ask() if database else 0
-    dead.host.kill()  # a second after the last answer at most: what it has kept may wait still
+    dead.host.kill()  # what it has kept may wait still
     dead.process.wait()
     yield _truth("a host dies: its valves are silent", _until(plant, dead.is_silent))
     rest = all(one.is_shown(plant.picture) for one in others)
@@ -206,8 +206,9 @@ def _partition(plant: _Plant, seconds: float) -> Iterator[Row]:
     begin = time.monotonic()
     cut.host.plug(False)
     yield _truth("a host is cut off: its valves are silent", _until(plant, cut.is_silent))
-    answered = cut.ask() if plant.database else 0
+    answered = 0
     if plant.database:
+        answered = cut.ask()
         yield Row("of its identifications meanwhile, answered there", answered, "")
         kept = plant.database.count(cut.name)
         yield Row("of them on the server while it is cut off", kept, "", None, "", "0", not kept)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from benchmark.hosts.network import OUTSIDE
-from benchmark.postgres_server import PostgresServer, why_no_server
+from benchmark.postgres_server import PostgresServer, running_server
 from benchmark.speed.rows import Row
 
 __all__ = ["Database", "plant_database"]
@@ -64,12 +64,5 @@ class Database:
 @contextlib.contextmanager
 def plant_database() -> Iterator[Database | None]:
     """Provide a new database on a new server; None where no server can be started."""
-    if why_no_server() is not None:
-        yield None
-        return
-    server = PostgresServer(OUTSIDE)
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            yield Database(server, Path(folder))
-    finally:
-        server.remove()
+    with running_server(OUTSIDE) as server, tempfile.TemporaryDirectory() as folder:
+        yield None if server is None else Database(server, Path(folder))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmark.postgres_server import PostgresServer, why_no_server
+from benchmark.postgres_server import PostgresServer, running_server
 from valve_friction_ros.history import copied
 from valve_friction_ros.history.copying.unsent import count_unsent
 from valve_friction_ros.history.server.address import HistoryServer
@@ -66,11 +66,5 @@ class Database:
 @contextlib.contextmanager
 def own_database() -> Iterator[Database | None]:
     """Provide a new database on a new server; None where no server can be started."""
-    if why_no_server() is not None:
-        yield None
-        return
-    server = PostgresServer()
-    try:
-        yield Database(server)
-    finally:
-        server.remove()
+    with running_server() as server:
+        yield None if server is None else Database(server)

@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmark.soak.database import Database
 from benchmark.soak.disk import filled
 from benchmark.soak.feed import Feed
-from benchmark.soak.plant import Plant, Process
+from benchmark.soak.plant import Life, Plant, Process
 
 __all__ = ["FAULTS", "Site", "bad_samples", "settled"]
 
@@ -136,45 +136,36 @@ def frozen(site: Site) -> Iterator[None]:
     process.is_held = False
 
 
-def full_disk(site: Site) -> Iterator[None]:
-    """Fill the disk of the history until a node says so; then there is room again."""
-    if site.disk is None:
-        return
+def _until_told(
+    site: Site, event: str, tells: Callable[[Life], bool], longer: float
+) -> Iterator[None]:
+    """Wait until a process tells of a fault, and up to `longer` s more; note both."""
     told: set[str] = set()
 
     def is_told() -> bool:
-        for process in site.plant.processes:
-            told.update(
-                valve
-                for valve, message in process.life.messages.items()
-                if "the history is not written" in message
-            )
-        return bool(told)
-
-    begin = time.monotonic()
-    with filled(site.disk):
-        yield from _until(is_told)
-        yield from _for(site.chance.uniform(0.0, 10.0))
-    site.plant.ledger.add("full disk", seconds=time.monotonic() - begin, told=bool(told))
-
-
-def _missed(site: Site, fault: str) -> Iterator[None]:
-    """Wait until a node says that it cannot send its history, and some time more; note both."""
-    told: set[str] = set()
-
-    def is_told() -> bool:
-        for process in site.plant.processes:
-            told.update(
-                valve
-                for valve, values in process.life.told.items()
-                if values.get("history_server problem")
-            )
+        told.update(one.name for one in site.plant.processes if tells(one.life))
         return bool(told)
 
     begin = time.monotonic()
     yield from _until(is_told)
-    yield from _for(site.chance.uniform(0.0, 20.0))
-    site.plant.ledger.add(fault, seconds=time.monotonic() - begin, told=bool(told))
+    yield from _for(site.chance.uniform(0.0, longer))
+    site.plant.ledger.add(event, seconds=time.monotonic() - begin, told=bool(told))
+
+
+def _tells_of_disk(life: Life) -> bool:
+    return any("the history is not written" in one for one in life.messages.values())
+
+
+def _tells_of_database(life: Life) -> bool:
+    return any(values.get("history_server problem") for values in life.told.values())
+
+
+def full_disk(site: Site) -> Iterator[None]:
+    """Fill the disk of the history until a node says so; then there is room again."""
+    if site.disk is None:
+        return
+    with filled(site.disk):
+        yield from _until_told(site, "full disk", _tells_of_disk, 10.0)
 
 
 def database_killed(site: Site) -> Iterator[None]:
@@ -184,7 +175,7 @@ def database_killed(site: Site) -> Iterator[None]:
         return
     database.is_away = True
     database.server.kill()
-    yield from _missed(site, "database away")
+    yield from _until_told(site, "database away", _tells_of_database, 20.0)
     yield from _until(database.server.launch)
     database.is_away = False
 
@@ -196,7 +187,7 @@ def database_silent(site: Site) -> Iterator[None]:
         return
     database.is_away = True
     with database.server.paused():
-        yield from _missed(site, "database away")
+        yield from _until_told(site, "database away", _tells_of_database, 20.0)
     database.is_away = False
 
 

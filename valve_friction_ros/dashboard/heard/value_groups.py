@@ -31,8 +31,6 @@ _SHOWN = ("NE 107", "estimate_", "reason", "friction_ratio", "friction_drift", "
 _FIT = ("fit", "rms", "systematic", "method", "derivative", "threshold", "samples", "sigma",
         "r_squared", "fixed", "warnings", "sliding_speed")  # fmt: skip
 
-_SAMPLES = ("samples_taken", "samples_rejected")
-
 
 def groups_of(values: Mapping[str, str], parameters: set[str]) -> dict[str, tuple[Entry, ...]]:
     """Return the values that no other part of a page shows, by what they are about.
@@ -69,8 +67,6 @@ def _with_intervals(changes: tuple[Entry, ...]) -> tuple[Entry, ...]:
 
 def _group(key: str, parameters: set[str]) -> str:
     """Return the group of a key; empty for one that is shown by itself."""
-    if key.startswith(_SAMPLES):
-        return "counters"
     if f"{_CHANGE} " in key and not key.startswith("evidence "):
         return "changes"
     if key.startswith(_SHOWN) or any(key.startswith(name) for name in parameters):
@@ -79,6 +75,7 @@ def _group(key: str, parameters: set[str]) -> str:
         ("evidence", ("evidence ",)),
         ("usage", _USAGE),
         ("command", _COMMAND),
+        ("counters", ("samples_",)),
         ("fit", _FIT),
     ):
         if key.startswith(starts):

@@ -54,7 +54,7 @@ def cannot_start(error: Exception) -> int:
 
 
 class _Answering:
-    """Looks at the services also within a turn, where it lasts."""
+    """Looks at the services also within a turn that has just begun, where it lasts."""
 
     def __init__(self, executors: Sequence[TurnExecutor]) -> None:
         self._executors = executors
@@ -79,9 +79,8 @@ def _run(
     """Take turns until the stop is requested."""
     least = _PAUSE_OF_A_NODE * len(nodes)
     lively_until = time.monotonic() + _LIVELY_TIME
-    answering = _Answering(executors)
     while not _is_over(stop):
-        is_lively = False
+        is_lively, answering = False, _Answering(executors)
         for executor in executors:
             is_lively |= executor.turn()
             answering.go_on()
