@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
@@ -12,18 +13,21 @@ from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams import utc_minute
 
 __all__ = [
     "DOUBT",
     "Diagnosis",
     "EarlierEstimate",
     "FrictionLimits",
+    "FrictionState",
     "Frictions",
     "against",
     "dead_band",
     "dead_band_half_width",
     "diagnose",
     "diagnose_again",
+    "friction_state",
     "is_compared",
     "leading_ratio",
     "percentage",
@@ -74,6 +78,20 @@ class FrictionLimits:
             )
 
 
+class FrictionState(Enum):
+    """How the friction of a record compares with its baseline, in words."""
+
+    UNKNOWN = ""
+    """It is not compared."""
+    IMPOSSIBLE = "friction below zero"
+    NORMAL = "friction normal"
+    PERHAPS_GROWN = "friction perhaps grown"
+    GROWN = "friction has grown"
+    EXCESS = "excess friction"
+    PERHAPS_COLLAPSED = "friction perhaps collapsed"
+    COLLAPSED = "friction collapsed, the packing may leak"
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """The diagnosis of a valve: the state of its friction.
@@ -89,12 +107,26 @@ class Diagnosis:
     ratio : Ratio or None
         Friction over its baseline, with its interval and the friction that is compared; None
         without a baseline, or where the result has no friction to compare with it.
+    state : FrictionState
+        What the record says of the friction.
     """
 
     level: Level
     status_signal: StatusSignal
     message: str
     ratio: Ratio | None
+    state: FrictionState = FrictionState.UNKNOWN
+
+    def of_before(self, time: int | None) -> "Diagnosis":
+        """Return what is said of a valve that is not watched now, by its record of a time, ns.
+
+        What was normal then need not be so now.
+        """
+        if self.state is not FrictionState.NORMAL or self.ratio is None:
+            return self
+        dated = "" if time is None else f" (identified {utc_minute(time)})"
+        message = f"{self.ratio.what} was {_figures(self.ratio)} times its baseline{dated}"
+        return replace(self, message=message)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the diagnosis as a mapping of plain values, from which other forms are derived.
@@ -267,7 +299,9 @@ def diagnose(
                 f"{_words(friction)} is {friction.value:.4g} ± {width} N, and "
                 "friction is above zero: check the direction of both signals"
             )
-            return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
+            return Diagnosis(
+                Level.WARN, StatusSignal.CHECK_FUNCTION, message, None, FrictionState.IMPOSSIBLE
+            )
     return _with_model_doubt(_by_size(result, valve, baseline, limits), result)
 
 
@@ -309,7 +343,8 @@ def _by_size(
     if baseline is not None:
         found = compared(result.parameters, result.sliding_speed, baseline)
         if vanished := _vanished(result, baseline, limits):
-            return Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, vanished, None)
+            level, signal = _SEVERITY[FrictionState.COLLAPSED]
+            return Diagnosis(level, signal, vanished, None, FrictionState.COLLAPSED)
     if all(math.isnan(one.value) for one in _frictions(result)):
         friction = _frictions(result)[0]
         message = f"{_words(friction)} is not identifiable: {friction.reason}"
@@ -384,28 +419,29 @@ def against(
     ratio: Ratio, limits: FrictionLimits, effect: str, healthy: str = "its baseline"
 ) -> Diagnosis:
     """Return the diagnosis of a friction over the `healthy` one, with its `effect` in words."""
+    state = friction_state(ratio, limits)
+    level, signal = _SEVERITY.get(state, (Level.OK, StatusSignal.GOOD))
     finding = f"{ratio.what} is {_figures(ratio)} times {healthy}"
+    return Diagnosis(level, signal, f"{state.value}: {finding}; {effect}", ratio, state)
+
+
+_SEVERITY = {
+    FrictionState.EXCESS: (Level.ERROR, StatusSignal.FAILURE),
+    FrictionState.COLLAPSED: (Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
+    FrictionState.GROWN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
+}
+
+
+def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
+    """Return what a ratio says: a limit is passed where the whole interval lies beyond it."""
     if ratio.low >= limits.error_ratio:
-        return Diagnosis(
-            Level.ERROR, StatusSignal.FAILURE, f"excess friction: {finding}; {effect}", ratio
-        )
+        return FrictionState.EXCESS
     if ratio.high <= limits.low_ratio:
-        return Diagnosis(
-            Level.ERROR,
-            StatusSignal.OUT_OF_SPECIFICATION,
-            f"friction collapsed, the packing may leak: {finding}; {effect}",
-            ratio,
-        )
+        return FrictionState.COLLAPSED
     if ratio.low >= limits.warn_ratio:
-        return Diagnosis(
-            Level.WARN,
-            StatusSignal.MAINTENANCE_REQUIRED,
-            f"friction has grown: {finding}; {effect}",
-            ratio,
-        )
-    words = "friction normal"
+        return FrictionState.GROWN
     if ratio.value >= limits.warn_ratio:
-        words = "friction perhaps grown"
-    elif ratio.value <= limits.low_ratio:
-        words = "friction perhaps collapsed"
-    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {finding}; {effect}", ratio)
+        return FrictionState.PERHAPS_GROWN
+    if ratio.value <= limits.low_ratio:
+        return FrictionState.PERHAPS_COLLAPSED
+    return FrictionState.NORMAL

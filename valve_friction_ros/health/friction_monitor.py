@@ -30,11 +30,15 @@ from valve_friction_ros.identification import (
     method_named,
     method_used,
 )
+from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 
 __all__ = ["FrictionMonitor", "IdentificationInput", "MonitorSettings", "identify_snapshot"]
+
+_REFUSED = 3
+"""Refusals in a row from which they are a fault. Chosen: one bad record, or two, may be chance."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,8 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
     except RefusalError as refusal:
         cleared = snapshot.cleared_because
         why = "" if cleared is None else f" (the buffer was cleared: {cleared})"
-        raise RefusedRecordError(f"{refusal}{why}", numbers) from refusal
+        is_fault = not isinstance(refusal, LittleMotionError)
+        raise RefusedRecordError(f"{refusal}{why}", numbers, is_fault) from refusal
 
 
 def _ago(age: int) -> str:
@@ -141,6 +146,7 @@ class FrictionMonitor:
         self._compared: _Compared | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
+        self._refused, self._refused_last = 0, ""
         self._internal_error: str | None = None
         self._baseline: Baseline | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
@@ -270,6 +276,7 @@ class FrictionMonitor:
         self._result, self._earlier, self._stamp = result, None, stamp
         self._known = self._known.followed_by(valve_numbers(result), stamp)
         self._refusal = self._internal_error = None
+        self._refused = 0
         self._follow_comparison()
 
     def _follow_comparison(self) -> None:
@@ -288,6 +295,22 @@ class FrictionMonitor:
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""
         self._refusal = str(refusal)
+        self.skip(refusal)
+
+    def skip(self, refusal: RefusalError) -> None:
+        """Count a refusal, which leaves the diagnosis as it is.
+
+        A record with too little motion is no fault, and does not end one either.
+        """
+        if isinstance(refusal, RefusedRecordError) and refusal.is_fault:
+            self._refused, self._refused_last = self._refused + 1, str(refusal)
+
+    @property
+    def refusals_problem(self) -> str | None:
+        """That one identification after the other is refused, with the latest reason, if so."""
+        if self._refused < _REFUSED:
+            return None
+        return f"the latest {self._refused} identifications were refused: {self._refused_last}"
 
     def fail(self, internal_error: str) -> None:
         """Remember that a bug has ended an identification, whatever its record."""
@@ -302,13 +325,14 @@ class FrictionMonitor:
             raise RefusalError("the valve has no result to take as baseline: identify it first")
         return Baseline.of(self._result)
 
-    def diagnosis(self, now: int | None = None) -> Diagnosis:
+    def diagnosis(self, now: int | None = None, is_watched: bool = True) -> Diagnosis:
         """Return the diagnosis by the latest result, also after a refusal; OK without any.
 
         That of an earlier estimate says how old it is at the time `now`, ns, where that is given.
+        Of a valve that is not watched now, as its samples cannot be used, it says what was.
         A bug in an identification raises the level to WARN at least, until one succeeds.
         """
-        diagnosis = self._diagnosis_by_result(now)
+        diagnosis = self._diagnosis_by_result(now, is_watched)
         if self._internal_error is None:
             return diagnosis
         message = f"{self._internal_error}; before: {diagnosis.message}"
@@ -316,9 +340,11 @@ class FrictionMonitor:
             return replace(diagnosis, message=message)
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
 
-    def _diagnosis_by_result(self, now: int | None) -> Diagnosis:
+    def _diagnosis_by_result(self, now: int | None, is_watched: bool) -> Diagnosis:
         if (estimate := self.estimate) is not None:
             diagnosis = self._with_alarm(estimate)
+            if not is_watched:
+                diagnosis = diagnosis.of_before(self._stamp if self._earlier is None else None)
             if self._earlier is not None and now is not None:
                 age = f"(identified {_ago(now - self._earlier.time)}before the restart)"
                 diagnosis = replace(diagnosis, message=f"{diagnosis.message} {age}")

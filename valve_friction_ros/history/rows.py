@@ -13,7 +13,12 @@ import numpy as np
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    FrictionState,
+    friction_state,
+)
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.history.connection import Connection, has_table
@@ -259,6 +264,8 @@ def _entry(
         _cell(row, "ratio_of") or "coulomb_friction",
         _number(_cell(row, "ratio_speed")),
     )
+    limits = FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"])
+    known = None if row["ratio"] is None else ratio
     return HistoryEntry(
         time=row["time_ns"],
         valve=KeptValve(row["name"], row["tag"]),
@@ -268,9 +275,10 @@ def _entry(
             Level(row["level"]),
             StatusSignal(row["status_signal"]),
             row["message"],
-            None if row["ratio"] is None else ratio,
+            known,
+            FrictionState.UNKNOWN if known is None else friction_state(known, limits),
         ),
-        limits=FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"]),
+        limits=limits,
         baseline=_baseline_in(row, _OF_ENTRY),
         sliding_speed=_number(_cell(row, "sliding_speed")),
         settings=row["content"],
