@@ -10,15 +10,15 @@ from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
     FrictionLimits,
+    StandingAlarm,
     diagnose,
     diagnose_again,
-    is_compared,
 )
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
-from valve_friction_ros.health.standing_alarm import is_standing, standing, without_standing
+from valve_friction_ros.health.standing_alarm import followed, limited, raised, standing
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
@@ -117,11 +117,17 @@ def _ago(age: int) -> str:
     return f"{seconds // length:.0f} {unit} ago, "
 
 
-class _Compared(NamedTuple):
-    """The newest estimate whose friction could be compared with the baseline, and its time, ns."""
+class _Raised(NamedTuple):
+    """What has raised the alarm that stands.
 
-    estimate: Result | EarlierEstimate
+    An estimate of a time, ns, or the alarm that an earlier run has kept; later records have left of
+    it a level at most.
+    """
+
     time: int
+    estimate: Result | EarlierEstimate | None
+    kept: StandingAlarm | None = None
+    most: Level = Level.ERROR
 
 
 class FrictionMonitor:
@@ -143,7 +149,7 @@ class FrictionMonitor:
         self._result: Result | None = None
         self._known = KnownNumbers()
         self._earlier: EarlierEstimate | None = None
-        self._compared: _Compared | None = None
+        self._raised: _Raised | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
         self._refused, self._refused_last = 0, ""
@@ -159,8 +165,8 @@ class FrictionMonitor:
     @baseline.setter
     def baseline(self, baseline: Baseline | None) -> None:
         self._baseline, self._known = baseline, self._known.since(self._stamp)
-        self._compared = None
-        self._follow_comparison()
+        self._raised = None
+        self._follow_alarm()
 
     @property
     def settings(self) -> MonitorSettings:
@@ -240,8 +246,8 @@ class FrictionMonitor:
         """
         if settings.valve != self._settings.valve:
             self._known = self._known.only_latest()
-            self._compared = None
-            self._follow_comparison()
+            self._raised = None
+            self._follow_alarm()
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear("valve or window parameters were changed")
@@ -258,18 +264,18 @@ class FrictionMonitor:
         """
         self._earlier, self._stamp = earlier, earlier.time
         self._known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
-        is_alarm = earlier.diagnosis.level is Level.ERROR or is_standing(earlier.diagnosis)
-        if is_alarm and self.baseline in (None, earlier.baseline):
-            self._compared = _Compared(earlier, earlier.time)
-        self._follow_comparison()
+        alarm = earlier.diagnosis.alarm
+        if alarm is not None and self.baseline in (None, earlier.baseline):
+            self._raised = _Raised(alarm.time, None, alarm)
+        self._follow_alarm()
 
     def renew(self, time: int) -> None:
         """Begin anew with a packing of the time `time`, ns: alarms of older records end.
 
         What the latest record itself says stays until the next one.
         """
-        if self._compared is not None and self._compared.time <= time:
-            self._compared = None
+        if self._raised is not None and self._raised.time <= time:
+            self._raised = None
 
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
@@ -277,15 +283,28 @@ class FrictionMonitor:
         self._known = self._known.followed_by(valve_numbers(result), stamp)
         self._refusal = self._internal_error = None
         self._refused = 0
-        self._follow_comparison()
+        self._follow_alarm()
 
-    def _follow_comparison(self) -> None:
-        """Hold the latest estimate, if it can be compared, as the newest that could be."""
-        latest, limits = self.estimate, self._settings.limits
+    def _follow_alarm(self) -> None:
+        """Let the latest estimate raise an alarm, leave one or end it."""
+        latest = self.estimate
         if latest is None or self._stamp is None:
             return
-        if is_compared(latest, self.baseline, limits):
-            self._compared = _Compared(latest, self._stamp)
+        own, alarm = self._diagnosis_of(latest), self._alarm()
+        left = None if alarm is None else followed(alarm, own, self._settings.limits)
+        if left is not None and self._raised is not None:
+            self._raised = self._raised._replace(most=left.level)
+        else:
+            self._raised = None if own.state.side is None else _Raised(self._stamp, latest)
+
+    def _alarm(self) -> StandingAlarm | None:
+        """Return the alarm that stands, by the baseline and the limits in force."""
+        if self._raised is None:
+            return None
+        time, estimate, alarm, most = self._raised
+        if estimate is not None:
+            alarm = raised(self._diagnosis_of(estimate), time)
+        return None if alarm is None else limited(alarm, most)
 
     def learn(self, numbers: Mapping[str, Measured], stamp: int) -> None:
         """Remember what a refused record shows of the valve, if anything, found at `stamp` (ns)."""
@@ -358,18 +377,16 @@ class FrictionMonitor:
 
     def _with_alarm(self, estimate: Result | EarlierEstimate) -> Diagnosis:
         """Return the diagnosis by the latest estimate, and the alarm that it does not end."""
-        latest, before = self._diagnosis_of(estimate), self._compared
-        if before is None or before.estimate is estimate or self.baseline is None:
+        latest = self._diagnosis_of(estimate)
+        if self._raised is not None and self._raised.estimate is estimate:
             return latest
-        limits = self._settings.limits
-        return standing(self._diagnosis_of(before.estimate), before.time, latest, limits)
+        return standing(self._alarm(), latest)
 
     def _diagnosis_of(self, estimate: Result | EarlierEstimate) -> Diagnosis:
         valve, limits = self._settings.valve, self._settings.limits
         if isinstance(estimate, Result):
             found = diagnose(estimate, valve, self.baseline, limits)
         else:
-            is_newest = self._compared is not None and self._compared.estimate is estimate
-            kept = estimate.diagnosis if is_newest else without_standing(estimate)
+            kept = estimate.diagnosis.own
             found = diagnose_again(estimate, kept, valve, self.baseline, limits)
         return qualified(found, self.common_factor, valve)

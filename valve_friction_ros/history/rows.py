@@ -13,15 +13,11 @@ import numpy as np
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
-from valve_friction_ros.health.diagnosis import (
-    Diagnosis,
-    FrictionLimits,
-    FrictionState,
-    friction_state,
-)
-from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.diagnosis import FrictionLimits
+from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.history.connection import Connection, has_table
+from valve_friction_ros.history.diagnosis_rows import diagnosis_in, state_columns
 from valve_friction_ros.history.entry import (
     Fit,
     HistoryEntry,
@@ -127,6 +123,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
         warn_ratio=entry.limits.warn_ratio,
         error_ratio=entry.limits.error_ratio,
         low_ratio=entry.limits.low_ratio,
+        **state_columns(diagnosis),
         settings_id=settings_id(connection, entry.settings),
         software_version=entry.version,
     )
@@ -271,13 +268,7 @@ def _entry(
         valve=KeptValve(row["name"], row["tag"]),
         span=None if row["begin_ns"] is None else Span(row["begin_ns"], row["end_ns"]),
         method=FORMER_METHODS.get(row["method"], row["method"]),
-        diagnosis=Diagnosis(
-            Level(row["level"]),
-            StatusSignal(row["status_signal"]),
-            row["message"],
-            known,
-            FrictionState.UNKNOWN if known is None else friction_state(known, limits),
-        ),
+        diagnosis=diagnosis_in(row, known, limits, any(one.value < 0 for one in parameters)),
         limits=limits,
         baseline=_baseline_in(row, _OF_ENTRY),
         sliding_speed=_number(_cell(row, "sliding_speed")),
