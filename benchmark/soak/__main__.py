@@ -17,6 +17,7 @@ from benchmark.soak.database import Kept, own_database
 from benchmark.soak.disk import small_disk
 from benchmark.soak.faults import FAULTS, Site, settled
 from benchmark.soak.feed import Feed, Piece
+from benchmark.soak.nonsense import PERIOD
 from benchmark.soak.plant import Plant, Process
 from benchmark.soak.summary import database_rows, rows
 from benchmark.speed.rows import Row
@@ -27,6 +28,8 @@ __all__ = ["main"]
 _MONTH = 30 * 86_400 * 10**9
 _BENCH = Path(__file__).resolve().parents[2] / "config" / "bench_low.yaml"
 _GROWTH = {"/fv_101": 1.0, "/fv_102": 1.6, "/fv_201": 1.0, "/fv_202": 2.5}
+_OF_NOW = "/fv_301"
+"""Valve whose sensors speak by the clock of now; theirs is the nonsense."""
 _TURN = 0.02
 _PAUSE = 3.0
 """Mean time between two records of a valve, s."""
@@ -40,7 +43,7 @@ _LOOKS = (0.1, 0.25, 0.5, 0.75)
 
 
 def _processes(folder: Path, disk: Path, url: str) -> tuple[Process, ...]:
-    """Start two identifiers of one valve each, and a process of two that lives through all."""
+    """Start identifiers of one valve each, and a process of two that lives through all."""
     common = [
         "--params-file",
         str(_BENCH),
@@ -51,6 +54,7 @@ def _processes(folder: Path, disk: Path, url: str) -> tuple[Process, ...]:
             window=10.0,
             input_timeout=8.0,
             alarm_recordings=3,
+            clock_tolerance=0.0,
             **({"history_url": url} if url else {}),
         ),
     ]
@@ -65,7 +69,20 @@ def _processes(folder: Path, disk: Path, url: str) -> tuple[Process, ...]:
         for valve in single
     ]
     many = Node("identifiers", [*common, *parameter_words(valves=f"[{first},{second}]")])
-    return (*found, Process("identifiers", many, (first, second), folder / "identifiers.log"))
+    of_now = Process(
+        _OF_NOW.strip("/"),
+        Node(
+            "identifier",
+            ["-r", f"__ns:={_OF_NOW}", *common, *parameter_words(clock_tolerance=60.0)],
+        ),
+        (_OF_NOW,),
+        folder / f"{_OF_NOW.strip('/')}.log",
+    )
+    return (
+        *found,
+        of_now,
+        Process("identifiers", many, (first, second), folder / "identifiers.log"),
+    )
 
 
 class _Month:
@@ -78,6 +95,7 @@ class _Month:
         self._next = dict.fromkeys(site.plant.valves, 0.0)
         self._faults: list[Iterator[None]] = []
         self._next_fault = time.monotonic() + _CALM
+        self._next_word = 0.0
 
     @property
     def share(self) -> float:
@@ -86,8 +104,9 @@ class _Month:
 
     def turn(self) -> None:
         """Send a piece to each valve that works, and let faults go on."""
-        for valve in self._site.plant.valves:
+        for valve in self._site.feeds:
             self._feed(valve)
+        self._speak()
         self._faults = [one for one in self._faults if next(one, self) is None]
         if time.monotonic() > self._next_fault:
             self._next_fault = time.monotonic() + self._site.chance.expovariate(1 / _CALM)
@@ -97,6 +116,13 @@ class _Month:
             self._faults.append(FAULTS[name][0](self._site))
         self._site.plant.turn(_TURN)
         self._look()
+
+    def _speak(self) -> None:
+        """Let the sensors of the valve of now say what is due."""
+        if time.monotonic() < self._next_word or not self._site.plant.is_ready(_OF_NOW):
+            return
+        self._next_word = time.monotonic() + PERIOD
+        self._site.plant.say(_OF_NOW, self._site.nonsense)
 
     def _feed(self, valve: str) -> None:
         site, plant = self._site, self._site.plant
@@ -134,6 +160,7 @@ class _Month:
         plant = self._site.plant
         deadline = time.monotonic() + _START_LIMIT
         while self._faults and time.monotonic() < deadline:
+            self._speak()
             self._faults = [one for one in self._faults if next(one, self) is None]
             plant.turn(_TURN)
         for process in plant.processes:
@@ -167,7 +194,7 @@ def _run(
         plant = Plant(ledger, _processes(folder, disk, database.url if database else ""))
         try:
             feeds = {valve: Feed(growth) for valve, growth in _GROWTH.items()}
-            site = Site(plant, feeds, disk if is_small else None, database, chance)
+            site = Site(plant, feeds, _OF_NOW, disk if is_small else None, database, chance)
             if not plant.wait(lambda: all(map(plant.is_ready, plant.valves)), _START_LIMIT):
                 raise RuntimeError(f"the plant is not ready: see the logs in {folder}")
             _live(_Month(site, seconds), plant)

@@ -1,5 +1,6 @@
 """What happens to a plant: each fault goes on by a step whenever it is asked to."""
 
+import itertools
 import random
 import signal
 import time
@@ -9,6 +10,7 @@ from pathlib import Path
 from benchmark.soak.database import Database
 from benchmark.soak.disk import filled
 from benchmark.soak.feed import Feed
+from benchmark.soak.nonsense import Nonsense
 from benchmark.soak.plant import Life, Plant, Process
 
 __all__ = ["FAULTS", "Site", "bad_samples", "settled"]
@@ -26,7 +28,9 @@ class Site:
     plant : Plant
         The processes.
     feeds : mapping of str to Feed
-        Feed of each valve.
+        Feed of each valve that works through the month.
+    of_now : str
+        Valve whose sensors speak by the clock of now.
     disk : Path or None
         Folder of the history, if its disk is small.
     database : Database or None
@@ -39,11 +43,15 @@ class Site:
         self,
         plant: Plant,
         feeds: Mapping[str, Feed],
+        of_now: str,
         disk: Path | None,
         database: Database | None,
         chance: random.Random,
     ) -> None:
         self.plant, self.feeds, self.chance = plant, feeds, chance
+        self.of_now, self.kinds = of_now, itertools.cycle(Nonsense)
+        self.nonsense: Nonsense | None = None
+        """What the sensors of the valve of now say wrong."""
         self.disk, self.database = disk, database
         self.silent: set[str] = set()
         """Valves whose sensors say nothing."""
@@ -97,7 +105,7 @@ def kill(site: Site) -> Iterator[None]:
 
 def clock_step(site: Site) -> Iterator[None]:
     """Let the clock of a valve's sensors be wrong by up to two hours, and be set right again."""
-    feed = site.feeds[site.chance.choice(site.plant.valves)]
+    feed = site.feeds[site.chance.choice([*site.feeds])]
     feed.clock_error = round(site.chance.uniform(-2.0, 2.0) * _HOUR)
     yield from _for(site.chance.uniform(5.0, 20.0))
     feed.clock_error = 0
@@ -105,7 +113,7 @@ def clock_step(site: Site) -> Iterator[None]:
 
 def silent_sensor(site: Site) -> Iterator[None]:
     """Let the sensors of a valve be silent until the node says so."""
-    valve = site.chance.choice(site.plant.valves)
+    valve = site.chance.choice([*site.feeds])
     process = site.plant.process_of(valve)
     if valve in site.silent or process.is_held:
         return
@@ -120,8 +128,30 @@ def silent_sensor(site: Site) -> Iterator[None]:
 
 def bad_samples(site: Site) -> Iterator[None]:
     """Let a pressure sensor say what is no number."""
-    site.feeds[site.chance.choice(site.plant.valves)].bad_rows = site.chance.randint(1, 40)
+    site.feeds[site.chance.choice([*site.feeds])].bad_rows = site.chance.randint(1, 40)
     yield
+
+
+def nonsense(site: Site) -> Iterator[None]:
+    """Let the sensors of a valve say nonsense until the node says so, then the truth again.
+
+    The kinds take turns. What a process does not live through is not counted.
+    """
+    valve, process = site.of_now, site.plant.process_of(site.of_now)
+    if site.nonsense is not None or not site.plant.is_ready(valve):
+        return
+    kind, life = next(site.kinds), process.life
+    for event, wanted in (("nonsense", True), ("nonsense over", False)):
+        site.nonsense = kind if wanted else None
+
+        def is_so(wanted: bool = wanted) -> bool:
+            return (kind.value in life.messages.get(valve, "")) is wanted
+
+        begin = time.monotonic()
+        yield from _until(is_so)
+        if process.life is life and not process.is_held:
+            seconds, told = time.monotonic() - begin, is_so()
+            site.plant.ledger.add(event, name=kind.name, seconds=seconds, told=told)
 
 
 def frozen(site: Site) -> Iterator[None]:
@@ -197,6 +227,7 @@ FAULTS: Mapping[str, tuple[Callable[[Site], Iterator[None]], float]] = {
     "clock step": (clock_step, 2.0),
     "silent sensor": (silent_sensor, 2.0),
     "bad samples": (bad_samples, 3.0),
+    "nonsense": (nonsense, 3.0),
     "frozen": (frozen, 1.0),
     "full disk": (full_disk, 1.0),
     "database killed": (database_killed, 1.0),

@@ -20,6 +20,7 @@ from benchmark.churn.ledger import Ledger
 from benchmark.churn.places import Node
 from benchmark.churn.processes import NodeProcess
 from benchmark.soak.feed import Piece
+from benchmark.soak.nonsense import Nonsense, said
 from valve_friction_ros.nodes.plumbing.messages import time_message
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 
@@ -241,6 +242,13 @@ class Plant:
             stem.header.stamp = sample.header.stamp
             self._stems[valve].publish(stem)
         process.life.sent[valve] += 2 * rows
+
+    def say(self, valve: str, kind: Nonsense | None) -> None:
+        """Send what both sensors of a valve say now: nonsense of a kind, or the truth."""
+        messages = said(kind, time.time_ns())
+        for publishers, message in zip((self._pressures, self._stems), messages, strict=True):
+            publishers[valve].publish(message)
+        self._by_valve[valve].life.sent[valve] += len(messages)
 
     def ask(self, valve: str, service: str) -> None:
         """Call a service of a valve, if it is there."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from benchmark.churn.processes import CODES
 from benchmark.soak.database import Kept
+from benchmark.soak.nonsense import TOLD_WITHIN
 from benchmark.speed.rows import Row
 
 __all__ = ["database_rows", "rows"]
@@ -77,6 +78,17 @@ def _memory(looks: _Events) -> Iterator[Row]:
             yield Row(item, size, "MB")
 
 
+def _nonsense(begun: _Events, ended: _Events) -> Iterator[Row]:
+    """Account for the nonsense of sensors: each is told, and over, within a time."""
+    yield Row("kinds of nonsense that sensors said", len({one["name"] for one in begun}), "of 11")
+    for item, some in (("told", begun), ("over", ended)):
+        late = [one for one in some if not (one["told"] and one["seconds"] <= TOLD_WITHIN)]
+        yield _none(f"nonsense that was not {item} within {TOLD_WITHIN:g} s", len(late))
+        if some:
+            longest = max(one["seconds"] for one in some)
+            yield Row(f"longest until nonsense was {item}", longest, "s")
+
+
 def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
     """Account for all that happened.
 
@@ -111,6 +123,7 @@ def rows(events: _Events, stored: Mapping[str, int]) -> Iterator[Row]:
     yield _none(
         "databases away that nobody told", sum(not one["told"] for one in of("database away"))
     )
+    yield from _nonsense(of("nonsense"), of("nonsense over"))
     for end in of("ending"):
         if end["code"] not in CODES:
             item, code = f"{end['name']} ended with code", end["code"] or -1

@@ -12,6 +12,7 @@ from extension.meanings import meanings, require_all
 __all__ = ["declared_keys", "entries", "is_explained", "keys_as_markdown", "pattern_of"]
 
 _WRITERS = {
+    "identifier/node.py": ("_data_values",),
     "identifier/status.py": (
         "_result_values",
         "_baseline_values",

@@ -33,6 +33,10 @@ def memory(share, megabytes):
     return {"kind": "memory", "share": share, "megabytes": megabytes}
 
 
+def nonsense(kind="nonsense", seconds=2.0, told=True):
+    return {"kind": kind, "name": "STEM_IN_MM", "seconds": seconds, "told": told}
+
+
 GOOD = [life(), call()]
 
 
@@ -44,6 +48,7 @@ def test_what_adds_up_misses_nothing():
     kept_late = call()  # it waited for a full disk as its process was killed
     assert missed([*GOOD, killed, refused, busy, cut, kept_late], stored=2) == set()
     assert missed([*GOOD, memory(0.1, 50), memory(0.5, 100), memory(1.0, 104)]) == set()
+    assert missed([*GOOD, nonsense(), nonsense("nonsense over")]) == set()
     assert missed([*GOOD, cut], stored=2) == set()  # stored, and killed before the answer
 
 
@@ -59,6 +64,17 @@ def test_what_adds_up_misses_nothing():
         ([*GOOD, {"kind": "silence", "told": False}], 1, "silent sensors that nobody told"),
         ([*GOOD, {"kind": "full disk", "told": False}], 1, "full disks that nobody told"),
         ([*GOOD, {"kind": "database away", "told": False}], 1, "databases away that nobody told"),
+        (
+            [*GOOD, nonsense(told=False)],
+            1,
+            "nonsense that was not told within 5 s",
+        ),
+        ([*GOOD, nonsense(seconds=5.1)], 1, "nonsense that was not told within 5 s"),
+        (
+            [*GOOD, nonsense(), nonsense("nonsense over", 6.0)],
+            1,
+            "nonsense that was not over within 5 s",
+        ),
         ([*GOOD, {"kind": "died"}], 1, "processes that ended by themselves"),
         ([*GOOD, {"kind": "ending", "name": "a", "code": None}], 1, "a ended with code"),
         ([*GOOD, memory(0.5, 100), memory(1.0, 106)], 1, "memory after 100 % of the month"),

@@ -113,7 +113,7 @@ class TestAgain:
         assert monitor_with(earlier, Baseline(50.0)).diagnosis() == ALARM
 
     def test_a_doubt_about_the_model_stays(self):
-        doubted = replace(ALARM, message=f"{DOUBT}; {ALARM.message}")
+        doubted = replace(ALARM, message=f"{DOUBT}; {ALARM.message}", doubt=DOUBT)
         monitor = monitor_with(kept(diagnosis=doubted), Baseline(400.0, 1.0))
         diagnosis = monitor.diagnosis()
         assert diagnosis.level == Level.WARN

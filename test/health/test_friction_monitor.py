@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from valve_friction_ros.health import (
     FrictionMonitor,
     Level,
     MonitorSettings,
+    RefusedRecordError,
     SlidingFriction,
     StatusSignal,
     diagnose,
@@ -73,6 +75,51 @@ class TestSettings:
         baseline = FrictionMonitor(SETTINGS).baseline
         assert (baseline, SETTINGS.identification.derivative_window) == (None, None)
         assert SETTINGS.window == 60.0
+
+
+class TestRefusalsInARow:
+    """Bad records are a fault; records with too little motion are none."""
+
+    BAD, STILL = (RefusedRecordError("why", {}, is_fault) for is_fault in (True, False))
+
+    def problem(self, *refusals):
+        monitor = FrictionMonitor(SETTINGS)
+        for one in refusals:
+            monitor.refuse(one)
+        return monitor.refusals_problem
+
+    def test_three_are_a_fault(self):
+        assert self.problem(self.BAD, self.BAD) is None
+        told = "the latest 3 identifications were refused: why"
+        assert self.problem(self.BAD, self.BAD, self.BAD) == told
+
+    def test_too_little_motion_does_not_count(self):
+        assert self.problem(*[self.STILL] * 9) is None
+        assert self.problem(self.BAD, self.STILL, self.BAD) is None
+        assert self.problem(self.BAD, self.STILL, self.BAD, self.BAD) is not None
+        assert self.problem(*[RefusalError("already running")] * 9) is None
+
+    def test_a_success_ends_it(self, loose_record):
+        monitor = FrictionMonitor(SETTINGS)
+        for _ in range(3):
+            monitor.skip(self.BAD)
+        feed(monitor, loose_record)
+        monitor.accept(identify_snapshot(*monitor.input()), START)
+        assert monitor.refusals_problem is None
+
+    @pytest.mark.parametrize(("is_still", "is_fault"), [(True, False), (False, True)])
+    def test_what_an_identification_refuses(self, loose_record, is_still, is_fault):
+        monitor = FrictionMonitor(SETTINGS)
+        feed(monitor, loose_record)
+        if is_still:
+            monitor.buffer.clear("")
+        else:
+            monitor.buffer.add_pressure(monitor.buffer.newest_stamp + 1, math.nan)
+        with pytest.raises(RefusedRecordError) as refused:
+            identify_snapshot(*monitor.input())
+        assert refused.value.is_fault is is_fault
+        again = pickle.loads(pickle.dumps(refused.value))
+        assert (str(again), again.is_fault) == (str(refused.value), is_fault)
 
 
 class TestIdentification:

@@ -8,11 +8,14 @@ import pytest
 
 from valve_friction_ros.health import (
     Baseline,
+    Diagnosis,
+    FrictionLimits,
     FrictionMonitor,
     KnownNumbers,
     Level,
     Measured,
     MonitorSettings,
+    StatusSignal,
 )
 from valve_friction_ros.model import Valve
 
@@ -95,7 +98,15 @@ class TestMonitor:
         )
         for time, numbers in ((0, LOST), (DAY, WITHIN)):
             friction = {"coulomb_friction": unknown()}
-            found = SimpleNamespace(numbers=numbers, parameters=friction, sliding_speed=math.nan)
+            unclear = Diagnosis(Level.OK, StatusSignal.GOOD, "", None)
+            found = SimpleNamespace(
+                numbers=numbers,
+                parameters=friction,
+                sliding_speed=math.nan,
+                diagnosis=unclear,
+                baseline=HEALTHY,
+                limits=FrictionLimits(),
+            )
             monitor.accept(found, time)
         return monitor
 

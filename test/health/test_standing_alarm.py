@@ -1,5 +1,7 @@
 """An alarm on friction stands while later records cannot be compared with the baseline."""
 
+import contextlib
+import sqlite3
 from dataclasses import replace
 
 import pytest
@@ -9,6 +11,7 @@ from valve_friction_ros.health import (
     Baseline,
     FrictionLimits,
     FrictionMonitor,
+    FrictionState,
     Level,
     MonitorSettings,
     SlidingFriction,
@@ -29,8 +32,8 @@ DATED = "(identified 2026-09-21 14:13 UTC); the latest record cannot be compared
 def sliding(with_values, unknown, friction):
     """Function of a sliding friction, N, and its speed, mm/s: a result without F_c."""
 
-    def build(value, speed):
-        slid = friction(value, 6.0, "sliding_friction")
+    def build(value, speed, width=6.0):
+        slid = friction(value, width, "sliding_friction")
         known = with_values(coulomb_friction=unknown(), sliding_friction=slid)
         return replace(known, sliding_speed=1e-3 * speed)
 
@@ -75,6 +78,77 @@ def test_a_record_that_can_be_compared_ends_it(monitor, sliding, nothing):
     monitor.accept(nothing, START + 3)
     assert monitor.diagnosis().level is Level.OK
     assert DATED not in monitor.diagnosis().message
+
+
+PLACES = {  # sliding friction now, its half width; level and words of what is said then
+    "as high, unsure": (400.0, 200.0, Level.ERROR, "excess friction"),
+    "normal, unsure": (150.0, 150.0, Level.ERROR, "excess friction"),
+    "collapsed, unsure": (60.0, 120.0, Level.ERROR, "excess friction"),
+    "surely below error_ratio": (200.0, 40.0, Level.WARN, "excess friction"),
+    "surely grown": (240.0, 6.0, Level.WARN, "friction has grown"),
+    "surely below both": (150.0, 6.0, Level.OK, "friction normal"),
+    "surely fallen": (100.0, 3.0, Level.WARN, "friction has fallen"),
+    "surely collapsed": (60.0, 3.0, Level.ERROR, "friction collapsed"),
+}
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_only_a_sure_end_ends_it(monitor, sliding, name):
+    """The baseline is 150 N; above 300 N it is ERROR, above 187.5 N WARN."""
+    value, width, level, words = PLACES[name]
+    monitor.accept(sliding(value, 2.0, width), START + DAY)
+    told = monitor.diagnosis()
+    assert told.level is level
+    assert told.message.startswith(words)
+    assert told.own.ratio.value == pytest.approx(value / 150.0)
+    stands = told.alarm is not None
+    assert stands is (words == "excess friction")
+    assert ("does not surely end it" in told.message) is stands
+
+
+def test_what_is_surely_over_does_not_come_back(monitor, sliding, nothing):
+    """An ERROR that has become a WARN stays one, until both are surely over."""
+    monitor.accept(sliding(200.0, 2.0, 40.0), START + DAY)
+    for later in (nothing, sliding(150.0, 2.0, 100.0)):
+        monitor.accept(later, START + 2 * DAY)
+        told = monitor.diagnosis()
+        assert (told.level, told.status_signal, told.state) == (
+            Level.WARN,
+            StatusSignal.MAINTENANCE_REQUIRED,
+            FrictionState.GROWN,
+        )
+    monitor.accept(sliding(150.0, 2.0, 6.0), START + 3 * DAY)
+    assert monitor.diagnosis().level is Level.OK
+
+
+LOW_PLACES = {
+    "unsure": (150.0, 150.0, Level.ERROR),
+    "surely above low_ratio": (115.0, 15.0, Level.WARN),
+    "surely above both": (150.0, 6.0, Level.OK),
+    "not compared": (None, None, Level.ERROR),
+}
+
+
+@pytest.mark.parametrize("name", LOW_PLACES)
+def test_the_low_side_is_its_mirror(sliding, nothing, name):
+    """Below 75 N it is ERROR, below 120 N WARN."""
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE))
+    monitor.baseline = HEALTHY
+    monitor.accept(sliding(50.0, 2.0, 1.0), START)
+    assert monitor.diagnosis().state is FrictionState.COLLAPSED
+    value, width, level = LOW_PLACES[name]
+    monitor.accept(nothing if value is None else sliding(value, 2.0, width), START + DAY)
+    assert monitor.diagnosis().level is level
+
+
+def test_the_demonstration_of_a_bad_measurement(sliding):
+    """F_c of 90 N of 301 all the time; two records are worse measured than the others."""
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE))
+    monitor.baseline = Baseline(sliding=SlidingFriction(301.0, 6.0, 2e-3))
+    widths = [5.0] * 6 + [38.0] + [5.0] * 3 + [38.0]
+    for k, width in enumerate(widths):
+        monitor.accept(sliding(111.0 if width > 5 else 90.0, 2.0, width), START + k)
+        assert monitor.diagnosis().level is Level.ERROR
 
 
 @pytest.mark.parametrize("speed", [2.0, 5.0])
@@ -154,6 +228,37 @@ class TestRestart:
         assert told.message.startswith(ALARM)
         assert told.message.count("cannot be compared") == 1
         assert told.message.split(DATED)[1].startswith("no comparison")
+
+    def test_what_is_left_of_it_stands(self, monitor, sliding, tmp_path):
+        """Its level and side, when the record that left it was the last before the restart."""
+        file = HistoryFile(tmp_path / "history.sqlite")
+        later = START + DAY
+        monitor.accept(sliding(200.0, 2.0, 40.0), later)
+        snapshot = RecordBuffer(BENCH_VALVE, 60.0).snapshot()
+        file.add(entry_of(monitor, VALVE, snapshot, monitor.settings, later))
+        kept = file.last_success(VALVE.name)
+        assert kept.diagnosis == monitor.diagnosis()
+        again = self.again(kept)
+        assert again.diagnosis() == kept.diagnosis
+        again.accept(sliding(150.0, 2.0, 100.0), START + 2 * DAY)
+        assert again.diagnosis().level is Level.WARN
+        again.accept(sliding(150.0, 2.0, 6.0), START + 3 * DAY)
+        assert again.diagnosis().level is Level.OK
+
+    def test_a_file_of_before_typed_states(self, kept, sliding, tmp_path):
+        """Its sentence is read once; then the alarm goes on by its state."""
+        with contextlib.closing(sqlite3.connect(tmp_path / "history.sqlite")) as file:
+            file.execute("UPDATE identification SET state = NULL, alarm_message = NULL")
+            file.commit()
+        old = HistoryFile(tmp_path / "history.sqlite").last_success(VALVE.name)
+        assert old.diagnosis.message == kept.diagnosis.message
+        assert old.diagnosis.alarm.state is FrictionState.EXCESS
+        monitor = self.again(old)
+        assert monitor.diagnosis().level is Level.ERROR
+        monitor.accept(sliding(150.0, 2.0, 150.0), START + 2 * DAY)
+        assert monitor.diagnosis().level is Level.ERROR
+        monitor.accept(sliding(150.0, 2.0, 6.0), START + 3 * DAY)
+        assert monitor.diagnosis().level is Level.OK
 
     def test_a_record_that_can_be_compared_ends_it(self, kept, sliding, nothing):
         monitor = self.again(kept)

@@ -240,7 +240,7 @@ def test_the_log_tells_a_clearing_right_after_a_bad_sample(live):
     process = live.start_identifier()
     client = live.client
     client.send_pressure(STAMPS[0], math.nan)
-    client.wait_until(lambda: "actuator_pressure is not finite" in process.errors, "a warning")
+    client.wait_until(lambda: "not finite: check sensor" in process.errors, "a warning")
     client.send_pressure(STAMPS[1], RECORD.pressure[0])
     client.send_pressure(STAMPS[0], RECORD.pressure[1])  # at once: no other warning may hide it
     client.wait_for_buffered(0)

@@ -45,6 +45,13 @@ def ratio_told(value, share):
             "check the packing for leakage now",
         ),
         (
+            70.0,
+            0.7,
+            f"The friction has fallen, {ratio_told(0.7, 0.01)}",
+            "2.4 %",
+            "look at the packing at the next stop: it may be worn",
+        ),
+        (
             102.0,
             2.04,
             f"The friction is normal, {ratio_told(1.02, 0.02)}",
@@ -59,10 +66,10 @@ def ratio_told(value, share):
             "before any work, identify it again from a longer record with more strokes",
         ),
         (
-            45.0,
-            22.5,
-            f"The friction has perhaps collapsed, {ratio_told(0.45, 0.5)}",
-            "1.6 %",
+            75.0,
+            30.0,
+            f"The friction has perhaps fallen, {ratio_told(0.75, 0.4)}",
+            "2.6 %",
             "before any work, identify it again from a longer record with more strokes",
         ),
     ],

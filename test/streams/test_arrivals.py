@@ -1,6 +1,7 @@
 """Samples by the block: the same as one by one, and tables of them."""
 
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -8,9 +9,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from valve_friction_ros.model import BENCH_VALVE
-from valve_friction_ros.streams import Arrivals, Complaints, Kind, RecordBuffer, rows_arrived
+from valve_friction_ros.streams import (
+    Arrivals,
+    Intake,
+    Kind,
+    RecordBuffer,
+    SampleFault,
+    Signal,
+    rows_arrived,
+)
 
 START = 1_700_000_000  # s
+FAULTS = {
+    "without a position": SampleFault.NO_JOINT,
+    "went back": SampleFault.BACK,
+    "repeats a stamp": SampleFault.REPEATED,
+    "not finite": SampleFault.NOT_FINITE,
+    "outside": SampleFault.OUT_OF_RANGE,
+}
 
 
 def arrivals(samples):
@@ -20,15 +36,19 @@ def arrivals(samples):
 
 def add_one_by_one(buffer, samples):
     """The readable form of `RecordBuffer.add_arrivals`."""
-    rejected, cleared = [], []
+    rejected, cleared = Counter(), []
     for kind, stamp, value in samples:
         if kind == Kind.PRESSURE:
             problem = buffer.add_pressure(stamp, value)
         else:
             problem = buffer.add_position(stamp, None if kind == Kind.NO_POSITION else value)
         if problem is not None:
-            (cleared if "the buffer was cleared" in problem else rejected).append(problem)
-    return Complaints(*((told[0] if told else None) for told in (rejected, cleared)))
+            signal = Signal.PRESSURE if kind == Kind.PRESSURE else Signal.POSITION
+            fault = next(fault for words, fault in FAULTS.items() if words in problem)
+            rejected[signal, fault] += 1
+            if fault is SampleFault.BACK:
+                cleared.append(problem)
+    return Intake(rejected, cleared[0] if cleared else None)
 
 
 @st.composite
@@ -39,7 +59,9 @@ def streams(draw):
         Kind.PRESSURE: st.one_of(
             st.floats(0, 250e3), st.sampled_from([math.nan, math.inf, -1.0, 250e3 + 1])
         ),
-        Kind.POSITION: st.one_of(st.floats(0, 0.03), st.sampled_from([math.nan, -math.inf])),
+        Kind.POSITION: st.one_of(
+            st.floats(0, 0.03), st.sampled_from([math.nan, -math.inf, 1e308, -11.0])
+        ),
         Kind.NO_POSITION: st.just(math.nan),
     }
     good = {Kind.PRESSURE: st.floats(0, 250e3), Kind.POSITION: st.floats(0, 0.03)}

@@ -8,12 +8,15 @@ from dataclasses import replace
 from valve_friction_ros.health import (
     Diagnosis,
     FrictionLimits,
+    FrictionState,
     Level,
     MonitorSettings,
     StatusSignal,
     compared,
 )
+from valve_friction_ros.health.diagnosis import friction_state
 from valve_friction_ros.history import HistoryEntry, KeptValve
+from valve_friction_ros.history.diagnosis_rows import state_columns
 from valve_friction_ros.history.entry import Fit, Span, settings_text
 from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.model import BENCH_VALVE
@@ -58,7 +61,11 @@ def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
             "span": Span(time - 60 * SECOND, time),
             "method": "refined",
             "diagnosis": Diagnosis(
-                Level.OK, StatusSignal.GOOD, "friction normal: so", found and found.ratio
+                Level.OK,
+                StatusSignal.GOOD,
+                "friction normal: so",
+                found and found.ratio,
+                friction_state(found.ratio, FrictionLimits()) if found else FrictionState.UNKNOWN,
             ),
             "limits": FrictionLimits(),
             "baseline": None,
@@ -105,8 +112,10 @@ _OF_VERSION_5 = {
 
 
 def make_version_5(history):
-    """Take away what versions 6 and 7 of the schema know: the valve in service, and other files."""
+    """Take away what later versions know: the valve in service, other files, typed states."""
     with closing(sqlite3.connect(history.path)) as connection:
+        for column in state_columns(Diagnosis(Level.OK, StatusSignal.GOOD, "", None)):
+            connection.execute(f"ALTER TABLE identification DROP COLUMN {column}")
         for table in ("identification", "baseline"):
             connection.execute(f"DROP INDEX {table}_uid")
             connection.execute(f"ALTER TABLE {table} DROP COLUMN uid")

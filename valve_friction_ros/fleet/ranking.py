@@ -18,6 +18,7 @@ class Status(NamedTuple):
 
 
 _LIMITS = FrictionLimits()
+_MAYBE = "maybe"
 _BY_SIGNAL = {
     StatusSignal.FAILURE.value: "excessive",
     StatusSignal.OUT_OF_SPECIFICATION.value: "collapsed",
@@ -48,8 +49,12 @@ def status_of(row: Mapping[str, Cell]) -> Status:
         return Status("refused", "none")
     if level > (_friction_level(row) or Level.OK):
         return Status("changed", level.name.lower())
-    if level is Level.OK:
-        return _status_of_ratio(ratio)
+    if level is Level.OK or row["ne_107"] == StatusSignal.CHECK_FUNCTION.value:
+        by_ratio = _status_of_ratio(ratio)
+        if level is Level.OK or by_ratio.colour == _MAYBE:
+            return by_ratio
+    if row["ne_107"] == StatusSignal.MAINTENANCE_REQUIRED.value and ratio < 1:
+        return Status("fallen", level.name.lower())
     return Status(_BY_SIGNAL[str(row["ne_107"])], level.name.lower())
 
 
@@ -57,9 +62,9 @@ def _status_of_ratio(ratio: float) -> Status:
     if ratio == -math.inf:
         return Status("no comparison", "none")
     if ratio >= _LIMITS.warn_ratio:
-        return Status("perhaps grown", "maybe")
-    if ratio <= _LIMITS.low_ratio:
-        return Status("perhaps collapsed", "maybe")
+        return Status("perhaps grown", _MAYBE)
+    if ratio <= _LIMITS.low_warn_ratio:
+        return Status("perhaps fallen", _MAYBE)
     return Status("normal", "ok")
 
 

@@ -20,6 +20,9 @@ from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
     FrictionLimits,
+    FrictionState,
+    Side,
+    StandingAlarm,
     dead_band,
     dead_band_half_width,
     diagnose,
@@ -37,7 +40,6 @@ from valve_friction_ros.health.known_numbers import DatedNumber, KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal, by_severity
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError
-from valve_friction_ros.health.standing_alarm import is_standing
 from valve_friction_ros.health.standstill import (
     Standstill,
     StandstillCounter,
@@ -63,6 +65,7 @@ __all__ = [
     "Finding",
     "FrictionLimits",
     "FrictionMonitor",
+    "FrictionState",
     "IdentificationInput",
     "KnownNumbers",
     "Level",
@@ -71,7 +74,9 @@ __all__ = [
     "Ratio",
     "Reference",
     "RefusedRecordError",
+    "Side",
     "SlidingFriction",
+    "StandingAlarm",
     "Standstill",
     "StandstillCounter",
     "StatusSignal",
@@ -93,7 +98,6 @@ __all__ = [
     "explains",
     "friction_words",
     "identify_snapshot",
-    "is_standing",
     "leading_ratio",
     "percentage",
     "qualified",

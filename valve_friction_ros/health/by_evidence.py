@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from valve_friction_ros.evidence import Evidence
 from valve_friction_ros.health.baseline import LARGEST_SHARE, Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, compared
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, against
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    FrictionState,
+    against,
+)
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING, RefusalError
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
@@ -115,7 +120,8 @@ def diagnosis_by_evidence(
             f"by {_moves(evidence)}, sliding friction is {one.value:.4g} N, and friction is above "
             "zero: check the direction of both signals"
         )
-        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
+        impossible = FrictionState.IMPOSSIBLE
+        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None, impossible)
     if not evidence.is_known:
         return None
     effect = f"by {_moves(evidence)}{_effect(evidence, valve)}"
@@ -146,7 +152,7 @@ def _by_change(evidence: Evidence, limits: FrictionLimits, effect: str) -> Diagn
         "~/set_baseline while it is healthy)"
     )
     found = against(ratio, limits, effect, healthy)
-    return found if found.level >= Level.WARN else None
+    return found if found.state.side is not None else None
 
 
 def _compared(evidence: Evidence, baseline: Baseline) -> Ratio | None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
@@ -12,25 +13,31 @@ from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
 from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams import utc_minute
 
 __all__ = [
     "DOUBT",
     "Diagnosis",
     "EarlierEstimate",
     "FrictionLimits",
+    "FrictionState",
     "Frictions",
+    "Side",
+    "StandingAlarm",
     "against",
     "dead_band",
     "dead_band_half_width",
     "diagnose",
     "diagnose_again",
-    "is_compared",
+    "friction_state",
     "leading_ratio",
     "percentage",
 ]
 
 DOUBT = "the Karnopp model does not describe this valve"
 """How the diagnosis of a valve begins that the model does not describe."""
+
+_AGAIN = "identify it again from a longer record with more strokes to be sure"
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,9 @@ class FrictionLimits:
         Ratio from which friction is excessive.
     low_ratio : float
         Ratio below which friction has collapsed: the packing is worn and may leak.
+    low_warn_ratio : float
+        Ratio below which a valve is worth maintenance, as above `warn_ratio`: its inverse, but
+        halfway to `low_ratio` by logarithm where that is nearer to 1.
 
     Raises
     ------
@@ -73,6 +83,94 @@ class FrictionLimits:
                 f"error_ratio {self.error_ratio:g}"
             )
 
+    @property
+    def low_warn_ratio(self) -> float:
+        """Ratio below which a valve is worth maintenance; between `low_ratio` and 1."""
+        return max(1 / self.warn_ratio, math.sqrt(self.low_ratio))
+
+
+class FrictionState(Enum):
+    """How the friction of a record compares with its baseline, in words."""
+
+    UNKNOWN = ""
+    """It is not compared."""
+    IMPOSSIBLE = "friction below zero"
+    NORMAL = "friction normal"
+    PERHAPS_GROWN = "friction perhaps grown"
+    GROWN = "friction has grown"
+    EXCESS = "excess friction"
+    PERHAPS_FALLEN = "friction perhaps fallen"
+    FALLEN = "friction has fallen"
+    COLLAPSED = "friction collapsed, the packing may leak"
+
+    @property
+    def side(self) -> "Side | None":
+        """The side on which the friction surely is; None where it is not sure."""
+        return _SIDES.get(self)
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether the friction is beyond a limit, and its interval is not."""
+        return self in _PERHAPS
+
+    @property
+    def level(self) -> Level:
+        """Severity of what the record says of the friction."""
+        return _SEVERITY[self][0]
+
+
+class Side(Enum):
+    """Where the friction is, seen from its baseline."""
+
+    HIGH = "high"
+    LOW = "low"
+
+
+_SIDES = {
+    FrictionState.GROWN: Side.HIGH,
+    FrictionState.EXCESS: Side.HIGH,
+    FrictionState.FALLEN: Side.LOW,
+    FrictionState.COLLAPSED: Side.LOW,
+}
+
+_SEVERITY = {
+    FrictionState.UNKNOWN: (Level.OK, StatusSignal.GOOD),
+    FrictionState.IMPOSSIBLE: (Level.WARN, StatusSignal.CHECK_FUNCTION),
+    FrictionState.NORMAL: (Level.OK, StatusSignal.GOOD),
+    FrictionState.PERHAPS_GROWN: (Level.WARN, StatusSignal.CHECK_FUNCTION),
+    FrictionState.GROWN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
+    FrictionState.EXCESS: (Level.ERROR, StatusSignal.FAILURE),
+    FrictionState.PERHAPS_FALLEN: (Level.WARN, StatusSignal.CHECK_FUNCTION),
+    FrictionState.FALLEN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
+    FrictionState.COLLAPSED: (Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
+}
+_PERHAPS = (FrictionState.PERHAPS_GROWN, FrictionState.PERHAPS_FALLEN)
+
+
+@dataclass(frozen=True)
+class StandingAlarm:
+    """An alarm on the friction that later records have not ended.
+
+    Attributes
+    ----------
+    level : Level
+        Severity.
+    status_signal : StatusSignal
+        The severity as a status signal of NE 107.
+    state : FrictionState
+        What the record said that raised it, or what later ones leave of it.
+    message : str
+        Its sentence, dated.
+    time : int
+        When that record was identified, ns since 1970 (UTC).
+    """
+
+    level: Level
+    status_signal: StatusSignal
+    state: FrictionState
+    message: str
+    time: int
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -89,12 +187,54 @@ class Diagnosis:
     ratio : Ratio or None
         Friction over its baseline, with its interval and the friction that is compared; None
         without a baseline, or where the result has no friction to compare with it.
+    state : FrictionState
+        What the record says of the friction.
+    doubt : str
+        Why the model does not describe the valve, with which the message begins; empty if it does.
+    alarm : StandingAlarm or None
+        The alarm of an earlier record that stands.
+    latest : Diagnosis or None
+        What the record itself says, where an alarm stands.
     """
 
     level: Level
     status_signal: StatusSignal
     message: str
     ratio: Ratio | None
+    state: FrictionState = FrictionState.UNKNOWN
+    doubt: str = ""
+    alarm: StandingAlarm | None = None
+    latest: "Diagnosis | None" = None
+
+    @property
+    def own(self) -> "Diagnosis":
+        """What the record itself says."""
+        return self.latest or self
+
+    def possible(self, side: Side, limits: FrictionLimits) -> Level:
+        """Return the level that the friction may have on a side, by the interval of its ratio.
+
+        A record whose friction is not compared leaves any level possible.
+        """
+        if self.ratio is None:
+            return Level.OK if self.state.side not in (None, side) else Level.ERROR
+        if side is Side.HIGH:
+            is_below = [self.ratio.high < one for one in (limits.warn_ratio, limits.error_ratio)]
+        else:
+            is_below = [self.ratio.low > one for one in (limits.low_warn_ratio, limits.low_ratio)]
+        return Level(2 - sum(is_below))
+
+    def of_before(self, time: int | None) -> "Diagnosis":
+        """Return what is said of a valve that is not watched now, by its record of a time, ns.
+
+        What was normal then need not be so now.
+        """
+        if self.state is not FrictionState.NORMAL or self.ratio is None:
+            return self
+        dated = "" if time is None else f" (identified {utc_minute(time)})"
+        message = f"{self.ratio.what} was {_figures(self.ratio)} times its baseline{dated}"
+        doubt = f"{self.doubt}; " if self.doubt else ""
+        return replace(self, message=doubt + message)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the diagnosis as a mapping of plain values, from which other forms are derived.
@@ -255,9 +395,10 @@ def diagnose(
     Diagnosis
         A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
         uncertain result raises no alarm: on an unchanged valve it would have to be wrong by the
-        whole distance to the bound. A friction that is not identifiable has collapsed where even
-        its largest possible value lies below the low bound. A valve that the model does not
-        describe is WARN at least.
+        whole distance to the bound. Where only the ratio itself lies beyond one, the valve is to be
+        identified again (WARN, check function). A friction that is not identifiable has collapsed
+        where even its largest possible value lies below the low bound. A valve that the model does
+        not describe is WARN at least.
     """
     limits = limits or FrictionLimits()
     for friction in _frictions(result):
@@ -267,7 +408,9 @@ def diagnose(
                 f"{_words(friction)} is {friction.value:.4g} ± {width} N, and "
                 "friction is above zero: check the direction of both signals"
             )
-            return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
+            return Diagnosis(
+                Level.WARN, StatusSignal.CHECK_FUNCTION, message, None, FrictionState.IMPOSSIBLE
+            )
     return _with_model_doubt(_by_size(result, valve, baseline, limits), result)
 
 
@@ -290,16 +433,7 @@ def diagnose_again(
     if compared(earlier.parameters, earlier.sliding_speed, baseline) is None:
         return kept
     again = _by_size(earlier, valve, baseline, limits)
-    doubt, _, _ = kept.message.partition(";")
-    return _doubted(again, doubt) if doubt.startswith(DOUBT) else again
-
-
-def is_compared(result: Frictions, baseline: Baseline | None, limits: FrictionLimits) -> bool:
-    """Return whether a result says how its friction compares with the baseline."""
-    if baseline is None or any(one.value < 0 for one in _frictions(result)):
-        return False
-    found = compared(result.parameters, result.sliding_speed, baseline)
-    return found is not None or bool(_vanished(result, baseline, limits))
+    return _doubted(again, kept.doubt) if kept.doubt else again
 
 
 def _by_size(
@@ -309,7 +443,8 @@ def _by_size(
     if baseline is not None:
         found = compared(result.parameters, result.sliding_speed, baseline)
         if vanished := _vanished(result, baseline, limits):
-            return Diagnosis(Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION, vanished, None)
+            level, signal = _SEVERITY[FrictionState.COLLAPSED]
+            return Diagnosis(level, signal, vanished, None, FrictionState.COLLAPSED)
     if all(math.isnan(one.value) for one in _frictions(result)):
         friction = _frictions(result)[0]
         message = f"{_words(friction)} is not identifiable: {friction.reason}"
@@ -374,38 +509,30 @@ def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
 def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:
     message = f"{doubt}; {diagnosis.message}"
     if diagnosis.level >= Level.WARN:
-        return replace(diagnosis, message=message)
-    return replace(
-        diagnosis, level=Level.WARN, status_signal=StatusSignal.CHECK_FUNCTION, message=message
-    )
+        return replace(diagnosis, message=message, doubt=doubt)
+    check = StatusSignal.CHECK_FUNCTION
+    return replace(diagnosis, level=Level.WARN, status_signal=check, message=message, doubt=doubt)
 
 
 def against(
     ratio: Ratio, limits: FrictionLimits, effect: str, healthy: str = "its baseline"
 ) -> Diagnosis:
     """Return the diagnosis of a friction over the `healthy` one, with its `effect` in words."""
+    state = friction_state(ratio, limits)
+    level, signal = _SEVERITY[state]
     finding = f"{ratio.what} is {_figures(ratio)} times {healthy}"
-    if ratio.low >= limits.error_ratio:
-        return Diagnosis(
-            Level.ERROR, StatusSignal.FAILURE, f"excess friction: {finding}; {effect}", ratio
-        )
-    if ratio.high <= limits.low_ratio:
-        return Diagnosis(
-            Level.ERROR,
-            StatusSignal.OUT_OF_SPECIFICATION,
-            f"friction collapsed, the packing may leak: {finding}; {effect}",
-            ratio,
-        )
-    if ratio.low >= limits.warn_ratio:
-        return Diagnosis(
-            Level.WARN,
-            StatusSignal.MAINTENANCE_REQUIRED,
-            f"friction has grown: {finding}; {effect}",
-            ratio,
-        )
-    words = "friction normal"
-    if ratio.value >= limits.warn_ratio:
-        words = "friction perhaps grown"
-    elif ratio.value <= limits.low_ratio:
-        words = "friction perhaps collapsed"
-    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{words}: {finding}; {effect}", ratio)
+    advice = f"; {_AGAIN}" if state.is_uncertain else ""
+    return Diagnosis(level, signal, f"{state.value}: {finding}; {effect}{advice}", ratio, state)
+
+
+def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
+    """Return what a ratio says: a limit is passed where the whole interval lies beyond it."""
+    passed = (
+        (ratio.low >= limits.error_ratio, FrictionState.EXCESS),
+        (ratio.high <= limits.low_ratio, FrictionState.COLLAPSED),
+        (ratio.low >= limits.warn_ratio, FrictionState.GROWN),
+        (ratio.high <= limits.low_warn_ratio, FrictionState.FALLEN),
+        (ratio.value >= limits.warn_ratio, FrictionState.PERHAPS_GROWN),
+        (ratio.value <= limits.low_warn_ratio, FrictionState.PERHAPS_FALLEN),
+    )
+    return next((state for is_passed, state in passed if is_passed), FrictionState.NORMAL)

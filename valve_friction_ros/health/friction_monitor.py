@@ -10,15 +10,15 @@ from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
     FrictionLimits,
+    StandingAlarm,
     diagnose,
     diagnose_again,
-    is_compared,
 )
 from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
-from valve_friction_ros.health.standing_alarm import is_standing, standing, without_standing
+from valve_friction_ros.health.standing_alarm import followed, limited, raised, standing
 from valve_friction_ros.health.valve_changes import Change, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
@@ -30,11 +30,15 @@ from valve_friction_ros.identification import (
     method_named,
     method_used,
 )
+from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 
 __all__ = ["FrictionMonitor", "IdentificationInput", "MonitorSettings", "identify_snapshot"]
+
+_REFUSED = 3
+"""Refusals in a row from which they are a fault. Chosen: one bad record, or two, may be chance."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,8 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
     except RefusalError as refusal:
         cleared = snapshot.cleared_because
         why = "" if cleared is None else f" (the buffer was cleared: {cleared})"
-        raise RefusedRecordError(f"{refusal}{why}", numbers) from refusal
+        is_fault = not isinstance(refusal, LittleMotionError)
+        raise RefusedRecordError(f"{refusal}{why}", numbers, is_fault) from refusal
 
 
 def _ago(age: int) -> str:
@@ -112,11 +117,17 @@ def _ago(age: int) -> str:
     return f"{seconds // length:.0f} {unit} ago, "
 
 
-class _Compared(NamedTuple):
-    """The newest estimate whose friction could be compared with the baseline, and its time, ns."""
+class _Raised(NamedTuple):
+    """What has raised the alarm that stands.
 
-    estimate: Result | EarlierEstimate
+    An estimate of a time, ns, or the alarm that an earlier run has kept; later records have left of
+    it a level at most.
+    """
+
     time: int
+    estimate: Result | EarlierEstimate | None
+    kept: StandingAlarm | None = None
+    most: Level = Level.ERROR
 
 
 class FrictionMonitor:
@@ -138,9 +149,10 @@ class FrictionMonitor:
         self._result: Result | None = None
         self._known = KnownNumbers()
         self._earlier: EarlierEstimate | None = None
-        self._compared: _Compared | None = None
+        self._raised: _Raised | None = None
         self._stamp: int | None = None
         self._refusal: str | None = None
+        self._refused, self._refused_last = 0, ""
         self._internal_error: str | None = None
         self._baseline: Baseline | None = None
         self.buffer = RecordBuffer(settings.valve, settings.window)
@@ -153,8 +165,8 @@ class FrictionMonitor:
     @baseline.setter
     def baseline(self, baseline: Baseline | None) -> None:
         self._baseline, self._known = baseline, self._known.since(self._stamp)
-        self._compared = None
-        self._follow_comparison()
+        self._raised = None
+        self._follow_alarm()
 
     @property
     def settings(self) -> MonitorSettings:
@@ -234,8 +246,8 @@ class FrictionMonitor:
         """
         if settings.valve != self._settings.valve:
             self._known = self._known.only_latest()
-            self._compared = None
-            self._follow_comparison()
+            self._raised = None
+            self._follow_alarm()
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
             self.buffer.clear("valve or window parameters were changed")
@@ -252,33 +264,47 @@ class FrictionMonitor:
         """
         self._earlier, self._stamp = earlier, earlier.time
         self._known = (known or KnownNumbers()).with_record(earlier.numbers, earlier.time)
-        is_alarm = earlier.diagnosis.level is Level.ERROR or is_standing(earlier.diagnosis)
-        if is_alarm and self.baseline in (None, earlier.baseline):
-            self._compared = _Compared(earlier, earlier.time)
-        self._follow_comparison()
+        alarm = earlier.diagnosis.alarm
+        if alarm is not None and self.baseline in (None, earlier.baseline):
+            self._raised = _Raised(alarm.time, None, alarm)
+        self._follow_alarm()
 
     def renew(self, time: int) -> None:
         """Begin anew with a packing of the time `time`, ns: alarms of older records end.
 
         What the latest record itself says stays until the next one.
         """
-        if self._compared is not None and self._compared.time <= time:
-            self._compared = None
+        if self._raised is not None and self._raised.time <= time:
+            self._raised = None
 
     def accept(self, result: Result, stamp: int) -> None:
         """Remember a result found at `stamp` (ns)."""
         self._result, self._earlier, self._stamp = result, None, stamp
         self._known = self._known.followed_by(valve_numbers(result), stamp)
         self._refusal = self._internal_error = None
-        self._follow_comparison()
+        self._refused = 0
+        self._follow_alarm()
 
-    def _follow_comparison(self) -> None:
-        """Hold the latest estimate, if it can be compared, as the newest that could be."""
-        latest, limits = self.estimate, self._settings.limits
+    def _follow_alarm(self) -> None:
+        """Let the latest estimate raise an alarm, leave one or end it."""
+        latest = self.estimate
         if latest is None or self._stamp is None:
             return
-        if is_compared(latest, self.baseline, limits):
-            self._compared = _Compared(latest, self._stamp)
+        own, alarm = self._diagnosis_of(latest), self._alarm()
+        left = None if alarm is None else followed(alarm, own, self._settings.limits)
+        if left is not None and self._raised is not None:
+            self._raised = self._raised._replace(most=left.level)
+        else:
+            self._raised = None if own.state.side is None else _Raised(self._stamp, latest)
+
+    def _alarm(self) -> StandingAlarm | None:
+        """Return the alarm that stands, by the baseline and the limits in force."""
+        if self._raised is None:
+            return None
+        time, estimate, alarm, most = self._raised
+        if estimate is not None:
+            alarm = raised(self._diagnosis_of(estimate), time)
+        return None if alarm is None else limited(alarm, most)
 
     def learn(self, numbers: Mapping[str, Measured], stamp: int) -> None:
         """Remember what a refused record shows of the valve, if anything, found at `stamp` (ns)."""
@@ -288,6 +314,22 @@ class FrictionMonitor:
     def refuse(self, refusal: RefusalError) -> None:
         """Remember that an identification was refused."""
         self._refusal = str(refusal)
+        self.skip(refusal)
+
+    def skip(self, refusal: RefusalError) -> None:
+        """Count a refusal, which leaves the diagnosis as it is.
+
+        A record with too little motion is no fault, and does not end one either.
+        """
+        if isinstance(refusal, RefusedRecordError) and refusal.is_fault:
+            self._refused, self._refused_last = self._refused + 1, str(refusal)
+
+    @property
+    def refusals_problem(self) -> str | None:
+        """That one identification after the other is refused, with the latest reason, if so."""
+        if self._refused < _REFUSED:
+            return None
+        return f"the latest {self._refused} identifications were refused: {self._refused_last}"
 
     def fail(self, internal_error: str) -> None:
         """Remember that a bug has ended an identification, whatever its record."""
@@ -302,13 +344,14 @@ class FrictionMonitor:
             raise RefusalError("the valve has no result to take as baseline: identify it first")
         return Baseline.of(self._result)
 
-    def diagnosis(self, now: int | None = None) -> Diagnosis:
+    def diagnosis(self, now: int | None = None, is_watched: bool = True) -> Diagnosis:
         """Return the diagnosis by the latest result, also after a refusal; OK without any.
 
         That of an earlier estimate says how old it is at the time `now`, ns, where that is given.
+        Of a valve that is not watched now, as its samples cannot be used, it says what was.
         A bug in an identification raises the level to WARN at least, until one succeeds.
         """
-        diagnosis = self._diagnosis_by_result(now)
+        diagnosis = self._diagnosis_by_result(now, is_watched)
         if self._internal_error is None:
             return diagnosis
         message = f"{self._internal_error}; before: {diagnosis.message}"
@@ -316,9 +359,11 @@ class FrictionMonitor:
             return replace(diagnosis, message=message)
         return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
 
-    def _diagnosis_by_result(self, now: int | None) -> Diagnosis:
+    def _diagnosis_by_result(self, now: int | None, is_watched: bool) -> Diagnosis:
         if (estimate := self.estimate) is not None:
             diagnosis = self._with_alarm(estimate)
+            if not is_watched:
+                diagnosis = diagnosis.of_before(self._stamp if self._earlier is None else None)
             if self._earlier is not None and now is not None:
                 age = f"(identified {_ago(now - self._earlier.time)}before the restart)"
                 diagnosis = replace(diagnosis, message=f"{diagnosis.message} {age}")
@@ -332,18 +377,16 @@ class FrictionMonitor:
 
     def _with_alarm(self, estimate: Result | EarlierEstimate) -> Diagnosis:
         """Return the diagnosis by the latest estimate, and the alarm that it does not end."""
-        latest, before = self._diagnosis_of(estimate), self._compared
-        if before is None or before.estimate is estimate or self.baseline is None:
+        latest = self._diagnosis_of(estimate)
+        if self._raised is not None and self._raised.estimate is estimate:
             return latest
-        limits = self._settings.limits
-        return standing(self._diagnosis_of(before.estimate), before.time, latest, limits)
+        return standing(self._alarm(), latest)
 
     def _diagnosis_of(self, estimate: Result | EarlierEstimate) -> Diagnosis:
         valve, limits = self._settings.valve, self._settings.limits
         if isinstance(estimate, Result):
             found = diagnose(estimate, valve, self.baseline, limits)
         else:
-            is_newest = self._compared is not None and self._compared.estimate is estimate
-            kept = estimate.diagnosis if is_newest else without_standing(estimate)
+            kept = estimate.diagnosis.own
             found = diagnose_again(estimate, kept, valve, self.baseline, limits)
         return qualified(found, self.common_factor, valve)

@@ -30,15 +30,19 @@ class RefusedRecordError(RefusalError):
     ----------
     numbers : mapping of str to Measured
         Numbers of the valve by name, SI units (`numbers_of_refused`).
+    is_fault : bool
+        Whether the record cannot be used, rather than shows too little motion.
     """
 
-    def __init__(self, message: str, numbers: Mapping[str, Measured]) -> None:
+    def __init__(
+        self, message: str, numbers: Mapping[str, Measured], is_fault: bool = True
+    ) -> None:
         super().__init__(message)
-        self.numbers = numbers
+        self.numbers, self.is_fault = numbers, is_fault
 
     def __reduce__(self) -> tuple[object, ...]:
         """Let it pass from process to process."""
-        return type(self), (str(self), self.numbers)
+        return type(self), (str(self), self.numbers, self.is_fault)
 
 
 def numbers_of_refused(

@@ -1,55 +1,87 @@
-"""An alarm on friction that stands while later records cannot be compared with the baseline."""
+"""An alarm on friction that stands until a record surely shows its end."""
 
-from valve_friction_ros.health.diagnosis import DOUBT, Diagnosis, EarlierEstimate, FrictionLimits
+from dataclasses import replace
+
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    FrictionState,
+    Side,
+    StandingAlarm,
+)
 from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.streams import utc_minute
 
-__all__ = ["is_standing", "standing", "without_standing"]
+__all__ = ["followed", "limited", "raised", "standing"]
 
-_LATEST = "; the latest record cannot be compared: "
+_LESSER = {Side.HIGH: FrictionState.GROWN, Side.LOW: FrictionState.FALLEN}
+"""What is left of an alarm that a record has surely ended as an ERROR, and not as a WARN."""
 
 
-def standing(before: Diagnosis, time: int, latest: Diagnosis, limits: FrictionLimits) -> Diagnosis:
-    """Return what is said of a valve whose latest record could not be compared.
+def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
+    """Return the alarm on the friction that a record, identified at a time, ns, raises, if any."""
+    if diagnosis.state.side is None:
+        return None
+    message = f"{diagnosis.message} (identified {utc_minute(time)})"
+    return StandingAlarm(diagnosis.level, diagnosis.status_signal, diagnosis.state, message, time)
+
+
+def followed(
+    alarm: StandingAlarm, latest: Diagnosis, limits: FrictionLimits
+) -> StandingAlarm | None:
+    """Return what the next record leaves of an alarm.
 
     Parameters
     ----------
-    before : Diagnosis
-        Diagnosis of the last record that could be; without an alarm on its friction `latest` counts
-        alone. A doubt about its model is none.
-    time : int
-        When that record was identified, ns since 1970 (UTC).
+    alarm : StandingAlarm
+        An alarm of an earlier record.
     latest : Diagnosis
-        Diagnosis of the latest record.
+        What the next record says by itself.
     limits : FrictionLimits
         Bounds of the friction.
 
     Returns
     -------
-    Diagnosis
-        The alarm with its date, and the sentence of the latest record. It has no ratio, as the
-        numbers that are shown beside it are those of the latest record.
+    StandingAlarm or None
+        The same, where that record leaves its level possible; a lesser one where it surely ends the
+        ERROR and not the WARN; None where it surely ends both, or is an alarm as severe by itself.
     """
-    has_grown = before.ratio is not None and before.ratio.low >= limits.warn_ratio
-    if before.level < Level.ERROR and not has_grown and not is_standing(before):
+    side = alarm.state.side
+    if side is None:
+        return None
+    left = min(alarm.level, latest.possible(side, limits))
+    if left is Level.OK or (latest.state.side is side and latest.state.level >= left):
+        return None
+    return limited(alarm, left)
+
+
+def limited(alarm: StandingAlarm, level: Level) -> StandingAlarm:
+    """Return an alarm of a level, WARN or more, at most."""
+    if alarm.level <= level or alarm.state.side is None:
+        return alarm
+    signal, state = StatusSignal.MAINTENANCE_REQUIRED, _LESSER[alarm.state.side]
+    return replace(alarm, level=level, status_signal=signal, state=state)
+
+
+def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
+    """Return what is said of a valve whose latest record has not ended an alarm.
+
+    It is the alarm with its date, and the sentence of the latest record, whose ratio it has.
+    """
+    if alarm is None:
         return latest
-    message, stood, _ = before.message.partition(_LATEST)
-    if not stood:
-        message += f" (identified {utc_minute(time)})"
-    worst = max(before, latest, key=lambda one: one.level)
-    return Diagnosis(worst.level, worst.status_signal, message + _LATEST + latest.message, None)
-
-
-def is_standing(diagnosis: Diagnosis) -> bool:
-    """Return whether a diagnosis is by an alarm from before its own record."""
-    return _LATEST in diagnosis.message
-
-
-def without_standing(earlier: EarlierEstimate) -> Diagnosis:
-    """Return the diagnosis that was kept with an estimate, without an alarm from before it."""
-    _, stood, message = earlier.diagnosis.message.partition(_LATEST)
-    if not stood:
-        return earlier.diagnosis
-    if message.startswith(DOUBT) or any(value < 0 for value in earlier.values.values()):
-        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None)
-    return Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
+    is_compared = latest.ratio is not None
+    link = "does not surely end it" if is_compared else "cannot be compared"
+    is_worse = latest.level > alarm.level
+    level, signal = (
+        (latest.level, latest.status_signal) if is_worse else (alarm.level, alarm.status_signal)
+    )
+    return Diagnosis(
+        level,
+        signal,
+        f"{alarm.message}; the latest record {link}: {latest.message}",
+        latest.ratio,
+        alarm.state,
+        alarm=alarm,
+        latest=latest,
+    )

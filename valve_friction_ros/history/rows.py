@@ -13,10 +13,11 @@ import numpy as np
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
-from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
-from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.diagnosis import FrictionLimits
+from valve_friction_ros.health.levels import Level
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.history.connection import Connection, has_table
+from valve_friction_ros.history.diagnosis_rows import diagnosis_in, state_columns
 from valve_friction_ros.history.entry import (
     Fit,
     HistoryEntry,
@@ -122,6 +123,7 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
         warn_ratio=entry.limits.warn_ratio,
         error_ratio=entry.limits.error_ratio,
         low_ratio=entry.limits.low_ratio,
+        **state_columns(diagnosis),
         settings_id=settings_id(connection, entry.settings),
         software_version=entry.version,
     )
@@ -259,18 +261,15 @@ def _entry(
         _cell(row, "ratio_of") or "coulomb_friction",
         _number(_cell(row, "ratio_speed")),
     )
+    limits = FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"])
+    known = None if row["ratio"] is None else ratio
     return HistoryEntry(
         time=row["time_ns"],
         valve=KeptValve(row["name"], row["tag"]),
         span=None if row["begin_ns"] is None else Span(row["begin_ns"], row["end_ns"]),
         method=FORMER_METHODS.get(row["method"], row["method"]),
-        diagnosis=Diagnosis(
-            Level(row["level"]),
-            StatusSignal(row["status_signal"]),
-            row["message"],
-            None if row["ratio"] is None else ratio,
-        ),
-        limits=FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"]),
+        diagnosis=diagnosis_in(row, known, limits, any(one.value < 0 for one in parameters)),
+        limits=limits,
         baseline=_baseline_in(row, _OF_ENTRY),
         sliding_speed=_number(_cell(row, "sliding_speed")),
         settings=row["content"],

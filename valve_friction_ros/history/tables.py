@@ -9,13 +9,14 @@ from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, ANSWERS,
 
 __all__ = ["ADDED_LATE", "SCHEMA_VERSION", "statements_from"]
 
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 """The database's user_version.
 
 Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
 and no half widths without calibration; version 3 has no records of baselines; version 4 does not
 say what a baseline replaced; version 5 knows nothing of the valve in service; version 6 has no keys
-that hold on several machines, and is the last one that servers never had."""
+that hold on several machines, and is the last one that servers never had; version 7 has the state
+of the friction and an alarm that stands in sentences only."""
 
 _SCHEMA = """
 CREATE TABLE valve (
@@ -177,6 +178,25 @@ CREATE TABLE keeper (
 a row from before the same in each copy of its file), names of the database itself, and the file
 that keeps a valve now."""
 
+_STATES = ";".join(
+    f"ALTER TABLE identification ADD COLUMN {name} {kind}"
+    for name, kind in {
+        "state": "TEXT",
+        "doubt": "TEXT",
+        "alarm_level": "INTEGER",
+        "alarm_status_signal": "TEXT",
+        "alarm_state": "TEXT",
+        "alarm_message": "TEXT",
+        "alarm_time_ns": "INTEGER",
+        "latest_level": "INTEGER",
+        "latest_status_signal": "TEXT",
+        "latest_state": "TEXT",
+        "latest_message": "TEXT",
+    }.items()
+)
+"""The state of the friction, what the model does not describe, and where an alarm of an earlier
+record stands, that alarm and what the record says by itself."""
+
 ADDED_LATE = (EVIDENCE_CHANGE, ANSWERS)
 """Tables that the first files of this version lack: each writing makes what is not there."""
 
@@ -207,12 +227,13 @@ _STEPS = {
     4: tuple(_REPLACED.split(";")),
     5: tuple(_SERVICE.split(";")),
     6: tuple(_SHARED.split(";")),
+    7: tuple(_STATES.split(";")),
 }
 """What leads from a version to the next one."""
 
 
 def statements_from(version: int) -> Iterator[str]:
     """Return the statements that lead from a version of the tables to the present; 0: no tables."""
-    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, _SERVICE, _SHARED)
+    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, _SERVICE, _SHARED, _STATES)
     steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
     return filter(str.strip, chain(*steps) if version else ";".join(tables).split(";"))

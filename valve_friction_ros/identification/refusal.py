@@ -1,6 +1,6 @@
 """Refusal of a record that does not determine the friction."""
 
-__all__ = ["RefusalError"]
+__all__ = ["LittleMotionError", "RefusalError"]
 
 
 class RefusalError(Exception):
@@ -16,3 +16,7 @@ class RefusalError(Exception):
     ...     print(str(refusal).split(":")[0])
     the stem did not move
     """
+
+
+class LittleMotionError(RefusalError):
+    """A record is too short, or its valve moves too little: no fault, as valves mostly rest."""

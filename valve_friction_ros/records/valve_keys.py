@@ -31,6 +31,7 @@ _IDENTIFIER_ONLY = (
     "joint",
     "valve_tag",
     "input_timeout",
+    "clock_tolerance",
     "identification_limit",
     "baseline_coulomb_friction",
     "baseline_in_alarm",

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from valve_friction_ros.health import StatusSignal, dead_band, drive_scale, percentage
+from valve_friction_ros.health import FrictionState, dead_band, drive_scale, percentage
 from valve_friction_ros.identification import SLIDING, Parameter, Verdict, two_digits
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
 
@@ -19,16 +19,21 @@ _AGAIN = "before any work, identify it again from a longer record with more stro
 _CHECK = "check the sensors and their mounting, then identify it again"
 
 _ALARMS = {
-    StatusSignal.FAILURE: _Finding(
+    FrictionState.EXCESS: _Finding(
         "the friction is excessive, {ratio}",
         "plan work on the packing now, and expect the loop to oscillate until then",
     ),
-    StatusSignal.OUT_OF_SPECIFICATION: _Finding(
+    FrictionState.COLLAPSED: _Finding(
         "the friction has collapsed, {ratio}", "check the packing for leakage now"
     ),
-    StatusSignal.MAINTENANCE_REQUIRED: _Finding(
+    FrictionState.GROWN: _Finding(
         "the friction has grown, {ratio}", "plan work on the packing for the next stop"
     ),
+    FrictionState.FALLEN: _Finding(
+        "the friction has fallen, {ratio}", "look at the packing at the next stop: it may be worn"
+    ),
+    FrictionState.PERHAPS_GROWN: _Finding("the friction has perhaps grown, {ratio}", _AGAIN),
+    FrictionState.PERHAPS_FALLEN: _Finding("the friction has perhaps fallen, {ratio}", _AGAIN),
 }
 
 
@@ -39,7 +44,7 @@ def diagnosis_sentence(record: IdentifiedRecord) -> str:
     monitor in words for readers outside control engineering.
     """
     friction = _friction(record)
-    alarm = _ALARMS.get(record.diagnosis.status_signal)
+    alarm = _ALARMS.get(record.diagnosis.state)
     if record.diagnosis.ratio is None and alarm is not None:
         vanished = next(one for one in _frictions(record) if math.isnan(one.value))
         size = f"at most {vanished.magnitude_bound:.2g} N, too small to be identified"
@@ -103,13 +108,9 @@ def _found(record: IdentifiedRecord) -> _Finding:
             "constant has changed by the same factor"
         )
         return _Finding(f"the friction seems to have changed, {ratio}", advice)
-    if diagnosis.status_signal in _ALARMS:
-        alarm = _ALARMS[diagnosis.status_signal]
+    if diagnosis.state in _ALARMS:
+        alarm = _ALARMS[diagnosis.state]
         return _Finding(alarm.what.format(ratio=ratio), alarm.advice)
-    if diagnosis.ratio.value >= record.limits.warn_ratio:
-        return _Finding(f"the friction has perhaps grown, {ratio}", _AGAIN)
-    if diagnosis.ratio.value <= record.limits.low_ratio:
-        return _Finding(f"the friction has perhaps collapsed, {ratio}", _AGAIN)
     advice = _CHECK if _doubt(record) else "no action is needed"
     return _Finding(f"the friction is normal, {ratio}", advice)
 

@@ -3,7 +3,7 @@
 import math
 from datetime import datetime, timezone
 
-from valve_friction_ros.health import FrictionLimits, Level, StatusSignal
+from valve_friction_ros.health import FrictionState, Level, StatusSignal
 from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.model import Recording
 from valve_friction_ros.reports.identified_record import IdentifiedRecord
@@ -15,15 +15,21 @@ _DATED = (1e9, 1e11)
 """Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
 
 _ALARMS = {
-    StatusSignal.FAILURE: Status(Colour.RED, "Excess friction", "failure (NE 107: F)"),
-    StatusSignal.OUT_OF_SPECIFICATION: Status(
+    FrictionState.EXCESS: Status(Colour.RED, "Excess friction", "failure (NE 107: F)"),
+    FrictionState.COLLAPSED: Status(
         Colour.RED, "Friction has collapsed", "out of specification (NE 107: S)"
     ),
-    StatusSignal.MAINTENANCE_REQUIRED: Status(
+    FrictionState.GROWN: Status(
         Colour.AMBER, "Friction has grown", "maintenance required (NE 107: M)"
     ),
-    StatusSignal.CHECK_FUNCTION: Status(
-        Colour.AMBER, "Check sensors and model", "check function (NE 107: C)"
+    FrictionState.FALLEN: Status(
+        Colour.AMBER, "Friction has fallen", "maintenance required (NE 107: M)"
+    ),
+    FrictionState.PERHAPS_GROWN: Status(
+        Colour.AMBER, "Uncertain", "the friction has perhaps grown"
+    ),
+    FrictionState.PERHAPS_FALLEN: Status(
+        Colour.AMBER, "Uncertain", "the friction has perhaps fallen"
     ),
 }
 
@@ -39,19 +45,17 @@ def valve_status(record: IdentifiedRecord) -> Status:
         return Status(colour, "The valve has changed", f"NE 107: {worst.status_signal.value}")
     if record.is_scaled:
         return Status(Colour.AMBER, "Check the sensors' scales", "check function (NE 107: C)")
-    if diagnosis.status_signal in _ALARMS:
-        return _ALARMS[diagnosis.status_signal]
+    return _of_friction(record)
+
+
+def _of_friction(record: IdentifiedRecord) -> Status:
+    diagnosis = record.diagnosis
+    if diagnosis.state in _ALARMS:
+        return _ALARMS[diagnosis.state]
+    if diagnosis.level >= Level.WARN:
+        return Status(Colour.AMBER, "Check sensors and model", "check function (NE 107: C)")
     if diagnosis.ratio is None:
         return Status(Colour.GREY, "Unknown", _why_unknown(record))
-    return _status_of_ratio(diagnosis.ratio.value, record.limits)
-
-
-def _status_of_ratio(ratio: float, limits: FrictionLimits) -> Status:
-    """Return the status of a friction that is not surely beyond a limit."""
-    if ratio >= limits.warn_ratio:
-        return Status(Colour.GREY, "Uncertain", "the friction has perhaps grown")
-    if ratio <= limits.low_ratio:
-        return Status(Colour.GREY, "Uncertain", "the friction has perhaps collapsed")
     return Status(Colour.GREEN, "Friction normal", "compared with the healthy valve")
 
 

@@ -10,11 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.streams.samples import Samples
 
-__all__ = ["COLUMNS", "Arrivals", "Kind", "rows_arrived"]
+__all__ = ["COLUMNS", "MOST_POSITION", "Arrivals", "Kind", "rows_arrived"]
 
 COLUMNS = ("time", "pressure", "position")
 """Columns of a table of samples: s, Pa, m."""
 
+
+MOST_POSITION = 10.0
+"""Largest reading of a stem position, m, either way. Chosen: the longest pistons of control valves
+travel 0.6 m, the gates of dams some metres, and a sensor's zero may lie elsewhere."""
 
 _SECOND = 1_000_000_000
 """Nanoseconds of a second."""
@@ -54,6 +58,13 @@ class Arrivals(NamedTuple):
         """Join what arrived one after the other; none are an empty one."""
         nothing = cls(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0))
         return cls(*map(np.concatenate, zip(nothing, *parts, strict=True)))
+
+    def plausible(self) -> "Arrivals":
+        """Return them with nan for positions that no valve has."""
+        beyond = (self.kinds == Kind.POSITION) & (np.abs(self.values) > MOST_POSITION)
+        if not beyond.any():
+            return self
+        return self._replace(values=np.where(beyond, np.nan, self.values))
 
     def samples(self, kind: Kind) -> Samples:
         """Return the samples of one kind."""

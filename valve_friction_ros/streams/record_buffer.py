@@ -3,6 +3,7 @@
 import math
 from collections import Counter, deque
 from collections.abc import Mapping
+from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -11,17 +12,42 @@ import numpy as np
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams.arrivals import Arrivals, Kind
+from valve_friction_ros.streams.arrivals import MOST_POSITION, Arrivals, Kind
 from valve_friction_ros.streams.samples import SampleBuffer, Samples, nanoseconds
 from valve_friction_ros.streams.uniform_grid import uniform_recording
 
-__all__ = ["Complaints", "RecordBuffer", "Rejection", "Snapshot"]
+__all__ = ["Intake", "RecordBuffer", "Rejection", "SampleFault", "Signal", "Snapshot"]
 
 _REJECTIONS_KEPT = 10_000
 """Rejections in memory. Chosen: ten seconds at 1 kHz, so a broken sensor does not fill the
 memory."""
 
 _CLEARED = ": the buffer was cleared"
+
+
+class Signal(Enum):
+    """A signal of a valve, by the name of its topic."""
+
+    PRESSURE = "actuator_pressure"
+    POSITION = "stem_state"
+
+    @classmethod
+    def of(cls, kind: int) -> "Signal":
+        """Return the signal that an arrival of a kind belongs to."""
+        return cls.PRESSURE if kind == Kind.PRESSURE else cls.POSITION
+
+
+class SampleFault(Enum):
+    """Why a sample is rejected."""
+
+    DAMAGED = "damaged"
+    """No message of the topic's type: it has neither stamp nor value."""
+    NO_JOINT = "no joint"
+    NOT_FINITE = "not finite"
+    OUT_OF_RANGE = "out of range"
+    REPEATED = "repeated"
+    BACK = "back"
+    """Its stamp goes back, which clears the buffer."""
 
 
 class Rejection(NamedTuple):
@@ -31,10 +57,18 @@ class Rejection(NamedTuple):
     cause: str
 
 
-class Complaints(NamedTuple):
-    """Faults of arrivals: the first rejection, and the first clearing of the buffer."""
+class Intake(NamedTuple):
+    """What became of arrivals.
 
-    rejected: str | None = None
+    Attributes
+    ----------
+    rejected : mapping of (Signal, SampleFault) to int
+        Samples that were rejected.
+    cleared : str or None
+        Cause of the first clearing of the buffer.
+    """
+
+    rejected: Mapping[tuple[Signal, SampleFault], int] = MappingProxyType({})
     cleared: str | None = None
 
 
@@ -127,22 +161,18 @@ class RecordBuffer:
 
     def add_pressure(self, stamp: int, pressure: float) -> str | None:
         """Take a pressure (Pa) stamped `stamp` (ns); return the cause of a rejection."""
-        lowest, highest = self._valve.pressure_minimum, self._valve.pressure_maximum
-        cause = None
-        if not lowest <= pressure <= highest and math.isfinite(pressure):
-            cause = f"actuator_pressure outside the sensor's range {lowest:g} to {highest:g} Pa"
-        return self._add("actuator_pressure", self._pressure, stamp, pressure, cause)
+        _, cause = self._add(Signal.PRESSURE, stamp, pressure)
+        return cause
 
     def add_position(self, stamp: int, position: float | None) -> str | None:
         """Take a stem position (m) stamped `stamp` (ns); return the cause of a rejection.
 
         None means a message without a position.
         """
-        if position is None:
-            return self._reject(stamp, "stem_state without a position of the joint")
-        return self._add("stem_state", self._position, stamp, position, None)
+        _, cause = self._add(Signal.POSITION, stamp, position)
+        return cause
 
-    def add_arrivals(self, arrivals: Arrivals) -> Complaints:
+    def add_arrivals(self, arrivals: Arrivals) -> Intake:
         """Take samples of both signals in the order in which they came.
 
         Arrivals without a fault are taken as a whole. Otherwise each sample is taken or rejected by
@@ -155,6 +185,7 @@ class RecordBuffer:
             and _are_good(self._pressure.last_stamp, pressure)
             and _are_good(self._position.last_stamp, position)
             and ((lowest <= pressure.values) & (pressure.values <= highest)).all()
+            and (np.abs(position.values) <= MOST_POSITION).all()
         ):
             return self._add_one_by_one(arrivals)
         self._pressure.extend(pressure)
@@ -162,46 +193,67 @@ class RecordBuffer:
         self._taken += arrivals.stamps.size
         if self._first_stamp is None and arrivals.stamps.size:
             self._first_stamp = int(arrivals.stamps[0])
-        return Complaints()
+        return Intake()
 
-    def _add_one_by_one(self, arrivals: Arrivals) -> Complaints:
-        rejected: str | None = None
+    def _add_one_by_one(self, arrivals: Arrivals) -> Intake:
+        rejected: Counter[tuple[Signal, SampleFault]] = Counter()
         cleared: str | None = None
         for kind, stamp, value in zip(*(part.tolist() for part in arrivals), strict=True):
-            if kind == Kind.PRESSURE:
-                problem = self.add_pressure(stamp, value)
-            else:
-                problem = self.add_position(stamp, value if kind == Kind.POSITION else None)
-            if problem is not None and problem.endswith(_CLEARED):
-                cleared = cleared or problem
-            else:
-                rejected = rejected or problem
-        return Complaints(rejected, cleared)
+            signal = Signal.of(kind)
+            fault, cause = self._add(signal, stamp, None if kind == Kind.NO_POSITION else value)
+            if fault is not None:
+                rejected[signal, fault] += 1
+            if fault is SampleFault.BACK:
+                cleared = cleared or cause
+        return Intake(rejected, cleared)
+
+    def drop_damaged(self, signal: Signal, count: int) -> Intake:
+        """Count messages of a signal's topic that hold no sample."""
+        self._rejected[f"{signal.value} is damaged"] += count
+        return Intake({(signal, SampleFault.DAMAGED): count})
 
     def _add(
-        self, name: str, buffer: SampleBuffer, stamp: int, value: float, cause: str | None
-    ) -> str | None:
-        last = buffer.last_stamp
+        self, signal: Signal, stamp: int, value: float | None
+    ) -> tuple[SampleFault | None, str | None]:
+        """Take a sample; return the fault for which it is rejected, and the cause in words."""
+        buffer = self._pressure if signal is Signal.PRESSURE else self._position
+        last, name = buffer.last_stamp, signal.value
+        if value is None:
+            return self._reject(
+                stamp, SampleFault.NO_JOINT, f"{name} without a position of the joint"
+            )
         if last is not None and stamp < last:
             cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
             self.clear(cause)
             self._rejected[f"{name} went back in time"] += 1
-            return cause + _CLEARED
+            return SampleFault.BACK, cause + _CLEARED
         if last is not None and stamp == last:
-            cause = f"{name} repeats a stamp"
-        elif not math.isfinite(value):
-            cause = f"{name} is not finite"
-        if cause is not None:
-            return self._reject(stamp, cause)
+            return self._reject(stamp, SampleFault.REPEATED, f"{name} repeats a stamp")
+        if not math.isfinite(value):
+            return self._reject(stamp, SampleFault.NOT_FINITE, f"{name} is not finite")
+        lowest, highest = self.bounds(signal)
+        if not lowest <= value <= highest:
+            whose = (
+                f"the sensor's range {lowest:g} to {highest:g} Pa"
+                if signal is Signal.PRESSURE
+                else f"the range of any valve, {lowest:g} to {highest:g} m"
+            )
+            return self._reject(stamp, SampleFault.OUT_OF_RANGE, f"{name} outside {whose}")
         buffer.append(stamp, value)
         self._taken += 1
         self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
-        return None
+        return None, None
 
-    def _reject(self, stamp: int, cause: str) -> str:
+    def bounds(self, signal: Signal) -> tuple[float, float]:
+        """Return the lowest and the highest reading that is taken, Pa or m."""
+        if signal is Signal.PRESSURE:
+            return self._valve.pressure_minimum, self._valve.pressure_maximum
+        return -MOST_POSITION, MOST_POSITION
+
+    def _reject(self, stamp: int, fault: SampleFault, cause: str) -> tuple[SampleFault, str]:
         self._rejections.append(Rejection(stamp, cause))
         self._rejected[cause] += 1
-        return cause
+        return fault, cause
 
     def clear(self, cause: str) -> None:
         """Remove all samples; refusals name `cause` until the buffer is full again."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
@@ -69,9 +69,11 @@ def _gap(name: str, samples: Samples, period: int) -> Gap | None:
 def _period(name: str, samples: Samples) -> int:
     """Return the median sampling period in ns; refuse a signal that is empty."""
     if samples.stamps.size == 0:
-        raise RefusalError(f"no samples of {name}: check that it is published, and on this topic")
+        raise LittleMotionError(
+            f"no samples of {name}: check that it is published, and on this topic"
+        )
     if samples.stamps.size == 1:
-        raise RefusalError(f"only one sample of {name}: check that it is sampled continuously")
+        raise LittleMotionError(f"only one sample of {name}: check that it is sampled continuously")
     return int(np.median(np.diff(samples.stamps)))
 
 

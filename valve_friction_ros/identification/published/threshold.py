@@ -3,7 +3,7 @@
 import numpy as np
 
 from valve_friction_ros.identification.published.sweep import Sweep
-from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.refusal import LittleMotionError
 
 __all__ = ["choose_threshold"]
 
@@ -49,7 +49,7 @@ def choose_threshold(sweep: Sweep, window: int) -> int:
     """
     usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * window)
     if not usable.any():
-        raise RefusalError(
+        raise LittleMotionError(
             "no threshold leaves enough moving samples to determine "
             f"{sweep.free} parameters: record more strokes, or fix a parameter"
         )

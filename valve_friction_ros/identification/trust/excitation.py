@@ -8,7 +8,7 @@ high, graphite and stribeck), which all determine the friction, and records that
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.identification.trust.plausible_units import position_question
 from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.recording import Recording
@@ -107,7 +107,7 @@ def require_enough_samples(recording: Recording, window: int) -> None:
     """Refuse a recording shorter than ten derivative windows of the published method."""
     least = _LEAST_WINDOWS * window
     if len(recording) < least:
-        raise RefusalError(
+        raise LittleMotionError(
             f"the record is too short: {len(recording)} samples ({recording.duration:.3g} s), "
             f"at least {least} are needed; record longer or sample faster"
         )
@@ -124,7 +124,7 @@ def require_motion(recording: Recording) -> None:
     span = float(np.ptp(recording.position))
     noise = measured(recording).white_noise
     if span == 0 or span < _MOTION_OVER_NOISE * noise:
-        raise RefusalError(
+        raise LittleMotionError(
             f"the stem did not move: its position spans {span * 1e6:.3g} µm with "
             f"{noise * 1e6:.3g} µm of noise; excite the valve over several percent of its travel"
         )
@@ -161,7 +161,7 @@ def require_two_directions(recording: Recording, window: int) -> None:
     up, down = _distances(position, _MOTION_OVER_NOISE * noise)
     if min(up, down) < _LEAST_SHARE_OF_DIRECTION * (up + down):
         way = "up" if up > down else "down"
-        raise RefusalError(
+        raise LittleMotionError(
             f"the stem moved {way} only ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
             "friction and spring cannot be separated; record at least one stroke each way"
         )
@@ -187,7 +187,7 @@ def require_travel(recording: Recording, valve: Valve) -> None:
     require_within_travel(recording, valve)
     way = float(np.ptp(recording.position))
     if np.isfinite(valve.travel) and way < _LEAST_TRAVEL * valve.travel:
-        raise RefusalError(
+        raise LittleMotionError(
             f"too little travel: the stem moved {way * 1e3:.3g} mm, "
             f"{percentage(way / valve.travel)} of its travel; "
             "excite the valve over several percent of it"
@@ -206,7 +206,7 @@ def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
     ):
         share = float(np.mean(distance < reach))
         if share > _MOST_AT_A_STOP:
-            raise RefusalError(
+            raise LittleMotionError(
                 f"the stem is at its {name} stop for {100 * share:.0f} % of the record, where "
                 f"{recording.driven_by.words} holds no information on friction: excite the valve "
                 "around mid-travel"
@@ -241,7 +241,7 @@ def require_related_signals(recording: Recording) -> None:
     """Refuse drive and stem that do not move together, or move too fast for the sampling."""
     words, position = recording.driven_by.words, recording.position
     if np.ptp(recording.drive) == 0:
-        raise RefusalError(
+        raise LittleMotionError(
             f"the {words} did not change: excite the valve, or check the {words} sensor"
         )
     slope, share = _followed(recording)

@@ -129,7 +129,7 @@ class EvidenceWatch:
         """Return that friction has grown or collapsed, if so."""
         self._settle()
         diagnosis = self._diagnosis()
-        if diagnosis is None or diagnosis.level < Level.WARN:
+        if diagnosis is None or diagnosis.level < Level.WARN or diagnosis.state.is_uncertain:
             return ()
         message, leads = diagnosis.message, self._leads(diagnosis)
         if not leads:

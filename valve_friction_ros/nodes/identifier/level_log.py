@@ -1,11 +1,17 @@
-"""Each change of a valve's level, logged once."""
+"""Changes of a valve's level and faults of its data: each begin and each end is logged once."""
+
+from collections.abc import Mapping
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from valve_friction_ros.health import Level
 
-__all__ = ["LevelLog"]
+__all__ = ["FaultLog", "LevelLog"]
+
+_CALM = 10.0
+"""Time, s, without a fault after which it is logged as over. Chosen: one that comes and goes is
+one fault."""
 
 
 class LevelLog:
@@ -29,3 +35,35 @@ class LevelLog:
             self._log.warning(line)
         else:
             self._log.error(line)
+
+
+class FaultLog:
+    """Logs when a fault begins, and when it has been over for a while.
+
+    Times are those of a steady clock, s.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._log = node.get_logger()
+        self._begun: dict[str, float] = {}
+        self._seen: dict[str, float] = {}
+        self._repeated: dict[str, int] = {}
+
+    def follow(self, faults: Mapping[str, str], now: float) -> None:
+        """Take the faults of now: what is wrong, in words that do not change, and one sentence."""
+        for what, sentence in faults.items():
+            if what not in self._begun:
+                self._begun[what] = now
+                self._log.warning(sentence)
+            self._seen[what] = now
+        for what in [one for one, seen in self._seen.items() if now - seen >= _CALM]:
+            again = self._repeated.pop(what, 0)
+            lasted = self._seen.pop(what) - self._begun.pop(what)
+            times = f", {again} times more" if again else ""
+            self._log.info(f"over after {lasted:.0f} s{times}: {what}")
+
+    def note(self, what: str, sentence: str, now: float) -> None:
+        """Take what happens at an instant; a repetition soon after it belongs to the same fault."""
+        if what in self._begun:
+            self._repeated[what] = self._repeated.get(what, 0) + 1
+        self.follow({what: sentence}, now)

@@ -1,6 +1,8 @@
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
+import math
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -26,9 +28,10 @@ from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForc
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.identification import Identification
-from valve_friction_ros.nodes.identifier.level_log import LevelLog
+from valve_friction_ros.nodes.identifier.level_log import FaultLog, LevelLog
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
+    CLOCK_TOLERANCE,
     IDENTIFICATION_LIMIT,
     INPUT_TIMEOUT,
     NUMBER_TOPICS,
@@ -64,12 +67,12 @@ from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT
-from valve_friction_ros.streams import Arrivals
+from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
 
 __all__ = ["PARAMETERS", "Identifier", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
-_LOG_EVERY = 5.0
+_CLEARED = "the buffer is cleared as stamps go back"
 
 
 class Identifier(PolledNode):
@@ -109,7 +112,9 @@ class Identifier(PolledNode):
         tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
-        self._inputs = ValveInputs(self, joint, self._take_samples)
+        self._quality = DataQuality(self._monitor.settings.valve)
+        self._fault_log = FaultLog(self)
+        self._inputs = ValveInputs(self, joint, self._take_samples, self._drop_damaged)
         pressure, stem, _ = self._inputs.names
         self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
         self._status_name = f"{self.get_fully_qualified_name()}: friction"
@@ -200,18 +205,26 @@ class Identifier(PolledNode):
         return stuck_status(self._status_name, self._history.valve.tag, problem)
 
     def _take_samples(self, arrivals: Arrivals) -> None:
-        rejected, cleared = self._monitor.buffer.add_arrivals(arrivals)
+        intake = self._monitor.buffer.add_arrivals(arrivals)
+        self._judge(arrivals, intake)
+        plausible = arrivals.plausible()
         for watch in self._watches:
-            watch.take(arrivals)
-        # Each call is throttled for itself, so bad samples do not hide that the buffer was cleared.
-        if rejected is not None:
-            self.get_logger().warning(rejected, throttle_duration_sec=_LOG_EVERY)
-        if cleared is not None:
-            self.get_logger().warning(cleared, throttle_duration_sec=_LOG_EVERY)
+            watch.take(plausible)
+        if intake.cleared is not None:
+            self._fault_log.note(_CLEARED, intake.cleared, time.monotonic())
+
+    def _drop_damaged(self, signal: Signal, count: int) -> None:
+        self._judge(Arrivals.joined(()), self._monitor.buffer.drop_damaged(signal, count))
+
+    def _judge(self, arrivals: Arrivals, intake: Intake) -> None:
+        now = self.get_clock().now().nanoseconds  # 0: simulated time has not begun
+        tolerance = self.get_parameter(CLOCK_TOLERANCE.name).value
+        self._quality.see(arrivals, intake, time.monotonic(), now or None, tolerance)
 
     def _take_parameters(self, changes: list[Parameter]) -> None:
         self._inputs.take()
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
+        self._quality.valve = self._monitor.settings.valve
         self._usage.follow_parameters()
         self._evidence.follow_parameters()
         self._baseline.follow_parameter(changes)
@@ -221,10 +234,9 @@ class Identifier(PolledNode):
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
         self._inputs.take()
         self._monitor.buffer.clear(cause)
+        self._quality.forget_stamps()
         self._evidence.forget_samples()
-        self.get_logger().warning(
-            f"{cause}: the buffer was cleared", throttle_duration_sec=_LOG_EVERY
-        )
+        self._fault_log.note("ROS time jumps", f"{cause}: the buffer was cleared", time.monotonic())
 
     async def _identify(self) -> str:
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
@@ -241,7 +253,7 @@ class Identifier(PolledNode):
             raise
         answer = "; ".join(
             (
-                *self._input_problems(),  # the cause where there are no samples
+                *self._silence(),  # the cause where there are no samples
                 str(refused or self._monitor.diagnosis().message),
                 *(one.message for one in by_severity(self._monitor.findings)),
             )
@@ -267,6 +279,8 @@ class Identifier(PolledNode):
             await self._identification.run(record)
         except (RefusalError, InternalError) as error:
             self._schedule.skip(str(error))
+            if isinstance(error, RefusalError):
+                self._monitor.skip(error)
             if not isinstance(error, RefusedRecordError) or self._monitor.findings == before:
                 return
             refused = error
@@ -307,11 +321,33 @@ class Identifier(PolledNode):
         self._publish_diagnostics()
         return answer
 
-    def _input_problems(self) -> list[str]:
+    def _silence(self) -> list[str]:
         clock = self.get_clock()
         if clock.ros_time_is_active and not clock.now().nanoseconds:
             return ["no time on /clock, though use_sim_time is set: play a clock, or unset it"]
         return self._inputs.problems(self.get_parameter(INPUT_TIMEOUT.name).value)
+
+    def _faults(self) -> dict[str, str]:
+        """Return what is wrong with the data: in words that do not change, and one sentence.
+
+        A recording that is played has stamps of its own.
+        """
+        now = time.monotonic()
+        found = self._quality.faults(now)
+        if any(one.is_of_clock for one in found) and self._inputs.is_played():
+            found = self._quality.faults(now, is_played=True)
+        valve, joint = self._quality.valve, self._inputs.names.joint
+        return {one.what: one.message(valve, joint) for one in found}
+
+    def _data_values(self) -> dict[str, str]:
+        """Return how long no sample of each input could be used."""
+        now, values = time.monotonic(), dict[str, str]()
+        pressure, stem = (self._quality.unusable(one, now) for one in Signal)
+        if math.isfinite(pressure):
+            values["usable_pressure_age [s]"] = f"{pressure:.1f}"
+        if math.isfinite(stem):
+            values["usable_position_age [s]"] = f"{stem:.1f}"
+        return values
 
     def _level(self) -> Level:
         """Return the level of the valve, with all that is found on it."""
@@ -339,6 +375,8 @@ class Identifier(PolledNode):
         del found[self._usage]  # the life of a packing, which no samples show
         level = self._worst(finding for some in found.values() for finding in some)
         self._alarm.follow(level, estimate.message, self._inputs.names)
+        faults = self._faults()
+        unusable = [*self._silence(), *faults.values()]
         status = friction_status(
             estimate,
             self._monitor,
@@ -346,7 +384,8 @@ class Identifier(PolledNode):
             [
                 *filter(None, [self.poll_failure, self.overdue()]),
                 *self._evidence.problems,
-                *self._input_problems(),
+                *unusable,
+                *filter(None, [self._monitor.refusals_problem]),
             ],
             [*self._history.problems, *filter(None, [self._history.conflict])],
             {
@@ -356,10 +395,14 @@ class Identifier(PolledNode):
                 **self._history.values(),
                 **self._schedule.values(),
                 **self._readiness.values(),
+                **self._data_values(),
             },
+            findings,
+            is_watched=not unusable,
         )
         self._alerts.follow(status, self._monitor.diagnosis(), findings)
         self._level_log.follow(status)
+        self._fault_log.follow(faults, time.monotonic())
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"
         message = DiagnosticArray(status=[status])

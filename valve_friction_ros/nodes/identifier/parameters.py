@@ -29,6 +29,7 @@ __all__ = [
     "BASELINE",
     "BASELINE_IN_ALARM",
     "CHANGEABLE",
+    "CLOCK_TOLERANCE",
     "HISTORY_DAYS",
     "HISTORY_FILE",
     "HISTORY_URL",
@@ -73,6 +74,13 @@ HISTORY_DAYS = ParameterSpec(
 )
 INPUT_TIMEOUT = ParameterSpec(
     "input_timeout", 3.0, "Silence of an input after which it is reported [s]", (0.1, 86400.0)
+)
+CLOCK_TOLERANCE = ParameterSpec(
+    "clock_tolerance",
+    60.0,
+    "Distance of stamps from the clock of the node from which it is reported [s]; 0: none, as for "
+    "recordings that are played without /clock",
+    (0.0, 1e9),
 )
 IDENTIFICATION_LIMIT = ParameterSpec(
     "identification_limit",
@@ -122,6 +130,7 @@ CHANGEABLE = (
         "window", 60.0, "Length of the record that is kept and identified [s]", (0.1, 86400.0)
     ),
     INPUT_TIMEOUT,
+    CLOCK_TOLERANCE,
     IDENTIFICATION_LIMIT,
     ParameterSpec(
         "method",

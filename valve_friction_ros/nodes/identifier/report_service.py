@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rclpy.node import Node
 
-from valve_friction_ros.health import FrictionMonitor, is_standing
+from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.history import HistoryError, ValveHistory
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -70,7 +70,7 @@ class ReportWriter:
         valve_limits, known = monitor.settings.valve_limits, monitor.known
         healthy = None if kept is None or kept.baseline != baseline else kept.record
         notes = () if refusal is None else (f"a later record was refused: {refusal}",)
-        if is_standing(diagnosis := monitor.diagnosis()):
+        if (diagnosis := monitor.diagnosis()).alarm is not None:
             notes = (*notes, f"an alarm of an earlier record stands: {diagnosis.message}")
         usage, response = self._usage.usage(), self._response.summary
         usage_limits = self._usage.limits()

@@ -163,11 +163,14 @@ def friction_status(
     input_problems: Sequence[str],
     upkeep_problems: Sequence[str],
     more: Mapping[str, str],
+    findings: Sequence[Finding],
+    is_watched: bool = True,
 ) -> DiagnosticStatus:
     """Compose the status of a valve at the time `now`, ns, from what is known of it.
 
     Problems of the inputs, and problems of the upkeep, which leave the diagnosis valid, raise the
     level to WARN at least. An earlier estimate is shown with its age. `more` holds further values.
+    A valve that is not watched is never told to be normal: its samples cannot be used.
     """
     values = {one.key: one.value for one in estimate.values}
     level, signal = Level(estimate.level[0]), StatusSignal(values["NE 107"])
@@ -189,11 +192,8 @@ def friction_status(
     if rejected:
         causes = (f"{cause} ({count})" for cause, count in sorted(rejected.items()))
         values["samples_rejected causes"] = "; ".join(causes)
-    message = estimate.message
-    if monitor.earlier is not None:
-        known, aged = monitor.diagnosis().message, monitor.diagnosis(now).message
-        message = message.replace(known, aged, 1)
-    message = "; ".join([*input_problems, *upkeep_problems, message])
+    known = _sentences(monitor, monitor.diagnosis(now, is_watched), by_severity(findings))
+    message = "; ".join([*input_problems, *upkeep_problems, *known])
     return _status(level, estimate.name, estimate.hardware_id, message, values)
 
 

@@ -13,13 +13,15 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscrip
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, readable
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.streams import Arrivals
+from valve_friction_ros.streams import Arrivals, Signal
 
 __all__ = ["ValveInputs"]
 
 
 _SILENCE = 0.5
 """Time without messages, s, after which the quality of service is suspected."""
+_PLAYER = "rosbag2_player"
+"""Name of the node of `ros2 bag play`."""
 
 
 class _Input:
@@ -47,12 +49,20 @@ class _Input:
 class ValveInputs:
     """Takes the samples of a valve from its topics and hands them on by the block.
 
-    An empty `joint` means the first joint of a message.
+    An empty `joint` means the first joint of a message. `drop` is told of messages of a signal's
+    topic that are no such messages.
     """
 
-    def __init__(self, node: Node, joint: str, hand_on: Callable[[Arrivals], None]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        joint: str,
+        hand_on: Callable[[Arrivals], None],
+        drop: Callable[[Signal, int], None],
+    ) -> None:
         self._node = node
         self._hand_on = hand_on
+        self._drop = drop
         self._joint = joint
         self._pressure = _Input(node, FluidPressure, "actuator_pressure", stream(), raw=True)
         self._stem = _Input(node, JointState, "stem_state", stream(), raw=True)
@@ -76,24 +86,20 @@ class ValveInputs:
             try:
                 arrivals = arrivals_of(pressures, stems, self._joint)
             except RuntimeError:
-                pressures = self._readable(self._pressure, pressures, FluidPressure)
-                stems = self._readable(self._stem, stems, JointState)
+                pressures = self._readable(Signal.PRESSURE, pressures, FluidPressure)
+                stems = self._readable(Signal.POSITION, stems, JointState)
                 arrivals = arrivals_of(pressures, stems, self._joint)
             self._hand_on(arrivals)
         if blocks := [taken.message for taken in self._blocks.take()]:
             self._take_blocks(blocks)
 
     def _readable(
-        self, source: _Input, taken: Sequence[TakenMessage], kind: type
+        self, signal: Signal, taken: Sequence[TakenMessage], kind: type
     ) -> list[TakenMessage]:
-        """Drop what is no message of the topic's type, and warn of it."""
+        """Drop what is no message of the topic's type."""
         found = readable(taken, kind)
         if len(found) < len(taken):
-            self._node.get_logger().warning(
-                f"{len(taken) - len(found)} messages on {source.watch.topic} are damaged, and were "
-                "dropped",
-                throttle_duration_sec=5.0,
-            )
+            self._drop(signal, len(taken) - len(found))
         return found
 
     def follow_publishers(self) -> None:
@@ -106,6 +112,15 @@ class ValveInputs:
         for one in (self._pressure, self._stem, self._blocks):
             one.follow_publishers()
 
+    def is_played(self) -> bool:
+        """Return whether a recording is played on the topics in use; it asks the middleware."""
+        used = (self._blocks,) if self._is_fed_by_blocks() else (self._pressure, self._stem)
+        return any(
+            publisher.node_name == _PLAYER
+            for one in used
+            for publisher in self._node.get_publishers_info_by_topic(one.watch.topic)
+        )
+
     def _take_blocks(self, blocks: Sequence[Float64MultiArray]) -> None:
         """Hand all blocks on together: each look at samples costs as much as a thousand of them."""
         try:
@@ -116,7 +131,6 @@ class ValveInputs:
                     self._take_blocks([block])
                 return
             self._bad_block = f"a block on {self._blocks.watch.topic}: {error}"
-            self._node.get_logger().warning(self._bad_block, throttle_duration_sec=5.0)
         else:
             self._bad_block = None
             self._hand_on(arrivals)

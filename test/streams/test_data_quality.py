@@ -1,0 +1,254 @@
+"""Faults of the data: when each begins and ends, and what is none."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.model import BENCH_VALVE, Valve
+from valve_friction_ros.streams import (
+    Arrivals,
+    DataFault,
+    DataQuality,
+    FaultKind,
+    Intake,
+    Kind,
+    RecordBuffer,
+    SampleFault,
+    Signal,
+)
+
+SECOND = 1_000_000_000
+NOW = 1_800_000_000 * SECOND
+TOLERANCE = 60.0
+GOOD = {Kind.PRESSURE: 1e5, Kind.POSITION: 0.01}
+REJECTED, OUTSIDE = FaultKind.REJECTED, FaultKind.OUTSIDE_TRAVEL
+SKEW, CLOCK = FaultKind.SKEW, FaultKind.CLOCK
+
+
+class Bench:
+    """A buffer and its data quality, fed by a clock of the test's own."""
+
+    def __init__(self, valve=BENCH_VALVE, tolerance=TOLERANCE):
+        self.buffer, self.quality = RecordBuffer(valve, 60.0), DataQuality(valve)
+        self.time, self.tolerance, self.has_clock = 0.0, tolerance, True
+
+    def arrive(self, *samples):
+        """Let samples (kind, seconds after now, value) arrive together."""
+        clock = NOW + round(self.time * SECOND)
+        arrivals = Arrivals(
+            np.array([one[0] for one in samples], np.uint8),
+            np.array([clock + round(one[1] * SECOND) for one in samples], np.int64),
+            np.array([one[2] for one in samples], float),
+        )
+        intake = self.buffer.add_arrivals(arrivals)
+        known = clock if self.has_clock else None
+        self.quality.see(arrivals, intake, self.time, known, self.tolerance)
+
+    def run(self, seconds, every=0.05, stem_every=None, **offsets):
+        """Let both sensors speak for a while; `pressure`, `position`: values; `late`, `off`: s."""
+        values = {kind: offsets.get(kind.name.lower(), good) for kind, good in GOOD.items()}
+        late, off = offsets.get("late", 0.0), offsets.get("off", 0.0)
+        for turn in range(round(seconds / every)):
+            self.time += every
+            samples = [(Kind.PRESSURE, off, values[Kind.PRESSURE])]
+            if turn % round((stem_every or every) / every) == 0:
+                kind = offsets.get("kind", Kind.POSITION)
+                samples.append((kind, off + late, values[Kind.POSITION]))
+            self.arrive(*samples)
+        return self.faults()
+
+    def faults(self, **options):
+        return self.quality.faults(self.time, **options)
+
+
+@pytest.fixture
+def bench():
+    found = Bench()
+    assert found.run(5.0) == ()
+    return found
+
+
+BAD = {
+    "nan pressure": (
+        {"pressure": math.nan},
+        DataFault(REJECTED, Signal.PRESSURE, SampleFault.NOT_FINITE),
+    ),
+    "pressure too high": (
+        {"pressure": 9e5},
+        DataFault(REJECTED, Signal.PRESSURE, SampleFault.OUT_OF_RANGE),
+    ),
+    "nan position": (
+        {"position": math.nan},
+        DataFault(REJECTED, Signal.POSITION, SampleFault.NOT_FINITE),
+    ),
+    "endless position": (
+        {"position": 1e308},
+        DataFault(REJECTED, Signal.POSITION, SampleFault.OUT_OF_RANGE),
+    ),
+    "no joint": (
+        {"kind": Kind.NO_POSITION},
+        DataFault(REJECTED, Signal.POSITION, SampleFault.NO_JOINT),
+    ),
+    "mm": ({"position": 9.0}, DataFault(OUTSIDE, Signal.POSITION)),
+    "below its stop": ({"position": -0.01}, DataFault(OUTSIDE, Signal.POSITION)),
+    "late": ({"late": 5.0}, DataFault(SKEW)),
+    "early": ({"late": -5.0}, DataFault(SKEW)),
+    "ahead": ({"off": 3e8}, DataFault(CLOCK)),
+    "behind": ({"off": -3e8}, DataFault(CLOCK)),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_fault_is_found_within_2_s_and_over_2_s_after_it(bench, name):
+    how, fault = BAD[name]
+    found = bench.run(2.0, **how)
+    assert [one for one in found if one.cause is not SampleFault.BACK] == [fault]
+    assert bench.run(2.1) == ()
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_its_sentence_has_the_cause_and_the_remedy(bench, name):
+    how, _ = BAD[name]
+    words = {
+        "nan pressure": ("actuator_pressure: 100 %", "not finite: check sensor"),
+        "pressure too high": ("9e+05 Pa is outside the sensor's range", "pressure_maximum"),
+        "nan position": ("the last usable one came 2 s ago", "check sensor"),
+        "endless position": ("1e+308 m is outside the range of any valve", "unit (m)"),
+        "no joint": ("no position of the joint 'stem'", "set joint"),
+        "mm": ("as at 9 m", "read as m?"),
+        "below its stop": ("as at -0.01 m", "check unit (m), zero and travel"),
+        "late": ("stamped 5 s later", "synchronise"),
+        "early": ("stamped 5 s earlier", "synchronise"),
+        "ahead": ("of both inputs are 3e+08 s ahead", "synchronise"),
+        "behind": ("of both inputs are 3e+08 s behind", "use_sim_time"),
+    }[name]
+    told = bench.run(2.1, **how)[0].message(BENCH_VALVE, "stem")
+    assert all(one in told for one in words), told
+    assert "\n" not in told
+
+
+def test_unstamped_messages():
+    bench = Bench()
+    kinds, values = np.array([*GOOD], np.uint8), np.array([*GOOD.values()])
+    for turn in range(40):
+        bench.time = 0.05 * turn
+        arrivals = Arrivals(kinds, np.zeros(2, np.int64), values)
+        intake = bench.buffer.add_arrivals(arrivals)
+        bench.quality.see(arrivals, intake, bench.time, NOW, TOLERANCE)
+    found = set(bench.faults())
+    assert DataFault(REJECTED, Signal.PRESSURE, SampleFault.REPEATED) in found
+    assert DataFault(REJECTED, Signal.POSITION, SampleFault.REPEATED) in found
+    assert DataFault(CLOCK) in found
+
+
+def test_two_publishers_on_one_topic():
+    bench = Bench()
+    for turn in range(40):
+        bench.time += 0.05
+        bench.arrive((Kind.PRESSURE, -(turn % 2), 1e5), (Kind.POSITION, 0.0, 0.01))
+    assert DataFault(REJECTED, Signal.PRESSURE, SampleFault.BACK) in bench.faults()
+
+
+def test_a_rejected_sample_is_not_usable(bench):
+    assert bench.quality.unusable(Signal.POSITION, bench.time) == 0.0
+    bench.run(3.0, position=math.nan)
+    assert bench.quality.unusable(Signal.POSITION, bench.time) == pytest.approx(3.0)
+    assert bench.quality.unusable(Signal.PRESSURE, bench.time) == 0.0
+    assert math.isinf(DataQuality(BENCH_VALVE).unusable(Signal.PRESSURE, 1.0))
+
+
+def test_a_share_begins_at_5_percent_and_ends_below_1(bench):
+    def one_bad_of(count):
+        for _ in range(600 // count):
+            bench.run(0.01, 0.01, position=math.nan)
+            bench.run(0.01 * (count - 1), 0.01)
+        return {one.kind for one in bench.faults()}
+
+    assert one_bad_of(25) == set()  # 4 %
+    assert one_bad_of(15) == {REJECTED}  # 7 %
+    assert one_bad_of(50) == {REJECTED}  # 2 %, and it has begun
+    assert one_bad_of(300) == set()
+
+
+def test_damaged_messages():
+    bench = Bench()
+    intake = bench.buffer.drop_damaged(Signal.POSITION, 3)
+    bench.quality.see(Arrivals.joined(()), intake, 0.0)
+    (found,) = bench.faults()
+    assert found == DataFault(REJECTED, Signal.POSITION, SampleFault.DAMAGED)
+    assert "no sample was usable yet: they are damaged" in found.message(BENCH_VALVE)
+    assert sum(bench.buffer.rejected.values()) == 3
+
+
+def test_a_sensor_that_reports_seldom_is_none_and_its_fault_lasts_to_its_next_sample(bench):
+    assert bench.run(60.0, stem_every=10.0) == ()
+    bench.run(10.0, stem_every=10.0, position=math.nan)
+    bench.run(9.9, stem_every=100.0)
+    assert bench.faults() == ()  # its first sample of this run is good
+    bench.run(1.0, stem_every=100.0, position=math.nan)
+    bench.time += 30.0
+    assert [one.kind for one in bench.faults()] == [REJECTED]
+
+
+def test_a_stem_that_stands_still_is_none(bench):
+    assert bench.run(3600.0, every=1.0) == ()
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 3.0, 20.0])
+@pytest.mark.parametrize("period", [0.01, 1.0, 10.0])
+def test_a_recording_is_played_at_any_speed(speed, period):
+    """Its stamps go on by `speed`; both signals are sampled at other times."""
+    bench, stamps = Bench(tolerance=0.0), {Kind.PRESSURE: 0.0, Kind.POSITION: -0.5 * period}
+    for turn in range(400):
+        kind = Kind.POSITION if turn % 2 else Kind.PRESSURE
+        bench.time += 0.5 * period / speed
+        stamps[kind] += period
+        bench.arrive((kind, stamps[kind] - bench.time, GOOD[kind]))
+        assert bench.faults() == ()
+
+
+@pytest.mark.parametrize("how", ["no clock", "no tolerance", "played"])
+def test_stamps_are_compared_with_a_comparable_clock_only(how):
+    bench = Bench(tolerance=0.0 if how == "no tolerance" else TOLERANCE)
+    bench.has_clock = how != "no clock"
+    bench.run(3.0, off=-3e8)
+    assert bench.faults(is_played=how == "played") == ()
+
+
+def test_a_backlog_is_none(bench):
+    """A node that was held up takes old samples first, in one turn or two."""
+    bench.time += 100.0
+    bench.arrive(*((kind, -90.0 + k, GOOD[kind]) for k in range(10) for kind in GOOD))
+    bench.time += 0.05
+    bench.arrive(*((kind, -79.0 + k, GOOD[kind]) for k in range(80) for kind in GOOD))
+    bench.run(0.05)
+    assert bench.faults() == ()
+
+
+def test_one_signal_with_a_wrong_clock(bench):
+    bench.run(2.0, late=1000.0)
+    assert set(bench.faults()) == {DataFault(SKEW), DataFault(CLOCK, Signal.POSITION)}
+
+
+def test_a_jump_of_the_clock_is_forgotten(bench):
+    bench.run(2.0, off=-3e8)
+    assert bench.faults()
+    bench.quality.forget_stamps()
+    assert {one.kind for one in bench.faults()} <= {REJECTED}
+
+
+def test_without_travel_any_place_of_a_stem_is_possible():
+    bench = Bench(replace(BENCH_VALVE, travel=math.inf))
+    assert bench.run(3.0, position=9.0) == ()
+    assert [one.kind for one in bench.run(3.0, position=11.0)] == [REJECTED]
+
+
+def test_the_machine_without_ranges_takes_any_pressure():
+    bench = Bench(Valve(1.0))
+    assert bench.run(3.0, pressure=-1e300) == ()
+
+
+def test_an_intake_without_faults():
+    assert Intake().rejected == {}
