@@ -21,7 +21,7 @@ from valve_friction_ros.health import (
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
-from valve_friction_ros.nodes.identifier.bag_service import saved_bag
+from valve_friction_ros.nodes.identifier.bag_service import BagSaver
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -41,6 +41,7 @@ from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
+from valve_friction_ros.nodes.identifier.service_parameters import WEBHOOK_URL, webhook_from
 from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     estimate_status,
@@ -104,8 +105,10 @@ class Identifier(PolledNode):
         values = values_of(self, CHANGEABLE)
         require_valid(values)
         reject_invalid(self, CHANGEABLE, require_valid)
+        webhook = webhook_from(self.get_parameter(WEBHOOK_URL.name).value)
         self._workers = workers
         self._monitor = FrictionMonitor(monitor_settings(values))
+        self._bags = BagSaver(self, self._monitor)
         tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
@@ -145,7 +148,7 @@ class Identifier(PolledNode):
             self._usage,
             self._response,
         )
-        self._alerts = Alerts(self, workers.alerts, self._history, self._level())
+        self._alerts = Alerts(self, workers.alerts, self._history, self._level(), webhook)
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
@@ -277,7 +280,7 @@ class Identifier(PolledNode):
 
     async def _save(self) -> str:
         self._inputs.take()
-        return str(await saved_bag(self, self._monitor, self._inputs.names, self._workers.files))
+        return str(await self._bags.saved(self._inputs.names, self._workers.files))
 
     async def _report(self) -> str:
         return str(await self._reports.written(self._workers.files))
