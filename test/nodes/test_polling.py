@@ -208,13 +208,37 @@ class TestTurn:
         assert errors.count("Traceback (most recent call last)") == 1
         assert "in fail\n" in errors
 
-    def test_what_a_callback_raises_ends_the_turn(self, bench):
+    def test_what_a_callback_raises_is_kept_to_its_node(self, bench, capfd):
         node, executor, _ = bench
+        faults, calls = [KeyError("a bug")], []
 
-        def fail():
-            raise KeyError("a bug")
+        def work():
+            calls.append(1)
+            if faults:
+                raise faults[0]
 
-        node.create_timer(0.01, fail)
-        time.sleep(0.05)
-        with pytest.raises(KeyError, match="a bug"):
-            executor.turn()
+        node.create_timer(0.01, work)
+        other = PolledNode("other", context=node.context)
+        other.create_timer(0.01, lambda: calls.append(2))
+        executor.add_node(other)
+
+        def turned(value):
+            del calls[:]
+            wait_until(lambda: executor.turn() or {1, 2} <= set(calls), "both timers")
+            return value()
+
+        (failure,) = turned(lambda: node.failures)
+        assert failure.startswith("internal error: KeyError: 'a bug' (test_polling.py, line ")
+        turned(lambda: node.failures)
+        assert capfd.readouterr().err.count("Traceback (most recent call last)") == 1
+        assert other.failures == ()
+        faults.clear()
+        assert turned(lambda: node.failures) == ()
+        other.destroy_node()
+
+    def test_what_a_service_raises_is_kept_to_its_node(self, bench):
+        node, executor, client = bench
+        node.create_service(Trigger, "~/work", lambda *_: 1 / 0)
+        self.requests(client, 1)
+        wait_until(lambda: executor.turn() or node.failures, "the bug")
+        assert node.failures[0].startswith("internal error: ZeroDivisionError")

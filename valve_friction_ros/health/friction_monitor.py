@@ -306,15 +306,15 @@ class FrictionMonitor:
         """Return the diagnosis by the latest result, also after a refusal; OK without any.
 
         That of an earlier estimate says how old it is at the time `now`, ns, where that is given.
-        A bug in an identification raises the level to WARN at least, until one succeeds.
+        A bug in an identification raises the level to ERROR, until one succeeds.
         """
         diagnosis = self._diagnosis_by_result(now)
         if self._internal_error is None:
             return diagnosis
         message = f"{self._internal_error}; before: {diagnosis.message}"
-        if diagnosis.level >= Level.WARN:
+        if diagnosis.level >= Level.ERROR:
             return replace(diagnosis, message=message)
-        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
+        return Diagnosis(Level.ERROR, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
 
     def _diagnosis_by_result(self, now: int | None) -> Diagnosis:
         if (estimate := self.estimate) is not None:

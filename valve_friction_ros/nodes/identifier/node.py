@@ -45,6 +45,7 @@ from valve_friction_ros.nodes.identifier.service_parameters import WEBHOOK_URL, 
 from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     estimate_status,
+    fail,
     friction_status,
     stuck_status,
 )
@@ -71,6 +72,7 @@ __all__ = ["PARAMETERS", "Identifier", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _LOG_EVERY = 5.0
+_TELLING = "diagnostics"
 
 
 class Identifier(PolledNode):
@@ -99,6 +101,19 @@ class Identifier(PolledNode):
         **named: Any,
     ) -> None:
         super().__init__("identifier", namespace=namespace, **named)
+        try:
+            self._build(workers, number_topics)
+        except BaseException:
+            self._abandon()
+            raise
+
+    def _abandon(self) -> None:
+        """Leave the graph, and the history to others, where the node cannot start."""
+        if (history := getattr(self, "_history", None)) is not None:
+            history.close()
+        self.destroy_node()
+
+    def _build(self, workers: Workers, number_topics: bool) -> None:
         own = replace(NUMBER_TOPICS, default=number_topics)
         declare_parameters(self, [own if one is NUMBER_TOPICS else one for one in PARAMETERS])
         warn_of_columns(self)
@@ -161,7 +176,7 @@ class Identifier(PolledNode):
         ):
             create_trigger_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
-        self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
+        self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
         self._jump_handle = self.get_clock().create_jump_callback(
             JumpThreshold(
                 min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True
@@ -324,6 +339,21 @@ class Identifier(PolledNode):
         """Return the most severe level of the diagnosis of friction and of what else is found."""
         return max([self._monitor.diagnosis().level, *(one.level for one in findings)])
 
+    def _tell(self) -> None:
+        """Publish the diagnostics; a bug in them is published in their stead."""
+        with self.guarded(_TELLING):
+            self._publish_diagnostics()
+        if (bug := self.failure_of(_TELLING)) is None:
+            return
+        status = self.stuck_status(bug)
+        self._estimate_topic.publish(status)
+        self._publish(status)
+
+    def _publish(self, status: DiagnosticStatus) -> None:
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics_publisher.publish(message)
+
     def _publish_diagnostics(self) -> None:
         self._inputs.take()
         self._inputs.follow_publishers()
@@ -347,7 +377,7 @@ class Identifier(PolledNode):
             self._monitor,
             now.nanoseconds,
             [
-                *filter(None, [self.poll_failure, self.overdue()]),
+                *filter(None, [self.overdue()]),
                 *self._evidence.problems,
                 *self._input_problems(),
             ],
@@ -361,13 +391,13 @@ class Identifier(PolledNode):
                 **self._readiness.values(),
             },
         )
+        if failures := (*self.failures, *self._evidence.failures):
+            fail(status, failures)
         self._alerts.follow(status, self._monitor.diagnosis(), findings)
         self._level_log.follow(status)
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = now.to_msg()
-        self._diagnostics_publisher.publish(message)
+        self._publish(status)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
