@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from records import simulated
 
 from valve_friction_ros.health import (
     Baseline,
@@ -17,13 +18,21 @@ from valve_friction_ros.health import (
     diagnose,
     identify_snapshot,
 )
+from valve_friction_ros.health.friction_monitor import MOST_SAMPLES
 from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
     identify_refined,
     identify_robust,
 )
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    SensorNoise,
+    SineWave,
+    converter_response,
+)
+from valve_friction_ros.streams import Samples, Snapshot
 
 SETTINGS = MonitorSettings(BENCH_VALVE)
 START = 1_700_000_000_000_000_000
@@ -73,6 +82,26 @@ class TestSettings:
         baseline = FrictionMonitor(SETTINGS).baseline
         assert (baseline, SETTINGS.identification.derivative_window) == (None, None)
         assert SETTINGS.window == 60.0
+
+
+class TestLongRecord:
+    """Twice the samples that are identified: 66 s at 2 kHz, and the truth of the simulated valve."""
+
+    def test_means_of_it_are_identified_and_the_result_says_so(self):
+        times = np.arange(2 * MOST_SAMPLES) / 2000
+        pressure = converter_response(SineWave(period=8.0).sample(times), 5e-4, 0.6)
+        record = SensorNoise(28.6e-6, 165.0, seed=1).applied_to(simulated(pressure, 5e-4))
+        stamps = START + 500_000 * np.arange(times.size, dtype=np.int64)
+        signals = (Samples(stamps, one) for one in (record.pressure, record.position))
+        snapshot = Snapshot(next(signals), next(signals), (), None)
+        result = identify_snapshot(snapshot, replaced(method="refined"))
+        assert result.evidence["averaged_samples"] == 2
+        assert result.findings[-1] == "the record is of means of 2 samples that follow each other"
+        assert len(result.recording) == MOST_SAMPLES
+        assert result.recording.sample_period == 1e-3
+        found = coulomb_friction(result)
+        assert abs(found.value - LOW_FRICTION.coulomb_friction) <= found.half_width
+        assert found.half_width < 2.0
 
 
 class TestIdentification:

@@ -98,6 +98,19 @@ class FaultyValve(PolledNode):
         self._diagnostics.publish(message)
 
 
+def _places(valves: Sequence[str]) -> list[str]:
+    """Return the namespaces of valves by their names."""
+    places = [f"/{valve.strip('/')}" for valve in valves if valve]
+    if not places:
+        raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
+    repeated = {place for place in places if places.count(place) > 1}
+    if repeated:
+        raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
+    for place in places:
+        validate_namespace(place)
+    return places
+
+
 def identifiers_of_valves(
     workers: Workers, arguments: Sequence[str] | None = None
 ) -> Iterator[Node]:
@@ -116,15 +129,7 @@ def identifiers_of_valves(
     host = PolledNode("identifiers")
     yield host
     declare_parameters(host, (_VALVES, _PROCESSES))
-    valves = [valve for valve in host.get_parameter(_VALVES.name).value if valve]
-    if not valves:
-        raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
-    places = [f"/{valve.strip('/')}" for valve in valves]
-    repeated = {place for place in places if places.count(place) > 1}
-    if repeated:
-        raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
-    for place in places:
-        validate_namespace(place)
+    places = _places(host.get_parameter(_VALVES.name).value)
     if processes := host.get_parameter(_PROCESSES.name).value:
         identify = ProcessWorker("identify", processes, compile_methods)
         workers = workers._replace(identify=identify)

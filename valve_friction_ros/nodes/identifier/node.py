@@ -228,7 +228,7 @@ class Identifier(PolledNode):
             self.get_logger().warning(cleared, throttle_duration_sec=_LOG_EVERY)
 
     def _take_parameters(self, changes: list[Parameter]) -> None:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
         self._usage.follow_parameters()
         self._evidence.follow_parameters()
@@ -237,7 +237,7 @@ class Identifier(PolledNode):
 
     def _on_time_jump(self, jump: TimeJump) -> None:
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._evidence.forget_samples()
         self.get_logger().warning(
@@ -246,7 +246,7 @@ class Identifier(PolledNode):
 
     async def _identify(self) -> str:
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         record, refused = self._identification.record(), None
         try:
             await self._identification.run(record)
@@ -275,7 +275,7 @@ class Identifier(PolledNode):
 
         A refusal is kept only where its record has changed what is found on the valve.
         """
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         before, refused = self._monitor.findings, None
         if self._identification.has_nothing_new:
             self._schedule.stall()
@@ -294,7 +294,7 @@ class Identifier(PolledNode):
         self._publish_diagnostics()
 
     async def _save(self) -> str:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         return str(await self._bags.saved(self._inputs.names, self._workers.files))
 
     async def _report(self) -> str:
@@ -311,13 +311,13 @@ class Identifier(PolledNode):
         return answer
 
     async def _clear(self) -> str:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._monitor.buffer.clear("on request")
         self._evidence.forget_samples()
         return "the buffer is empty; estimate and baseline are kept"
 
     async def _reset_usage(self) -> str:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._evidence.renew()
         self._response.renew()
         self._monitor.renew(self.get_clock().now().nanoseconds)

@@ -25,7 +25,13 @@ from valve_friction_ros.streams import utc, utc_day, utc_minute
 __all__ = ["estimate_status", "fail", "friction_status", "stuck_status", "trend_values"]
 
 
-_EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
+_EVIDENCE_UNITS = {
+    "threshold": " [m/s]",
+    "samples": "",
+    "sigma": " [N]",
+    "r_squared": "",
+    "averaged_samples": "",
+}
 
 
 def _result_values(shown: Mapping[str, Any], band: float, half_width: float) -> dict[str, str]:
