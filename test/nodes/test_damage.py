@@ -79,7 +79,17 @@ class TestOneOfSeveral:
     def require_others(self, client, statuses):
         for name in ("/fv_101/identifier: friction", "/fv_103/identifier: friction"):
             assert statuses[name].level == b"\x00", statuses[name]
-        assert client.identified(quick_record())
+        assert client.trigger("clear").success
+        client.send_record(quick_record())
+        client.next_status(
+            lambda one: (
+                one.name.startswith(NAMESPACE)
+                and values_of(one)["buffered_samples"] == str(2 * len(quick_record()))
+            ),
+            "all samples of the first valve",
+        )
+        answer = client.trigger("identify")
+        assert answer.success, answer.message
 
     def test_that_cannot_start(self, live, tmp_path):
         faulty = "/fv_102/identifier:\n  ros__parameters: {travel: -1.0, valve_tag: FV-102}\n"
