@@ -73,6 +73,25 @@ def test_secrets_come_from_the_environment_and_are_never_shown():
         assert wrong not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("beside", "token"),
+    [
+        ("https://example.com/a", "t0ken"),
+        ("https://example.com:443/a", "t0ken"),
+        ("https://example.com/b", ""),
+        ("https://example.com:8443/a", ""),
+        ("https://example.org/a", ""),
+        ("http://example.com/a", ""),  # cannot be used
+        ("", ""),
+    ],
+)
+def test_the_token_is_for_the_address_beside_it(beside, token):
+    """The signature does not give its key away."""
+    environment = {"VALVE_FRICTION_WEBHOOK_URL": beside}
+    given = Webhook.at("https://example.com/a")
+    assert Secrets("k3y", "t0ken").going_to(given, environment) == Secrets("k3y", token)
+
+
 def test_an_alert_as_json():
     time = datetime(2026, 1, 2, 5, 4, 5, tzinfo=timezone(timedelta(hours=2)))
     alert = Alert("FV-101", "/fv/identifier", Level.OK, Level.ERROR, "F", "excess µ", 2.5, time)

@@ -1,29 +1,43 @@
-"""The identifier with a bug in its loop or in a timer, its worker busy, as a node to start."""
+"""The identifier with a bug in its loop, in a timer or at its start, as a node to start.
+
+With the name of several identifiers the bug is in that of the valve fv_102.
+"""
 
 import sys
 import time
 from pathlib import Path
 
 SCRIPT = Path(__file__)
+SEVERAL = SCRIPT.with_name("raising_identifiers.py")
 RAISE = "raise"
 """Name of the file, in the node's working directory, that names where the bug is."""
-LOOP, TIMER = "loop", "timer"
+LOOP, TIMER, BEGINNING = "loop", "timer", "beginning"
 BUSY = 300.0
 """Time, s, for which the worker is busy."""
 
-if __name__ == "__main__":
-    from valve_friction_ros.nodes.identifier import node, workers
+
+def break_identifiers(places=("/fv_101",)):
+    """Put the bugs into the identifiers of some namespaces."""
+    from valve_friction_ros.nodes.identifier import node
 
     def raising(name, method):
         def call(self, *arguments):
-            if Path(RAISE).exists() and Path(RAISE).read_text() == name:
+            is_it = self.get_namespace() in places and Path(RAISE).exists()
+            if is_it and Path(RAISE).read_text() == name:
                 raise ZeroDivisionError("a bug")
             return method(self, *arguments)
 
         return call
 
     one = node.Identifier
+    one._build = raising(BEGINNING, one._build)
     one.poll = raising(LOOP, one.poll)
     one._publish_diagnostics = raising(TIMER, one._publish_diagnostics)
+
+
+if __name__ == "__main__":
+    from valve_friction_ros.nodes.identifier import node, workers
+
+    break_identifiers()
     workers.compile_methods = lambda: time.sleep(BUSY)
     sys.exit(node.main())

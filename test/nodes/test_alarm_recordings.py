@@ -51,6 +51,17 @@ def recorded(client, before=None):
     return Path(values[key])
 
 
+def restarted(live, node, parameters):
+    """Start the node again, with other parameters and the baseline that it has kept."""
+    live.client.watched.clear()
+    node.stop()
+    live.nodes.remove(node)
+    live.client.statuses.clear()
+    node = live.start_identifier({**FAST, **parameters})
+    live.client.next_status()
+    return node
+
+
 def alarmed(client, before=None):
     """Raise an alarm, and wait for its recording."""
     client.identified(HEALTHY)
@@ -167,7 +178,7 @@ def small_disk(tmp_path):
 
 
 def test_a_full_disk_is_told_and_no_torn_bag_stays(live, tmp_path, small_disk):
-    baseline_set(live, {"alarm_folder": str(small_disk)})
+    node = baseline_set(live, {"alarm_folder": str(small_disk)})
     client = live.client
     client.identified(TIGHT)
     values = client.status_values(
@@ -182,8 +193,7 @@ def test_a_full_disk_is_told_and_no_torn_bag_stays(live, tmp_path, small_disk):
     assert "alarm_recording" not in client.last_values()
     history = HistoryFile(tmp_path / "valve_friction_ros" / "history.sqlite")
     assert alarm_recordings(history, NODE) == ()
-    (done,) = client.set_parameters(NODE, {"alarm_folder": str(tmp_path / "room")})
-    assert done.successful
+    restarted(live, node, {"alarm_folder": str(tmp_path / "room")})
     assert alarmed(client).parent == tmp_path / "room"
     assert "alarm_recording problem" not in client.last_values()
 
@@ -219,7 +229,8 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
         (folder / name).mkdir(parents=True)
         (folder / name / "metadata.yaml").touch()
     (folder / others[0] / "note.txt").touch()
-    baseline_set(live, {"alarm_folder": str(folder), "alarm_recordings": 2})
+    chosen = {"alarm_folder": str(folder), "alarm_recordings": 2}
+    node = baseline_set(live, chosen)
     client, path, paths = live.client, None, []
     for _ in range(4):
         path = str(alarmed(client, path))
@@ -229,14 +240,12 @@ def test_many_alarms_are_bounded_and_nothing_else_is_removed(live, tmp_path):
     assert names(folder) == sorted([*others, paths[0], paths[-1]])  # of one level in a row
     size = sum(one.stat().st_size for one in Path(path).iterdir())
 
-    (done,) = client.set_parameters(NODE, {"alarm_megabytes": 1.5 * size / 1e6})
-    assert done.successful
+    node = restarted(live, node, {**chosen, "alarm_megabytes": 1.5 * size / 1e6})
     path = str(alarmed(client, path))
     expected = sorted([*others, Path(path).name])
     client.wait_until(lambda: names(folder) == expected, "one recording", timeout=100)
     assert "Excess friction" in paged(client, path)
-    (done,) = client.set_parameters(NODE, {"alarm_megabytes": 0.001})
-    assert done.successful
+    restarted(live, node, {**chosen, "alarm_megabytes": 0.001})
     client.identified(HEALTHY)
     client.identified(TIGHT)
     told = client.status_values(lambda one: "alarm_recording problem" in values_of(one), "no room")[
@@ -276,7 +285,7 @@ def test_what_is_not_recorded(live, tmp_path, switched_off):
 
 def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
     (tmp_path / "file").touch()
-    baseline_set(live, {"alarm_folder": str(tmp_path / "file" / "alarms")})
+    node = baseline_set(live, {"alarm_folder": str(tmp_path / "file" / "alarms")})
     client = live.client
     client.identified(TIGHT)
     values = client.status_values(
@@ -286,8 +295,7 @@ def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path):
         "the alarm was not recorded: cannot write an alarm's recording into "
         f"{tmp_path / 'file' / 'alarms'}: Not a directory"
     )
-    (done,) = client.set_parameters(NODE, {"alarm_folder": str(tmp_path / "alarms")})
-    assert done.successful
+    restarted(live, node, {"alarm_folder": str(tmp_path / "alarms")})
     assert alarmed(client).parent == tmp_path / "alarms"
     assert "alarm_recording problem" not in client.last_values()
 

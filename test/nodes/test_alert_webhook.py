@@ -40,9 +40,8 @@ def test_each_change_of_level_is_posted_once(live, tmp_path, monkeypatch):
     certificate = self_signed(tmp_path)
     monkeypatch.setenv("SSL_CERT_FILE", str(certificate.with_name("certificate.pem")))
     with Receiver(certificate) as receiver:
-        node = live.start_identifier(
-            {**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0, "valve_tag": "FV-101"}
-        )
+        monkeypatch.setenv("VALVE_FRICTION_WEBHOOK_URL", receiver.url)
+        node = live.start_identifier({**KNOWN, "webhook_period": 0.0, "valve_tag": "FV-101"})
         client = live.client
         client.identified(TIGHT)
         client.next_status(lambda one: one.level == ERROR, "an alarm")
@@ -104,9 +103,6 @@ def test_a_refused_alert_is_upkeep_and_no_alert(live):
         client.next_status()  # the WARN of the webhook itself is not posted
         client.next_status()
         assert changes(receiver) == [("OK", "ERROR"), ("ERROR", "OK")]
-        assert client.set_together(f"{NODE}", {"webhook_url": ""}).successful
-        status = client.next_status(lambda one: "webhook" not in values_of(one), "no webhook")
-        assert status.level == OK
     assert "/hook" not in node.errors
     require_no_secret(live, node)
 
@@ -161,12 +157,41 @@ def test_silence_of_the_inputs_is_posted_and_a_restart_is_not(live):
         assert "no data on" in receiver.bodies[-1]["message"]
 
 
+def test_nobody_on_the_graph_turns_the_alerts_to_another_address(live, monkeypatch):
+    with Receiver() as receiver, Receiver() as thief:
+        monkeypatch.setenv("VALVE_FRICTION_WEBHOOK_URL", receiver.url)
+        live.start_identifier({**KNOWN, "webhook_period": 0.0})
+        refused = live.client.set_together(NODE, {"webhook_url": thief.url})
+        assert not refused.successful
+        assert "read-only" in refused.reason
+        live.client.identified(TIGHT)
+        live.client.wait_until(lambda: receiver.requests, "an alert")
+        assert receiver.requests[0][1]["Authorization"] == "Bearer t0ken"
+        assert thief.requests == []
+
+
+def test_the_token_goes_only_to_the_address_beside_it(live, monkeypatch):
+    with Receiver() as receiver, Receiver() as other:
+        monkeypatch.setenv("VALVE_FRICTION_WEBHOOK_URL", receiver.url)
+        node = live.start_identifier({**KNOWN, "webhook_url": other.url, "webhook_period": 0.0})
+        live.client.identified(TIGHT)
+        live.client.wait_until(lambda: other.requests, "an alert")
+        headers = other.requests[0][1]
+        assert "Authorization" not in headers
+        assert SIGNATURE in headers
+        assert receiver.requests == []
+        told = f"no token is sent to http://127.0.0.1:{other.port}, as that of the environment goes"
+        assert told in node.errors
+    require_no_secret(live, node)
+
+
 def test_an_address_that_cannot_be_used_is_refused_without_repeating_it(live):
-    live.start_identifier()
-    refused = live.client.set_together(NODE, {"webhook_url": "http://example.com/s3cret"})
-    assert not refused.successful
-    assert "http to another machine" in refused.reason
-    assert "s3cret" not in refused.reason
+    node = live.start("identifier", {"webhook_url": "http://example.com/s3cret"})
+    live.client.watched.clear()
+    live.nodes.remove(node)
+    assert node.exit_code() == 2
+    assert "http to another machine" in node.errors
+    assert "s3cret" not in node.errors
 
 
 def test_what_is_found_on_a_valve_is_told_once_whatever_restarts(live, history):

@@ -106,12 +106,12 @@ def test_a_bug_in_the_thread_is_a_problem_until_it_is_gone(bench, monkeypatch):
         patched.setattr(evidence_watch, "evidence_of", bug)
         bench.watch._combine()
         assert settled(bench)["evidence moves"] == "0"
-    (problem,) = bench.watch.problems
-    assert problem.startswith("internal error: ZeroDivisionError: a bug")
+    (failure,) = bench.watch.failures
+    assert failure.startswith("internal error: ZeroDivisionError: a bug")
     assert any("Traceback" in one for one in bench.log)
     bench.watch._combine()
     assert settled(bench)["evidence moves"] == "600"
-    assert bench.watch.problems == []
+    assert bench.watch.failures == []
 
 
 def test_a_thread_that_never_ends_is_overdue():

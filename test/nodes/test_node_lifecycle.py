@@ -13,7 +13,7 @@ from valve_friction_ros.identification import published_estimate
 from valve_friction_ros.model import BENCH_VALVE, Recording, SineWave
 
 IDENTIFY = f"{NAMESPACE}/identifier/identify"
-OK, WARN = b"\x00", b"\x01"
+OK, ERROR = b"\x00", b"\x02"
 NODES = ("identifier", "simulator", "pressure_source")
 PLAYED = str(PROJECT / "test/nodes/played_pressure.csv")
 BAD_STARTS = {  # node, parameters, words of the only line
@@ -156,7 +156,7 @@ def test_a_bug_is_an_internal_error_and_the_next_record_identifies(live, tmp_pat
     assert response.message.endswith("): report it, with what ~/save writes")
 
     status = client.next_status()
-    assert status.level == WARN
+    assert status.level == ERROR
     assert status.message.startswith(words)
     values = values_of(status)
     assert values["NE 107"] == "C"

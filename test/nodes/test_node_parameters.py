@@ -54,6 +54,21 @@ BAD_CHANGES = [  # changes, words of the reason
     ),
     ({"joint": "arm"}, "joint"),
     ({"valve_tag": "FV-102"}, "valve_tag"),
+    *(
+        ({name: value}, f"read-only parameter: {name}")
+        for name, value in {
+            "webhook_url": "https://example.com/",
+            "alarm_folder": "../../etc",
+            "save_folder": "/proc/x",
+            "report_folder": "/etc",
+            "history_file": "",
+            "history_url": "postgresql://example.com/x",
+            "history_days": 0.001,
+            "save_megabytes": 1e6,
+            "alarm_megabytes": 0.001,
+            "alarm_recordings": 1,
+        }.items()
+    ),
 ]
 
 

@@ -1,26 +1,77 @@
-"""What cannot be written is refused with its folder; a bug is not blamed on the folder."""
+"""Nodes write in the folder that was given at the start, within its room, and nowhere else."""
 
 import errno
+import re
 
 import pytest
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.plumbing.output_folder import output_folder
+from valve_friction_ros.nodes.plumbing.output_folder import (
+    OutputFolder,
+    folder_of,
+    free_path,
+    require_room,
+)
+
+NAME = "fv_101_20260102T030405Z"
 
 
-def test_the_folder_that_is_given_or_the_usual_one(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_HOME", str(tmp_path))
-    with output_folder("~/pages", "reports", "a report") as folder:
-        assert folder.name == "pages"
-        assert folder.is_absolute()
-    with output_folder("", "reports", "a report") as folder:
-        assert folder == tmp_path / "valve_friction_ros" / "reports"
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    """The data folder."""
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
+    monkeypatch.setenv("HOME", str(tmp_path / "person"))
+    return tmp_path / "ros" / "valve_friction_ros"
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        ("", "ros/valve_friction_ros/reports"),
+        ("plant/pages", "ros/valve_friction_ros/plant/pages"),
+        ("plant/../pages", "ros/valve_friction_ros/pages"),
+        ("~/pages", "person/pages"),
+    ],
+)
+@pytest.mark.usefixtures("home")
+def test_the_folder_that_is_given_or_the_usual_one(tmp_path, given, found):
+    assert folder_of(given, "reports") == tmp_path / found
+    with OutputFolder(given, "reports", "a report").opened() as folder:
+        assert folder == tmp_path / found
+        assert folder.is_dir()
+
+
+@pytest.mark.usefixtures("home")
+def test_an_absolute_folder_is_where_it_says(tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "link").symlink_to("disk")
+    assert folder_of(str(tmp_path / "link" / "pages"), "reports") == tmp_path / "disk" / "pages"
+
+
+@pytest.mark.parametrize("given", ["../../etc", "a/../../etc", "link", "link/pages"])
+def test_a_relative_folder_does_not_lead_out_of_the_data_folder(tmp_path, home, given):
+    home.mkdir(parents=True)
+    (home / "link").symlink_to(tmp_path)
+    with pytest.raises(ValueError, match=f"^the folder {given} leads out of {home}, where relati"):
+        OutputFolder(given, "alarms", "a bag")
+
+
+@pytest.mark.usefixtures("home")
+def test_a_link_that_comes_later_is_not_followed(tmp_path):
+    kept = OutputFolder(str(tmp_path / "plant" / "pages"), "reports", "a report")
+    (tmp_path / "elsewhere" / "pages").mkdir(parents=True)
+    (tmp_path / "plant").symlink_to("elsewhere")
+    with (
+        pytest.raises(RefusalError, match=r"plant/pages: since the start a link leads from there"),
+        kept.opened(),
+    ):
+        pytest.fail("the link was followed")
 
 
 def test_an_unknown_home_is_refused():
     with (
         pytest.raises(RefusalError, match=r"^cannot write a report into ~nobody-such/x: Could not"),
-        output_folder("~nobody-such/x", "reports", "a report"),
+        OutputFolder("~nobody-such/x", "reports", "a report").opened(),
     ):
         pytest.fail("there is no such folder")
 
@@ -28,7 +79,7 @@ def test_an_unknown_home_is_refused():
 def test_trouble_with_the_disk_is_refused(tmp_path):
     with (
         pytest.raises(RefusalError, match=f"^cannot write a bag into {tmp_path}: No space left"),
-        output_folder(str(tmp_path), "saved", "a bag"),
+        OutputFolder(str(tmp_path), "saved", "a bag").opened(),
     ):
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -37,6 +88,45 @@ def test_trouble_with_the_disk_is_refused(tmp_path):
 def test_a_bug_is_not_blamed_on_the_folder(tmp_path, bug):
     with (
         pytest.raises(type(bug), match=r"^a bug$"),
-        output_folder(str(tmp_path), "reports", "a report"),
+        OutputFolder(str(tmp_path), "reports", "a report").opened(),
     ):
         raise bug
+
+
+def test_a_link_has_the_name_that_it_has_wherever_it_leads(tmp_path):
+    """A dangling one would be written through."""
+    assert free_path(tmp_path, NAME, ".html") == tmp_path / f"{NAME}.html"
+    (tmp_path / f"{NAME}.html").symlink_to(tmp_path / "nothing")
+    assert free_path(tmp_path, NAME, ".html") == tmp_path / f"{NAME}_2.html"
+
+
+class TestRoom:
+    """A page of two blocks of 4,096 bytes, and a bag of two files of one block each."""
+
+    TAKEN = 4 * 4096
+
+    @pytest.fixture
+    def folder(self, tmp_path):
+        (tmp_path / f"{NAME}.html").write_bytes(b"x" * 4097)
+        bag = tmp_path / f"{NAME}_2"
+        bag.mkdir()
+        for name in ("metadata.yaml", "bag.mcap"):
+            (bag / name).write_bytes(b"x")
+        for other in ("fv_1011", "afv_101", "fv_101_a"):  # of other valves
+            (tmp_path / f"{other}_20260102T030405Z.html").write_bytes(b"x" * 100_000)
+        (tmp_path / "fv_101_notes.html").write_bytes(b"x" * 100_000)
+        (bag / "link").symlink_to(tmp_path / "fv_101_notes.html")
+        return tmp_path
+
+    def test_there_is_room(self, folder):
+        require_room(folder, "fv_101", self.TAKEN + 1)
+
+    def test_what_has_just_been_written_may_fill_it(self, folder):
+        require_room(folder, "fv_101", self.TAKEN, is_there=True)
+        with pytest.raises(RefusalError, match="with this one"):
+            require_room(folder, "fv_101", self.TAKEN - 1, is_there=True)
+
+    def test_there_is_none(self, folder):
+        told = f"no room: fv_101 takes 0.0164 MB in {folder}, and save_megabytes is 0.016384: move"
+        with pytest.raises(RefusalError, match=f"^{re.escape(told)}"):
+            require_room(folder, "fv_101", self.TAKEN)

@@ -5,19 +5,24 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 import rclpy
-from live_nodes import PATIENCE, SECOND, Client, Domain
+from live_nodes import PATIENCE, SECOND, Client, Domain, time_of
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
-from valve_friction_ros.nodes.plumbing.qos import blocks
+from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
 
 CHECKED = "7.1.6"
@@ -90,6 +95,71 @@ def test_messages_are_taken_in_their_order(bench, raw):
     received = [one.received for one in messages]
     assert received == sorted(received)
     assert begin - SECOND < received[0] <= received[-1] < time.time_ns() + SECOND
+
+
+def send_all(publisher, messages):
+    """Publish in bursts that no queue of the transport is overrun by."""
+    for begin in range(0, len(messages), 200):
+        for message in messages[begin : begin + 200]:
+            publisher.publish(message)
+        assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE)), "not acknowledged"
+
+
+def test_a_flood_is_taken_by_turns(bench):
+    """What others may wait for at most; `is_all` takes what the queue held."""
+    node, _, client = bench
+    polled = PolledSubscription(node, Float64, "numbers", stream())
+    other = PolledSubscription(node, Float64, "numbers", stream())
+    publisher = client.node.create_publisher(Float64, "numbers", stream())
+    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
+    send_all(publisher, [Float64(data=float(number)) for number in range(4_000)])
+    assert len(other.take(is_all=True)) == 4_000
+    sizes = []
+    for more in (True, False):
+        sizes.append(len(polled.take()))
+        assert polled.has_more is more
+    assert sizes == [3_000, 1_000]
+    assert polled.losses.lost == other.losses.lost == 0
+
+
+def test_what_a_queue_lost_is_counted(bench):
+    node, _, client = bench
+    polled = PolledSubscription(node, Float64, "numbers", QoSProfile(depth=10))
+    send = sender(client, polled)
+    send(0)
+    assert [one.message.data for one in taken(polled, 1)] == [0]
+    send(*range(1, 1001))
+    last = wait_until(lambda: [one for one in polled.take() if one.message.data == 1000], "it")
+    assert last
+    losses = polled.losses
+    assert 0 < losses.lost == losses.recently_lost
+    assert losses.lost + losses.recently_taken == 1001
+    assert losses.share == losses.lost / 1001
+
+
+def test_one_signal_waits_for_the_other_that_has_more_than_its_share(bench):
+    """Otherwise the stem would run ahead of its pressure."""
+    node, _, client = bench
+    arrived = []
+    inputs = ValveInputs(node, "stem", arrived.append)
+    pressure = client.node.create_publisher(FluidPressure, "actuator_pressure", stream())
+    stem = client.node.create_publisher(JointState, "stem_state", stream())
+    for publisher in pressure, stem:
+        wait_until(publisher.get_subscription_count, "the subscription")
+    messages = [FluidPressure(fluid_pressure=1e5) for _ in range(4_000)]
+    for number, message in enumerate(messages):
+        message.header.stamp = time_of(number)
+    send_all(pressure, messages)
+    message = JointState(name=["stem"], position=[0.01])
+    message.header.stamp = time_of(4_000)
+    send_all(stem, [message])
+
+    def kinds():
+        inputs.take()
+        return np.bincount(arrived[-1].kinds, minlength=2).tolist()
+
+    assert kinds() == [3_000, 0]
+    assert kinds() == [1_000, 1]
 
 
 def test_no_executor_takes_them(bench):
@@ -208,13 +278,37 @@ class TestTurn:
         assert errors.count("Traceback (most recent call last)") == 1
         assert "in fail\n" in errors
 
-    def test_what_a_callback_raises_ends_the_turn(self, bench):
+    def test_what_a_callback_raises_is_kept_to_its_node(self, bench, capfd):
         node, executor, _ = bench
+        faults, calls = [KeyError("a bug")], []
 
-        def fail():
-            raise KeyError("a bug")
+        def work():
+            calls.append(1)
+            if faults:
+                raise faults[0]
 
-        node.create_timer(0.01, fail)
-        time.sleep(0.05)
-        with pytest.raises(KeyError, match="a bug"):
-            executor.turn()
+        node.create_timer(0.01, work)
+        other = PolledNode("other", context=node.context)
+        other.create_timer(0.01, lambda: calls.append(2))
+        executor.add_node(other)
+
+        def turned(value):
+            del calls[:]
+            wait_until(lambda: executor.turn() or {1, 2} <= set(calls), "both timers")
+            return value()
+
+        (failure,) = turned(lambda: node.failures)
+        assert failure.startswith("internal error: KeyError: 'a bug' (test_polling.py, line ")
+        turned(lambda: node.failures)
+        assert capfd.readouterr().err.count("Traceback (most recent call last)") == 1
+        assert other.failures == ()
+        faults.clear()
+        assert turned(lambda: node.failures) == ()
+        other.destroy_node()
+
+    def test_what_a_service_raises_is_kept_to_its_node(self, bench):
+        node, executor, client = bench
+        node.create_service(Trigger, "~/work", lambda *_: 1 / 0)
+        self.requests(client, 1)
+        wait_until(lambda: executor.turn() or node.failures, "the bug")
+        assert node.failures[0].startswith("internal error: ZeroDivisionError")

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -104,3 +105,28 @@ def test_threads_share_what_waits(tmp_path):
     done(blocked)
     worker.shutdown()
     assert not worker.is_busy
+
+
+def test_valves_take_turns():
+    """Each has one identification in the queue: one that asks again is behind the others."""
+    begin, order, done = threading.Event(), [], threading.Event()
+    worker = Worker("identify")
+
+    def identify(valve):
+        begin.wait(PATIENCE)
+        order.append(valve)
+
+    def ask_again(future):
+        future.result()
+        if len(order) < 6:
+            worker.submit(identify, "storm").add_done_callback(ask_again)
+        else:
+            done.set()
+
+    worker.submit(identify, "storm").add_done_callback(ask_again)
+    for valve in ("b", "c"):
+        worker.submit(identify, valve)
+    begin.set()
+    assert done.wait(PATIENCE)
+    worker.shutdown()
+    assert order == ["storm", "b", "c", "storm", "storm", "storm"]

@@ -213,6 +213,14 @@ def messages(bag):
             yield connection.topic, (connection.topic, stamp.sec, stamp.nanosec, value)
 
 
+def start_saving_into(live, folder, **parameters):
+    """Start the node with the disk's troubles, and give it two samples."""
+    parameters = {"save_folder": str(folder), "window": WINDOW, **parameters}
+    live.start_identifier(parameters, script=SCRIPT)
+    live.client.send_record(quick_record())
+    live.client.identified_whole(held(quick_record()))
+
+
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
@@ -221,31 +229,49 @@ def messages(bag):
         ("~nobody-of-that-name/bags", "Could not determine home directory."),
     ],
 )
-def test_what_cannot_be_saved_is_told_and_the_node_goes_on(run, name, reason):
-    (run.folder / "file").write_text("")
-    folder = Path(name) if name.startswith("~") else run.folder / name
-    (result,) = run.client.set_parameters(IDENTIFIER, {"save_folder": str(folder)})
-    assert result.successful
-    response = run.client.trigger("save")
+def test_what_cannot_be_saved_is_told_and_the_node_goes_on(live, tmp_path, name, reason):
+    (tmp_path / "file").write_text("")
+    folder = Path(name) if name.startswith("~") else tmp_path / name
+    start_saving_into(live, folder)
+    response = live.client.trigger("save")
     assert not response.success
     assert response.message == f"cannot write a bag into {folder}: {reason}"
-    assert run.client.trigger("identify").success
+    assert live.client.trigger("identify").success
     if folder.exists():
         assert list(folder.iterdir()) == []
 
 
-def test_the_node_goes_on_while_it_saves(run):
-    folder = run.folder / SLOW
-    (result,) = run.client.set_parameters(IDENTIFIER, {"save_folder": str(folder)})
-    assert result.successful
-    saving = run.client.request(Trigger, f"{IDENTIFIER}/save", Trigger.Request())
-    run.client.next_status()
-    assert run.client.trigger("set_baseline").success
+def test_the_node_goes_on_while_it_saves(live, tmp_path):
+    folder = tmp_path / SLOW
+    start_saving_into(live, folder)
+    saving = live.client.request(Trigger, f"{IDENTIFIER}/save", Trigger.Request())
+    live.client.next_status()
+    assert live.client.trigger("set_baseline").success
     assert not saving.done()
-    (run.folder / FINISH).touch()
-    response = run.client.wait_until_answered(saving)
+    (tmp_path / FINISH).touch()
+    response = live.client.wait_until_answered(saving)
     assert response.success, response.message
     assert Path(response.message).parent == folder
+
+
+def test_nobody_on_the_graph_fills_the_disk_by_saving(live, tmp_path):
+    folder = tmp_path / "saved"
+    start_saving_into(live, folder, save_megabytes=0.1, report_folder=tmp_path / "pages")
+    answers = [live.client.trigger("save") for _ in range(8)]
+    assert [one.success for one in answers] == sorted(
+        (one.success for one in answers), reverse=True
+    )
+    assert answers[0].success
+    assert not answers[-1].success
+    assert "MB in " in answers[-1].message
+    assert "save_megabytes is 0.1: move files away" in answers[-1].message
+    files = [one for one in folder.rglob("*") if one.is_file()]
+    assert sum(one.stat().st_size for one in files) <= 100_000
+    assert len(list(folder.iterdir())) == sum(one.success for one in answers)
+    page = live.client.trigger("report")  # some 200 kB
+    assert not page.success
+    assert page.message.startswith("no room: fv_101 takes ")
+    assert list((tmp_path / "pages").iterdir()) == []
 
 
 def test_an_empty_buffer_is_not_saved(run):

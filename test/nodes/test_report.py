@@ -94,13 +94,12 @@ def test_friction_is_judged_against_the_baseline_in_force(bench):
         ("~nobody-of-that-name/reports", "Could not determine home directory."),
     ],
 )
-def test_what_cannot_be_written_is_told_and_the_node_goes_on(bench, tmp_path, name, reason):
-    client, _ = bench
-    client.identified(quick_record())
+def test_what_cannot_be_written_is_told_and_the_node_goes_on(live, tmp_path, name, reason):
     (tmp_path / "file").write_text("")
     folder = name if name.startswith("~") else str(tmp_path / name)
-    (result,) = client.set_parameters(IDENTIFIER, {"report_folder": folder})
-    assert result.successful
+    live.start_identifier({"report_folder": folder})
+    client = live.client
+    client.identified(quick_record())
     response = client.trigger("report")
     assert not response.success
     assert response.message == f"cannot write a report into {folder}: {reason}"

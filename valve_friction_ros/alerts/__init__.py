@@ -3,10 +3,11 @@
 from valve_friction_ros.alerts.alert import Alert
 from valve_friction_ros.alerts.posting import DeliveryError, post
 from valve_friction_ros.alerts.sender import AlertSender, Outbox, OutboxState
-from valve_friction_ros.alerts.webhook import SIGNATURE, Secrets, Webhook, signature
+from valve_friction_ros.alerts.webhook import SIGNATURE, URL_VARIABLE, Secrets, Webhook, signature
 
 __all__ = [
     "SIGNATURE",
+    "URL_VARIABLE",
     "Alert",
     "AlertSender",
     "DeliveryError",

@@ -268,7 +268,8 @@ class AlertSender:
 
     def _failure(self, alert: Alert, webhook: Webhook) -> DeliveryError | None:
         try:
-            secrets = Secrets.from_environment() if self._secrets is None else self._secrets
+            if (secrets := self._secrets) is None:
+                secrets = Secrets.from_environment().going_to(webhook)
             post(webhook, alert.body(), secrets, self._limit)
         except DeliveryError as failure:
             return failure

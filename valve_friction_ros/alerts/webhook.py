@@ -1,5 +1,6 @@
 """Where alerts go, and by what they are known to be genuine."""
 
+import contextlib
 import hashlib
 import hmac
 import os
@@ -9,12 +10,13 @@ from urllib.parse import urlsplit
 
 from valve_friction_ros.loopback import is_loopback
 
-__all__ = ["SIGNATURE", "Place", "Secrets", "Webhook", "signature"]
+__all__ = ["SIGNATURE", "URL_VARIABLE", "Place", "Secrets", "Webhook", "signature"]
 
 SIGNATURE = "X-Valve-Friction-Signature"
 """Header with the signature."""
 
-_URL = "VALVE_FRICTION_WEBHOOK_URL"
+URL_VARIABLE = "VALVE_FRICTION_WEBHOOK_URL"
+"""Variable of the environment with the address that the token is for."""
 _SECRET = "VALVE_FRICTION_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
 _TOKEN = "VALVE_FRICTION_WEBHOOK_TOKEN"  # noqa: S105
 
@@ -79,8 +81,8 @@ class Webhook:
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> "Webhook | None":
         """Read ``VALVE_FRICTION_WEBHOOK_URL``, if it is set; raises ValueError like `at`."""
-        url = environment.get(_URL, "").strip()
-        return cls.at(url, _URL) if url else None
+        url = environment.get(URL_VARIABLE, "").strip()
+        return cls.at(url, URL_VARIABLE) if url else None
 
     @property
     def place(self) -> Place:
@@ -112,7 +114,7 @@ class Secrets:
     secret : str
         Key of the signature; empty: no signature.
     token : str
-        Bearer token; empty: none.
+        Bearer token, for the address in the environment alone; empty: none.
     """
 
     secret: str = field(default="", repr=False)
@@ -128,6 +130,17 @@ class Secrets:
         if not token.isascii() or (token and not token.isprintable()) or " " in token:
             raise ValueError(f"{_TOKEN} has a space, or a character that is not ASCII: correct it")
         return cls(secret, token)
+
+    def going_to(self, webhook: Webhook, environment: Mapping[str, str] = os.environ) -> "Secrets":
+        """Return what may go to a webhook: the token only to the address of the environment.
+
+        Who may give a parameter is not always who may have the token. The key of the signature goes
+        nowhere.
+        """
+        with contextlib.suppress(ValueError):
+            if webhook == Webhook.from_environment(environment):
+                return self
+        return Secrets(self.secret)
 
     def headers(self, body: bytes, time: int) -> dict[str, str]:
         """Return the headers that vouch for a body sent at `time`, s since 1970."""

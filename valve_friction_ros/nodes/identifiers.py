@@ -6,20 +6,26 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
+from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.identification.preparation import compile_methods
 from valve_friction_ros.nodes.identifier import parameters
 from valve_friction_ros.nodes.identifier.node import Identifier
+from valve_friction_ros.nodes.identifier.status import stuck_status
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
+from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.process_worker import ProcessWorker
-from valve_friction_ros.nodes.plumbing.running import join_graph, run_nodes
+from valve_friction_ros.nodes.plumbing.qos import LATCHED
+from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, join_graph, run_nodes
 
-__all__ = ["PARAMETERS", "identifiers_of_valves", "main"]
+__all__ = ["PARAMETERS", "FaultyValve", "identifiers_of_valves", "main"]
 
 _VALVES = ParameterSpec(
     "valves", [""], "Namespaces of the valves, an identifier each [-]", read_only=True
@@ -53,53 +59,113 @@ PARAMETERS = (*_OWN, *parameters.PARAMETERS)
 """Its own, and those of its identifiers."""
 
 
+class FaultyValve(PolledNode):
+    """Stands in for the identifier of a valve that cannot start: it says so, and does no more.
+
+    Parameters
+    ----------
+    place : str
+        Namespace of the valve.
+    problem : str
+        Why it cannot start.
+    context : Context
+        The participant of the graph.
+    """
+
+    def __init__(self, place: str, problem: str, context: Context) -> None:
+        super().__init__(
+            "identifier", namespace=place, context=context, start_parameter_services=False
+        )
+        overrides = getattr(self, "_parameter_overrides", {})  # rclpy offers no other way to them
+        given = overrides.get(parameters.VALVE_TAG.name)
+        self._tag = str(given.value) if given is not None and given.value else place.strip("/")
+        self._problem = f"cannot start, so nobody watches this valve: {problem}"
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_publisher(DiagnosticStatus, "~/estimate", LATCHED).publish(self._status())
+        self.create_timer(1.0, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def stuck_status(self, problem: str) -> DiagnosticStatus:
+        """Return the status of a valve that nobody monitors."""
+        name = f"{self.get_fully_qualified_name()}: friction"
+        return stuck_status(name, self._tag, problem)
+
+    def _status(self) -> DiagnosticStatus:
+        return self.stuck_status(self._problem)
+
+    def _tell(self) -> None:
+        message = DiagnosticArray(status=[self._status()])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def _places(valves: Sequence[str]) -> list[str]:
+    """Return the namespaces of valves by their names."""
+    places = [f"/{valve.strip('/')}" for valve in valves if valve]
+    if not places:
+        raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
+    repeated = {place for place in places if places.count(place) > 1}
+    if repeated:
+        raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
+    for place in places:
+        validate_namespace(place)
+    return places
+
+
 def identifiers_of_valves(
     workers: Workers, arguments: Sequence[str] | None = None
 ) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve of its parameter.
 
+    One that cannot start is logged, and a `FaultyValve` stands in for it.
+
     Raises
     ------
     ValueError
-        If no valve is named, or a valve is named twice, or ROS arguments remap a namespace.
+        If no valve is named, or a valve is named twice, or ROS arguments remap a namespace, or no
+        valve can start.
     rclpy.exceptions.InvalidNamespaceException
         If a name cannot be a namespace.
     """
     host = PolledNode("identifiers")
     yield host
     declare_parameters(host, (_VALVES, _PROCESSES))
-    valves = [valve for valve in host.get_parameter(_VALVES.name).value if valve]
-    if not valves:
-        raise ValueError("no valve is named: give the parameter valves, such as [fv_101, fv_102]")
-    places = [f"/{valve.strip('/')}" for valve in valves]
-    repeated = {place for place in places if places.count(place) > 1}
-    if repeated:
-        raise ValueError(f"valve {min(repeated)} is named twice: name each valve once")
-    for place in places:
-        validate_namespace(place)
+    places = _places(host.get_parameter(_VALVES.name).value)
     if processes := host.get_parameter(_PROCESSES.name).value:
         identify = ProcessWorker("identify", processes, compile_methods)
         workers = workers._replace(identify=identify)
     services = replace(_PARAMETER_SERVICES, default=len(places) <= _MANY)
     declare_parameters(host, (services,))
-    context = host.context
+    context, faults = host.context, dict[str, str]()
     for number, place in enumerate(places):
         if number and number % _TOGETHER == 0:
             context = Context()
             join_graph(arguments, context)
-        identifier = Identifier(
-            workers,
-            place,
-            number_topics=len(places) <= _FEW,
-            context=context,
-            start_parameter_services=host.get_parameter(services.name).value,
-        )
+        try:
+            with bugs_reported(host, *WRONG_REQUESTS):
+                identifier = Identifier(
+                    workers,
+                    place,
+                    number_topics=len(places) <= _FEW,
+                    context=context,
+                    start_parameter_services=host.get_parameter(services.name).value,
+                )
+        except (*WRONG_REQUESTS, InternalError, RefusalError) as error:
+            faults[place] = " ".join(str(error).split())
+            yield FaultyValve(place, faults[place], context)
+            continue
         yield identifier
         if identifier.get_namespace() != place:
             raise ValueError(
                 f"the namespace {place} is remapped to {identifier.get_namespace()}: start without "
                 "__ns, the valves have namespaces of their own"
             )
+    lines = [f"{place}/identifier: {problem}" for place, problem in faults.items()]
+    if len(faults) == len(places):
+        raise ValueError("; ".join(lines))
+    for line in lines:
+        host.get_logger().error(
+            f"cannot start {line}: correct it and start again; the other valves are watched"
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -39,6 +39,7 @@ _IDENTIFIER_ONLY = (
     "error_ratio",
     "low_ratio",
     "save_folder",
+    "save_megabytes",
     "report_folder",
     "history_file",
     "history_url",

@@ -3,6 +3,7 @@
 from valve_friction_ros.streams.arrivals import COLUMNS, Arrivals, Kind, rows_arrived
 from valve_friction_ros.streams.data_quality import DataFault, DataQuality, FaultKind
 from valve_friction_ros.streams.dates import DAY, utc, utc_day, utc_minute, utc_second
+from valve_friction_ros.streams.losses import LossCounter, Losses
 from valve_friction_ros.streams.record_buffer import (
     Intake,
     RecordBuffer,
@@ -22,6 +23,8 @@ __all__ = [
     "FaultKind",
     "Intake",
     "Kind",
+    "LossCounter",
+    "Losses",
     "RecordBuffer",
     "SampleFault",
     "Samples",

@@ -88,6 +88,27 @@ class Snapshot(NamedTuple):
         counts = Counter(rejection.cause for rejection in self.rejections)
         return "; ".join(f"{cause} ({count} samples)" for cause, count in counts.items())
 
+    def thinned(self, most: int) -> "tuple[Snapshot, int]":
+        """Return a snapshot of `most` samples of each signal at most, and how many make a mean.
+
+        Where a signal has more, each `n` of its samples that follow each other are replaced by
+        their mean (`Samples.averaged`), `n` the least number that suffices; of both signals the
+        time that both cover is left. A signal that has no more stays as it is. Where both have the
+        same stamps, so have their means.
+        """
+        pressure, position = self.pressure, self.position
+        longest = max(pressure.stamps.size, position.stamps.size)
+        if longest <= most or not min(pressure.stamps.size, position.stamps.size):
+            return self, 1
+        begin = max(int(pressure.stamps[0]), int(position.stamps[0]))
+        end = min(int(pressure.stamps[-1]), int(position.stamps[-1]))
+        count = -(-longest // most)
+        signals = (
+            one.within(begin, end).averaged(count if one.stamps.size > most else 1)
+            for one in (pressure, position)
+        )
+        return self._replace(pressure=next(signals), position=next(signals)), count
+
     def recording(self) -> Recording:
         """Put both signals on one time grid.
 

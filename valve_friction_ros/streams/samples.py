@@ -33,6 +33,29 @@ class Samples(NamedTuple):
             np.concatenate([np.empty(0), *(part.values for part in parts)]),
         )
 
+    def within(self, begin: int, end: int) -> "Samples":
+        """Return those from `begin` to `end`, ns, both included."""
+        first = int(np.searchsorted(self.stamps, begin))
+        last = int(np.searchsorted(self.stamps, end, side="right"))
+        return Samples(self.stamps[first:last], self.values[first:last])
+
+    def averaged(self, count: int) -> "Samples":
+        """Return the means of each `count` samples that follow each other, at their mean stamps.
+
+        A motion at constant speed keeps its values at its times, so no signal is late against
+        another. The latest samples that do not fill a mean are left out, and so is a mean over more
+        than twice the time that so many samples take: it spans a pause.
+        """
+        means = self.stamps.size // count
+        if count <= 1 or not means:
+            return self
+        stamps = self.stamps[: means * count].reshape(means, count)
+        values = self.values[: means * count].reshape(means, count)
+        period = int(np.median(np.diff(self.stamps)))
+        is_whole = stamps[:, -1] - stamps[:, 0] <= 2 * count * period
+        since = stamps[:, 0] + (stamps - stamps[:, :1]).sum(axis=1) // count
+        return Samples(since[is_whole], values.mean(axis=1)[is_whole])
+
 
 def _array(numbers: range) -> NDArray[np.int64]:
     return np.arange(numbers.start, numbers.stop, numbers.step, dtype=np.int64)

@@ -7,8 +7,9 @@ from typing import Any
 from valve_friction_ros.dashboard import DashboardOptions
 from valve_friction_ros.dashboard.access import Access, accounts_from
 from valve_friction_ros.history import server_from
+from valve_friction_ros.nodes.plumbing.output_folder import folder_of
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec
-from valve_friction_ros.records.data_folder import data_folder, history_file
+from valve_friction_ros.records.data_folder import history_file
 
 __all__ = ["PARAMETERS", "options_from"]
 
@@ -101,9 +102,6 @@ PARAMETERS = (
 def options_from(values: Mapping[str, Any]) -> DashboardOptions:
     """Return the options that parameters give; raises ValueError or OSError for wrong ones."""
 
-    def folder(name: str, usual: str) -> Path:
-        return Path(values[name]) if values[name] else data_folder() / usual
-
     def file(name: str) -> Path | None:
         return Path(values[name]).expanduser() if values[name] else None
 
@@ -119,9 +117,9 @@ def options_from(values: Mapping[str, Any]) -> DashboardOptions:
         ),
         port=values["port"],
         history=server_from(values["history_url"]) or file("history_file"),
-        reports=folder("report_folder", "reports").expanduser(),
-        bags=folder("save_folder", "saved").expanduser(),
-        alarms=folder("alarm_folder", "alarms").expanduser(),
+        reports=folder_of(values["report_folder"], "reports"),
+        bags=folder_of(values["save_folder"], "saved"),
+        alarms=folder_of(values["alarm_folder"], "alarms"),
         time_zone=values["time_zone"],
         silence=values["silence"],
     )

@@ -33,7 +33,7 @@ from valve_friction_ros.nodes.identifier.service_parameters import (
     ALARM_RECORDINGS,
 )
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
-from valve_friction_ros.nodes.plumbing.output_folder import output_folder, valve_name
+from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc_second
@@ -78,6 +78,8 @@ class AlarmRecorder:
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
         self._reports, self._worker = reports, worker
+        given = node.get_parameter(ALARM_FOLDER.name).value
+        self._folder = OutputFolder(given, "alarms", "an alarm's recording")
         self._level: Level | None = None
         self._rise: _Rise | None = None
         self._last_rise: tuple[Level, float] | None = None
@@ -149,7 +151,6 @@ class AlarmRecorder:
     ) -> Future[AlarmRecording]:
         """Have the worker write a bag, which takes the place of the first one of the rise."""
         node = self._node
-        given = node.get_parameter(ALARM_FOLDER.name).value
         most, room = self._bounds()
         valve = valve_name(node)
         name = recording_name(valve, rise.time, rise.level)
@@ -158,7 +159,7 @@ class AlarmRecorder:
         def write_bag() -> AlarmRecording:
             # The worker has done it: it does one thing after the other.
             before = None if first is None or first.exception() else first.result().path
-            with output_folder(given, "alarms", "an alarm's recording") as folder:
+            with self._folder.opened() as folder:
                 remove_oldest(folder, valve, most - (before is None), room, new=before)
                 path = write(folder, name, samples, before)
                 size = size_of(path)
@@ -183,6 +184,8 @@ class AlarmRecorder:
 
         def write_page() -> str | None:
             try:
+                if page.is_symlink():  # it would be followed
+                    page.unlink()
                 write(page)
                 if size_of(path) > room:
                     page.unlink()

@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from valve_friction_ros.alerts import Alert, AlertSender
+from valve_friction_ros.alerts import URL_VARIABLE, Alert, AlertSender, Secrets, Webhook
 from valve_friction_ros.health import Diagnosis, Finding, Level, StatusSignal, leading_ratio
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.service_parameters import (
     WEBHOOK_PERIOD,
     WEBHOOK_URL,
-    webhook_from,
 )
-from valve_friction_ros.nodes.plumbing.parameters import values_of
 
 __all__ = ["Alerts"]
 
@@ -32,10 +30,24 @@ class Alerts:
     """
 
     def __init__(
-        self, node: Node, sender: AlertSender, history: HistoryWriter, level: Level
+        self,
+        node: Node,
+        sender: AlertSender,
+        history: HistoryWriter,
+        level: Level,
+        webhook: Webhook | None,
     ) -> None:
-        self._node, self._history = node, history
+        self._node, self._history, self._webhook = node, history, webhook
         self._outbox = sender.outbox()
+        self._outbox.address(webhook)
+        if (
+            webhook is not None
+            and (all_of := Secrets.from_environment()).going_to(webhook) != all_of
+        ):
+            node.get_logger().warning(
+                f"no token is sent to {webhook}, as that of the environment goes only to the "
+                f"address of {URL_VARIABLE}: name the address there, not by {WEBHOOK_URL.name}"
+            )
         self._kept = history.told_level()
         self._told = level if self._kept is None else self._kept
         self._told_at = -math.inf if self._kept is None else time.monotonic()
@@ -49,20 +61,16 @@ class Alerts:
 
         What is wrong with the alerts themselves raises the level afterwards, and is not posted.
         """
-        values = values_of(self._node, (WEBHOOK_URL, WEBHOOK_PERIOD))
-        webhook, period = webhook_from(values), values[WEBHOOK_PERIOD.name]
-        self._outbox.address(webhook)
-        level = Level(status.level[0])
-        if webhook is None:
-            self._told, self._told_at = level, -math.inf
+        if self._webhook is None:
             return
+        level, period = Level(status.level[0]), self._node.get_parameter(WEBHOOK_PERIOD.name).value
         if self._kept is None:
             self._keep(self._told)
         now = time.monotonic()
         if level != self._told and now - self._told_at >= period:
             self._outbox.put(self._alert(status, level, leading_ratio(diagnosis, findings, level)))
             self._told, self._told_at = level, now
-        self._mark(status, str(webhook))
+        self._mark(status, str(self._webhook))
 
     def _keep(self, level: Level) -> None:
         """Keep the level that was told last, unless it is kept."""

@@ -1,5 +1,6 @@
 """``~/save``: the identifier's buffer as a bag."""
 
+import shutil
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -9,34 +10,57 @@ from rclpy.node import Node
 from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import Valve
-from valve_friction_ros.nodes.identifier.parameters import SAVE_FOLDER
+from valve_friction_ros.nodes.identifier.parameters import SAVE_FOLDER, SAVE_MEGABYTES
 from valve_friction_ros.nodes.plumbing.background import done_in
-from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+from valve_friction_ros.nodes.plumbing.output_folder import (
+    OutputFolder,
+    file_name,
+    require_room,
+    valve_name,
+)
 from valve_friction_ros.records.bags.libraries import bag_libraries
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.records.valve_keys import SETTINGS
 from valve_friction_ros.streams import Snapshot
 
-__all__ = ["bag_writer", "saved_bag"]
+__all__ = ["BagSaver", "bag_writer"]
 
 
-async def saved_bag(
-    node: Node, monitor: FrictionMonitor, names: StreamNames, worker: ThreadPoolExecutor
-) -> Path:
-    """Write what the buffer holds now as a bag, in a thread of `worker`; return its path.
+class BagSaver:
+    """Writes what the buffer holds as bags, as long as they have room.
 
-    Raises RefusalError if it cannot be written, or the libraries that bags need are not there.
+    Raises ValueError if the folder cannot be used.
     """
-    given = node.get_parameter(SAVE_FOLDER.name).value
-    name = file_name(node, node.get_clock().now().nanoseconds)
-    snapshot, settings = monitor.input()
-    write_into = bag_writer(node, settings.valve, names)
 
-    def write() -> Path:
-        with output_folder(given, "saved", "a bag") as folder:
-            return write_into(folder, name, snapshot, None)
+    def __init__(self, node: Node, monitor: FrictionMonitor) -> None:
+        self._node, self._monitor = node, monitor
+        given = node.get_parameter(SAVE_FOLDER.name).value
+        self._folder = OutputFolder(given, "saved", "a bag")
 
-    return await done_in(worker, write)
+    async def saved(self, names: StreamNames, worker: ThreadPoolExecutor) -> Path:
+        """Write what the buffer holds now, in a thread of `worker`; return the path of the bag.
+
+        Raises RefusalError if it cannot be written or has no room, or the libraries that bags need
+        are not there.
+        """
+        node, valve = self._node, valve_name(self._node)
+        name = file_name(node, node.get_clock().now().nanoseconds)
+        room = 1e6 * node.get_parameter(SAVE_MEGABYTES.name).value
+        snapshot, settings = self._monitor.input()
+        write_into = bag_writer(node, settings.valve, names)
+
+        def write() -> Path:
+            with self._folder.opened() as folder:
+                require_room(folder, valve, room)
+                path = write_into(folder, name, snapshot, None)
+                try:
+                    require_room(folder, valve, room, is_there=True)
+                except RefusalError:
+                    shutil.rmtree(path)
+                    raise
+                return path
+
+        return await done_in(worker, write)
 
 
 def bag_writer(

@@ -74,7 +74,12 @@ class EvidenceWatch:
     @property
     def problems(self) -> list[str]:
         """Why the evidence does not follow the valve; empty if it does."""
-        return [one for one in (self._error, self._ledger.problem) if one]
+        return [self._ledger.problem] if self._ledger.problem else []
+
+    @property
+    def failures(self) -> list[str]:
+        """The bug in the latest combination; empty if there was none."""
+        return [self._error] if self._error else []
 
     async def as_baseline(self) -> Baseline:
         """Return the sliding friction of the moves as baseline; raises RefusalError.

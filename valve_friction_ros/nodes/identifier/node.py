@@ -23,7 +23,7 @@ from valve_friction_ros.health import (
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
 from valve_friction_ros.nodes.identifier.alerts import Alerts
-from valve_friction_ros.nodes.identifier.bag_service import saved_bag
+from valve_friction_ros.nodes.identifier.bag_service import BagSaver
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
@@ -44,9 +44,11 @@ from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
+from valve_friction_ros.nodes.identifier.service_parameters import WEBHOOK_URL, webhook_from
 from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     estimate_status,
+    fail,
     friction_status,
     stuck_status,
 )
@@ -73,6 +75,7 @@ __all__ = ["PARAMETERS", "Identifier", "main"]
 
 _DIAGNOSTIC_PERIOD = 1.0
 _CLEARED = "the buffer is cleared as stamps go back"
+_TELLING = "diagnostics"
 
 
 class Identifier(PolledNode):
@@ -101,14 +104,29 @@ class Identifier(PolledNode):
         **named: Any,
     ) -> None:
         super().__init__("identifier", namespace=namespace, **named)
+        try:
+            self._build(workers, number_topics)
+        except BaseException:
+            self._abandon()
+            raise
+
+    def _abandon(self) -> None:
+        """Leave the graph, and the history to others, where the node cannot start."""
+        if (history := getattr(self, "_history", None)) is not None:
+            history.close()
+        self.destroy_node()
+
+    def _build(self, workers: Workers, number_topics: bool) -> None:
         own = replace(NUMBER_TOPICS, default=number_topics)
         declare_parameters(self, [own if one is NUMBER_TOPICS else one for one in PARAMETERS])
         warn_of_columns(self)
         values = values_of(self, CHANGEABLE)
         require_valid(values)
         reject_invalid(self, CHANGEABLE, require_valid)
+        webhook = webhook_from(self.get_parameter(WEBHOOK_URL.name).value)
         self._workers = workers
         self._monitor = FrictionMonitor(monitor_settings(values))
+        self._bags = BagSaver(self, self._monitor)
         tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         joint = self.get_parameter(JOINT.name).value
@@ -150,7 +168,7 @@ class Identifier(PolledNode):
             self._usage,
             self._response,
         )
-        self._alerts = Alerts(self, workers.alerts, self._history, self._level())
+        self._alerts = Alerts(self, workers.alerts, self._history, self._level(), webhook)
         self.add_post_set_parameters_callback(self._take_parameters)
         for name, work, failure in (
             ("identify", self._identify, ""),
@@ -163,7 +181,7 @@ class Identifier(PolledNode):
         ):
             create_trigger_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
-        self.create_timer(_DIAGNOSTIC_PERIOD, self._publish_diagnostics, clock=steady)
+        self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
         self._jump_handle = self.get_clock().create_jump_callback(
             JumpThreshold(
                 min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True
@@ -222,7 +240,7 @@ class Identifier(PolledNode):
         self._quality.see(arrivals, intake, time.monotonic(), now or None, tolerance)
 
     def _take_parameters(self, changes: list[Parameter]) -> None:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
         self._quality.valve = self._monitor.settings.valve
         self._usage.follow_parameters()
@@ -232,7 +250,7 @@ class Identifier(PolledNode):
 
     def _on_time_jump(self, jump: TimeJump) -> None:
         cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._quality.forget_stamps()
         self._evidence.forget_samples()
@@ -240,7 +258,7 @@ class Identifier(PolledNode):
 
     async def _identify(self) -> str:
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         record, refused = self._identification.record(), None
         try:
             await self._identification.run(record)
@@ -269,7 +287,7 @@ class Identifier(PolledNode):
 
         A refusal is kept only where its record has changed what is found on the valve.
         """
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         before, refused = self._monitor.findings, None
         if self._identification.has_nothing_new:
             self._schedule.stall()
@@ -290,8 +308,8 @@ class Identifier(PolledNode):
         self._publish_diagnostics()
 
     async def _save(self) -> str:
-        self._inputs.take()
-        return str(await saved_bag(self, self._monitor, self._inputs.names, self._workers.files))
+        self._inputs.take(is_all=True)
+        return str(await self._bags.saved(self._inputs.names, self._workers.files))
 
     async def _report(self) -> str:
         return str(await self._reports.written(self._workers.files))
@@ -307,13 +325,13 @@ class Identifier(PolledNode):
         return answer
 
     async def _clear(self) -> str:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._monitor.buffer.clear("on request")
         self._evidence.forget_samples()
         return "the buffer is empty; estimate and baseline are kept"
 
     async def _reset_usage(self) -> str:
-        self._inputs.take()
+        self._inputs.take(is_all=True)
         self._evidence.renew()
         self._response.renew()
         self._monitor.renew(self.get_clock().now().nanoseconds)
@@ -357,6 +375,21 @@ class Identifier(PolledNode):
         """Return the most severe level of the diagnosis of friction and of what else is found."""
         return max([self._monitor.diagnosis().level, *(one.level for one in findings)])
 
+    def _tell(self) -> None:
+        """Publish the diagnostics; a bug in them is published in their stead."""
+        with self.guarded(_TELLING):
+            self._publish_diagnostics()
+        if (bug := self.failure_of(_TELLING)) is None:
+            return
+        status = self.stuck_status(bug)
+        self._estimate_topic.publish(status)
+        self._publish(status)
+
+    def _publish(self, status: DiagnosticStatus) -> None:
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics_publisher.publish(message)
+
     def _publish_diagnostics(self) -> None:
         self._inputs.take()
         self._inputs.follow_publishers()
@@ -382,7 +415,7 @@ class Identifier(PolledNode):
             self._monitor,
             now.nanoseconds,
             [
-                *filter(None, [self.poll_failure, self.overdue()]),
+                *filter(None, [self.overdue()]),
                 *self._evidence.problems,
                 *unusable,
                 *filter(None, [self._monitor.refusals_problem]),
@@ -400,14 +433,14 @@ class Identifier(PolledNode):
             findings,
             is_watched=not unusable,
         )
+        if failures := (*self.failures, *self._evidence.failures):
+            fail(status, failures)
         self._alerts.follow(status, self._monitor.diagnosis(), findings)
         self._level_log.follow(status)
         self._fault_log.follow(faults, time.monotonic())
         if self._readiness.is_slow:
             status.message += f"; {self._readiness.problem}"
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = now.to_msg()
-        self._diagnostics_publisher.publish(message)
+        self._publish(status)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

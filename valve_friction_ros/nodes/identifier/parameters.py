@@ -16,11 +16,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     require_valve_units,
 )
-from valve_friction_ros.nodes.identifier.service_parameters import (
-    SERVICE_PARAMETERS,
-    VALVE_LIMITS,
-    webhook_from,
-)
+from valve_friction_ros.nodes.identifier.service_parameters import SERVICE_PARAMETERS, VALVE_LIMITS
 from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, optional
 from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT, VALVE_PARAMETERS, valve_from
 from valve_friction_ros.records.data_folder import history_file
@@ -40,6 +36,7 @@ __all__ = [
     "PERIOD",
     "REPORT_FOLDER",
     "SAVE_FOLDER",
+    "SAVE_MEGABYTES",
     "VALVE_TAG",
     "baseline_from",
     "monitor_settings",
@@ -70,7 +67,11 @@ HISTORY_URL = ParameterSpec(
     read_only=True,
 )
 HISTORY_DAYS = ParameterSpec(
-    "history_days", 1100.0, "Time for which they are kept [days]; 0: for ever", (0.0, 36525.0)
+    "history_days",
+    1100.0,
+    "Time for which they are kept [days]; 0: for ever",
+    (0.0, 36525.0),
+    read_only=True,
 )
 INPUT_TIMEOUT = ParameterSpec(
     "input_timeout", 3.0, "Silence of an input after which it is reported [s]", (0.1, 86400.0)
@@ -102,13 +103,23 @@ SAVE_FOLDER = ParameterSpec(
     "save_folder",
     "",
     "Folder that ~/save writes bags into [-]; empty: valve_friction_ros/saved under ROS_HOME, or "
-    "under ~/.ros",
+    "under ~/.ros; a relative one is in valve_friction_ros there",
+    read_only=True,
+)
+SAVE_MEGABYTES = ParameterSpec(
+    "save_megabytes",
+    1000.0,
+    "Room that the bags of ~/save of a valve may take [MB], and as much the pages of ~/report; "
+    "when it is full, both refuse",
+    (0.001, 1e6),
+    read_only=True,
 )
 REPORT_FOLDER = ParameterSpec(
     "report_folder",
     "",
     "Folder that ~/report writes pages into [-]; empty: valve_friction_ros/reports under ROS_HOME, "
-    "or under ~/.ros",
+    "or under ~/.ros; a relative one is in valve_friction_ros there",
+    read_only=True,
 )
 NUMBER_TOPICS = ParameterSpec(
     "number_topics",
@@ -124,7 +135,7 @@ PERIOD = ParameterSpec(
     (0.0, 31_557_600.0),
 )
 
-CHANGEABLE = (
+PARAMETERS = (
     *VALVE_PARAMETERS,
     ParameterSpec(
         "window", 60.0, "Length of the record that is kept and identified [s]", (0.1, 86400.0)
@@ -200,14 +211,22 @@ CHANGEABLE = (
         (0.0, 1.0),
     ),
     SAVE_FOLDER,
+    SAVE_MEGABYTES,
     REPORT_FOLDER,
     HISTORY_DAYS,
     PERIOD,
     *SERVICE_PARAMETERS,
+    VALVE_TAG,
+    HISTORY_FILE,
+    HISTORY_URL,
+    JOINT,
+    NUMBER_TOPICS,
 )
-"""Those that can be changed while the node runs."""
 
-PARAMETERS = (*CHANGEABLE, VALVE_TAG, HISTORY_FILE, HISTORY_URL, JOINT, NUMBER_TOPICS)
+CHANGEABLE = tuple(one for one in PARAMETERS if not one.read_only)
+"""Those that can be changed while the node runs: none that is an address, a folder, or room.
+
+Whoever reaches the ROS graph can change them."""
 
 
 def monitor_settings(values: Mapping[str, Any]) -> MonitorSettings:
@@ -245,7 +264,6 @@ def require_valid(values: Mapping[str, Any]) -> None:
     settings = monitor_settings(values)
     require_valve_units(settings.valve, settings.identification.fixed)
     baseline_from(values)
-    webhook_from(values)
     for one in CHANGEABLE:
         if one.choices and values[one.name] not in one.choices:
             raise ValueError(

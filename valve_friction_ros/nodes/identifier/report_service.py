@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from itertools import count
 from pathlib import Path
 
 from rclpy.node import Node
@@ -11,19 +10,28 @@ from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.history import HistoryError, ValveHistory
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER
+from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER, SAVE_MEGABYTES
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.memory import give_back_memory
-from valve_friction_ros.nodes.plumbing.output_folder import file_name, output_folder
+from valve_friction_ros.nodes.plumbing.output_folder import (
+    OutputFolder,
+    file_name,
+    free_path,
+    require_room,
+    valve_name,
+)
 from valve_friction_ros.streams import utc
 
 __all__ = ["ReportWriter"]
 
 
 class ReportWriter:
-    """Writes pages on the last result, with what is known of the valve beside it."""
+    """Writes pages on the last result, with what is known of the valve beside it.
+
+    Raises ValueError if the folder cannot be used.
+    """
 
     def __init__(
         self,
@@ -35,21 +43,28 @@ class ReportWriter:
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
         self._usage, self._response = usage, response
+        given = node.get_parameter(REPORT_FOLDER.name).value
+        self._folder = OutputFolder(given, "reports", "a report")
 
     async def written(self, worker: ThreadPoolExecutor) -> Path:
         """Write a page on the last result, in a thread of `worker`; return its path.
 
-        Raises RefusalError if there is no result, or the page cannot be written.
+        Raises RefusalError if there is no result, or the page cannot be written or has no room.
         """
         write_page = self.of_now()
-        given = self._node.get_parameter(REPORT_FOLDER.name).value
-        name = file_name(self._node, self._monitor.stamp or 0)
+        valve, name = valve_name(self._node), file_name(self._node, self._monitor.stamp or 0)
+        room = 1e6 * self._node.get_parameter(SAVE_MEGABYTES.name).value
 
         def write() -> Path:
-            with output_folder(given, "reports", "a report") as folder:
-                folder.mkdir(parents=True, exist_ok=True)
-                path = _free_name(folder, name)
+            with self._folder.opened() as folder:
+                require_room(folder, valve, room)
+                path = free_path(folder, name, ".html")
                 write_page(path)
+                try:
+                    require_room(folder, valve, room, is_there=True)
+                except RefusalError:
+                    path.unlink()
+                    raise
                 return path
 
         return await done_in(worker, write)
@@ -108,9 +123,3 @@ def _read(history: HistoryWriter) -> tuple[ValveHistory | None, list[str]]:
         return history.read(), []
     except HistoryError as error:
         return None, [f"no trend, as the history cannot be read: {error}"]
-
-
-def _free_name(folder: Path, name: str) -> Path:
-    """Return the first file of this name, or with a number after it, that is not there."""
-    names = (f"{name}.html" if number == 1 else f"{name}_{number}.html" for number in count(1))
-    return next(path for path in map(folder.joinpath, names) if not path.exists())

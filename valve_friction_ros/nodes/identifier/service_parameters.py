@@ -65,7 +65,8 @@ WEBHOOK_URL = ParameterSpec(
     "",
     "Address that each change of the level is posted to [-], https, or http to this machine; "
     "empty: that of the environment, VALVE_FRICTION_WEBHOOK_URL, or nowhere. No secret belongs "
-    "into it: everybody on the ROS graph can read it",
+    "into it: everybody on the ROS graph can read it. No token is sent there",
+    read_only=True,
 )
 WEBHOOK_PERIOD = ParameterSpec(
     "webhook_period",
@@ -104,13 +105,22 @@ ALARM_FOLDER = ParameterSpec(
     "alarm_folder",
     "",
     "Folder of these recordings [-]; empty: valve_friction_ros/alarms under ROS_HOME, or under "
-    "~/.ros",
+    "~/.ros; a relative one is in valve_friction_ros there",
+    read_only=True,
 )
 ALARM_RECORDINGS = ParameterSpec(
-    "alarm_recordings", 20, "Recordings of a valve that are kept, the latest [-]", (1, 100_000)
+    "alarm_recordings",
+    20,
+    "Recordings of a valve that are kept, the latest [-]",
+    (1, 100_000),
+    read_only=True,
 )
 ALARM_MEGABYTES = ParameterSpec(
-    "alarm_megabytes", 200.0, "Room that the recordings of a valve may take [MB]", (0.001, 1e6)
+    "alarm_megabytes",
+    200.0,
+    "Room that the recordings of a valve may take [MB]",
+    (0.001, 1e6),
+    read_only=True,
 )
 ALARM_PAUSE = ParameterSpec(
     "alarm_pause",
@@ -158,12 +168,11 @@ def response_limits(values: Mapping[str, Any]) -> ResponseLimits:
     return ResponseLimits(deviation / 100, dead_time, t86)
 
 
-def webhook_from(values: Mapping[str, Any]) -> Webhook | None:
-    """Return the webhook of parameter values, else of the environment; None for none.
+def webhook_from(url: str) -> Webhook | None:
+    """Return the webhook of the parameter's value, else of the environment; None for none.
 
     Raises ValueError if its address, or the token in the environment, cannot be used.
     """
-    url = values[WEBHOOK_URL.name]
     webhook = Webhook.at(url) if url else Webhook.from_environment()
     if webhook is not None:
         Secrets.from_environment()

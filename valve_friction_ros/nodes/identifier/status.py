@@ -22,10 +22,16 @@ from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
 from valve_friction_ros.streams import utc, utc_day, utc_minute
 
-__all__ = ["estimate_status", "friction_status", "stuck_status", "trend_values"]
+__all__ = ["estimate_status", "fail", "friction_status", "stuck_status", "trend_values"]
 
 
-_EVIDENCE_UNITS = {"threshold": " [m/s]", "samples": "", "sigma": " [N]", "r_squared": ""}
+_EVIDENCE_UNITS = {
+    "threshold": " [m/s]",
+    "samples": "",
+    "sigma": " [N]",
+    "r_squared": "",
+    "averaged_samples": "",
+}
 
 
 def _result_values(shown: Mapping[str, Any], band: float, half_width: float) -> dict[str, str]:
@@ -198,9 +204,18 @@ def friction_status(
 
 
 def stuck_status(name: str, hardware_id: str, problem: str) -> DiagnosticStatus:
-    """Compose the status of a valve whose node is stuck."""
+    """Compose the status of a valve whose node is stuck, fails or cannot start."""
     values = {"estimate_valid": "false", "NE 107": StatusSignal.CHECK_FUNCTION.value}
     return _status(Level.ERROR, name, hardware_id, problem, values)
+
+
+def fail(status: DiagnosticStatus, failures: Sequence[str]) -> None:
+    """Turn a status into that of a valve whose node fails; what it says stays behind the cause."""
+    status.level = bytes([Level.ERROR])
+    status.message = "; ".join([*failures, status.message])
+    for entry in status.values:
+        if entry.key == "NE 107":
+            entry.value = StatusSignal.CHECK_FUNCTION.value
 
 
 def _status(

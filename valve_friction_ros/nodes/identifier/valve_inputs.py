@@ -13,7 +13,7 @@ from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscrip
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, readable
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.streams import Arrivals, Signal
+from valve_friction_ros.streams import Arrivals, Losses, Signal
 
 __all__ = ["ValveInputs"]
 
@@ -24,6 +24,13 @@ _PLAYER = "rosbag2_player"
 """Name of the node of `ros2 bag play`."""
 
 
+_LOSS_LIMIT = 1e-3
+"""Share of lost messages that is worth a warning. Chosen: single samples are interpolated, and a
+network may lose one now and then."""
+_LOSS_IS_OVER = 5.0
+"""Time without a loss, s, after which losses are over."""
+
+
 class _Input:
     """One topic: its subscription, and the watch over it."""
 
@@ -32,13 +39,41 @@ class _Input:
     ) -> None:
         self._node = node
         self._polled = PolledSubscription(node, kind, topic, quality, raw)
+        self._held_back: list[TakenMessage] = []
         self.watch = InputWatch(node, self._polled.subscription)
 
-    def take(self) -> list[TakenMessage]:
-        messages = self._polled.take()
+    @property
+    def has_more(self) -> bool:
+        return self._polled.has_more
+
+    @property
+    def losses(self) -> Losses:
+        return self._polled.losses
+
+    def take(self, is_all: bool) -> list[TakenMessage]:
+        messages = self._polled.take(is_all)
         if messages:
             self.watch.arrived()
-        return messages
+        held_back, self._held_back = self._held_back, []
+        return held_back + messages
+
+    def until(self, taken: list[TakenMessage], received: int) -> list[TakenMessage]:
+        """Return what was received until a time, ns; the rest is taken the next time."""
+        early = [one for one in taken if one.received <= received]
+        self._held_back = [one for one in taken if one.received > received]
+        return early
+
+    def loss_problem(self) -> str | None:
+        """Say which share of the messages was lost, if it is worth a warning, else None."""
+        losses = self.losses
+        if losses.silence > _LOSS_IS_OVER or losses.share < _LOSS_LIMIT:
+            return None
+        published = losses.recently_lost + losses.recently_taken
+        return (
+            f"{100 * losses.share:.2g} % of the messages on {self.watch.topic} were lost in the "
+            f"last minute ({losses.recently_lost} of {published}): they come faster than this "
+            "process takes them, or the network drops them: publish fewer, or blocks on ~/samples"
+        )
 
     def follow_publishers(self) -> None:
         if self.watch.silence() > _SILENCE and self._polled.follow_publishers():
@@ -77,11 +112,27 @@ class ValveInputs:
     def values(self) -> dict[str, str]:
         """Return the values of the diagnostic: where the samples come from."""
         pressure, stem, joint = self.names
-        return {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
+        values = {"pressure_topic": pressure, "stem_topic": stem, "stem_joint": joint}
+        for name, losses in self.losses().items():
+            values[f"{name} lost [messages]"] = str(losses.lost)
+            values[f"{name} lost [%]"] = f"{100 * losses.share:.3g}"
+        return values
 
-    def take(self) -> None:
-        """Take the samples that have arrived."""
-        pressures, stems = self._pressure.take(), self._stem.take()
+    def losses(self) -> dict[str, Losses]:
+        """Return the messages that were lost, by what they hold; only where there are any."""
+        inputs = {"pressures": self._pressure, "positions": self._stem, "blocks": self._blocks}
+        return {name: one.losses for name, one in inputs.items() if one.losses.lost}
+
+    def take(self, is_all: bool = False) -> None:
+        """Take the samples that have arrived: a fair share of a turn, or `is_all` that are there.
+
+        Where one signal has more than its share, the other waits for it.
+        """
+        pressures, stems = self._pressure.take(is_all), self._stem.take(is_all)
+        taken = ((self._pressure, pressures), (self._stem, stems))
+        full = [messages[-1].received for one, messages in taken if one.has_more and messages]
+        if full and not is_all:
+            pressures, stems = (one.until(messages, min(full)) for one, messages in taken)
         if pressures or stems:
             try:
                 arrivals = arrivals_of(pressures, stems, self._joint)
@@ -90,7 +141,7 @@ class ValveInputs:
                 stems = self._readable(Signal.POSITION, stems, JointState)
                 arrivals = arrivals_of(pressures, stems, self._joint)
             self._hand_on(arrivals)
-        if blocks := [taken.message for taken in self._blocks.take()]:
+        if blocks := [taken.message for taken in self._blocks.take(is_all)]:
             self._take_blocks(blocks)
 
     def _readable(
@@ -142,7 +193,8 @@ class ValveInputs:
         """
         found = [] if self._bad_block is None else [self._bad_block]
         used = (self._blocks,) if self._is_fed_by_blocks() else (self._pressure, self._stem)
-        problems = (one.watch.problem(timeout) for one in used)
+        problems = [one.watch.problem(timeout) for one in used]
+        problems += [one.loss_problem() for one in (self._pressure, self._stem, self._blocks)]
         return found + [problem for problem in problems if problem is not None]
 
     def _is_fed_by_blocks(self) -> bool:

@@ -2,6 +2,7 @@
 
 import contextlib
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -67,15 +68,13 @@ class PolledNode(Node):
     ----------
     last_heard : float
         When a message of its streams was taken last, s of the monotonic clock; at first its start.
-    poll_failure : str or None
-        The bug in the latest work, if there was one.
     """
 
     def __init__(
         self, *arguments: Any, start_parameter_services: bool = True, **named: Any
     ) -> None:
         self.last_heard = time.monotonic()
-        self.poll_failure: str | None = None
+        self._failures: dict[str, str] = {}
         self._tells_parameters = start_parameter_services
         super().__init__(
             *arguments,
@@ -109,15 +108,33 @@ class PolledNode(Node):
     def close(self) -> None:
         """Do what the node has to do at its end; called once, before any node is destroyed."""
 
-    def poll_guarded(self) -> None:
-        """Do the work that is due; a bug in it is logged, and costs no other node anything."""
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """The bugs in the latest work of the node, one line each; none once that work succeeds."""
+        return tuple(dict.fromkeys(self._failures.values()))
+
+    def failure_of(self, work: str) -> str | None:
+        """Return the bug in the latest work of this name; None if there was none."""
+        return self._failures.get(work)
+
+    @contextlib.contextmanager
+    def guarded(self, work: str) -> Iterator[None]:
+        """Keep a bug in some work to this node: it is logged once, and the process goes on.
+
+        `failures` has it until work of the same name succeeds.
+        """
         try:
-            with bugs_reported(self, known=self.poll_failure):
-                self.poll()
+            with bugs_reported(self, known=self._failures.get(work)):
+                yield
         except (InternalError, RefusalError) as error:
-            self.poll_failure = str(error)
+            self._failures[work] = str(error)
         else:
-            self.poll_failure = None
+            self._failures.pop(work, None)
+
+    def poll_guarded(self) -> None:
+        """Do the work that is due."""
+        with self.guarded("poll"):
+            self.poll()
 
     def overdue(self) -> str | None:
         """Say which work in another thread has not ended within its limit; None if there is none.
@@ -136,6 +153,8 @@ class PolledNode(Node):
 
 class TurnExecutor(SingleThreadedExecutor):
     """Runs what is ready and returns; it never waits in the middleware.
+
+    A bug in a callback costs the node that it belongs to, and no other.
 
     A wait of rclpy costs about 10 µs for each service of its nodes, and a look whether one has a
     request 2 µs. So the services of a `PolledNode` are no part of the wait: it is for the timers.
@@ -166,8 +185,6 @@ class TurnExecutor(SingleThreadedExecutor):
         self._take_requests()
         for task in self._answers:
             task()
-            if task.done():
-                task.result()  # raises what the callback has raised
 
     def _take_requests(self) -> bool:
         """Begin to answer the requests that have come; return whether there are any."""
@@ -175,15 +192,15 @@ class TurnExecutor(SingleThreadedExecutor):
         for node in self.get_nodes():
             for service in node.services:
                 if isinstance(service.callback_group, NeverReady):
-                    self._take_request_of(service)
+                    self._take_request_of(node, service)
         return len(self._answers) > before
 
-    def _take_request_of(self, service: Service) -> None:
+    def _take_request_of(self, node: Node, service: Service) -> None:
         # One at a time, as rclpy runs the newest of its tasks first.
         with service.handle:  # so that nothing destroys it meanwhile
             request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is not None:
-            self._answers.append(self.create_task(_answer, service, request, header))
+            self._answers.append(self.create_task(_answer, node, service, request, header))
 
     def _run_ready(self) -> None:
         """Run the tasks and the timers that are ready now."""
@@ -194,12 +211,20 @@ class TurnExecutor(SingleThreadedExecutor):
 
         with contextlib.suppress(TimeoutException, ShutdownException, ConditionReachedException):
             while True:
-                task, _, _ = self.wait_for_ready_callbacks(0.0, None, is_done)
+                task, entity, node = self.wait_for_ready_callbacks(0.0, None, is_done)
                 has_run = True
-                task()
-                task.result()  # raises what the callback has raised
+                with _kept_to(node, f"callback {id(entity)}"):
+                    task()
+                    task.result()  # raises what the callback has raised
 
 
-async def _answer(service: Service, request: object, header: object) -> None:
-    response = await await_or_execute(service.callback, request, service.srv_type.Response())
-    service.send_response(response, header)
+def _kept_to(node: Node | None, work: str) -> contextlib.AbstractContextManager[None]:
+    """Keep a bug in the work of a node to it, if it is a `PolledNode`."""
+    return node.guarded(work) if isinstance(node, PolledNode) else contextlib.nullcontext()
+
+
+async def _answer(node: Node, service: Service, request: object, header: object) -> None:
+    """Answer a request; one that meets a bug stays without an answer."""
+    with _kept_to(node, service.srv_name):
+        response = await await_or_execute(service.callback, request, service.srv_type.Response())
+        service.send_response(response, header)

@@ -18,12 +18,14 @@ from rclpy.subscription import Subscription
 
 from valve_friction_ros.nodes.plumbing.polled_node import NeverReady, PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
+from valve_friction_ros.streams import LossCounter, Losses
 
 __all__ = ["PolledSubscription", "TakenMessage"]
 
 
-_MOST = 100_000
-"""Messages that are taken at once, so that no flood of them holds up the node for ever."""
+_MOST = 3_000
+"""Messages that are taken in a turn: some 30 ms of work, so that a storm on one valve holds up the
+others no longer. At ten turns a second that is 30 kHz."""
 
 
 class TakenMessage(NamedTuple):
@@ -39,6 +41,11 @@ class PolledSubscription:
     Its history, depth and reliability can be overridden by ``qos_overrides.…`` parameters. The
     depth of `quality` must hold what arrives between two calls of `take`. With `raw` messages are
     taken as they came, serialised.
+
+    Attributes
+    ----------
+    has_more : bool
+        Whether the last call of `take` may have left some messages.
     """
 
     def __init__(
@@ -48,6 +55,8 @@ class PolledSubscription:
         self._kind, self._raw = kind, raw
         self._subscription = self._subscribed(topic, quality, qos_overrides())
         self._reliability = quality.reliability  # as overridden
+        self._counter = LossCounter()
+        self.has_more = False
 
     def _subscribed(
         self, topic: str, quality: QoSProfile, overrides: QoSOverridingOptions | None
@@ -89,17 +98,35 @@ class PolledSubscription:
         self._node.destroy_subscription(self._subscription)
         quality.reliability = wanted
         self._subscription = self._subscribed(topic, quality, None)
+        self._counter.forget()
         return True
 
-    def take(self) -> list[TakenMessage]:
-        """Take what has arrived, oldest first; what exceeds 100,000 messages waits for the next."""
+    def take(self, is_all: bool = False) -> list[TakenMessage]:
+        """Take what has arrived, oldest first.
+
+        What exceeds 3,000 messages waits for the next turn; with `is_all` all is taken that the
+        queue can have held at the call.
+        """
         kind, raw = self._subscription.msg_type, self._subscription.raw
+        most = max(_MOST, self._subscription.qos_profile.depth) if is_all else _MOST
         taken: list[TakenMessage] = []
+        numbers: list[int | None] = []
         handle = self._subscription.handle
         with handle:  # so that nothing destroys it meanwhile
-            while len(taken) < _MOST and (found := handle.take_message(kind, raw)) is not None:
+            while len(taken) < most and (found := handle.take_message(kind, raw)) is not None:
                 message, details = found
                 taken.append(TakenMessage(message, details["received_timestamp"]))
+                numbers.append(details.get("publication_sequence_number"))
         if taken:
-            self._node.last_heard = time.monotonic()
+            now = time.monotonic()
+            self._node.last_heard = now
+            known = [number for number in numbers if number is not None]
+            if len(known) == len(numbers):  # a middleware need not number them
+                self._counter.take(known, now)
+        self.has_more = len(taken) == most
         return taken
+
+    @property
+    def losses(self) -> Losses:
+        """The messages that were published and not taken."""
+        return self._counter.losses(time.monotonic())

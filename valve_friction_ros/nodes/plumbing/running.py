@@ -187,7 +187,8 @@ def _close(nodes: Sequence[Node], executors: Mapping[Context, TurnExecutor]) -> 
     """
     for node in nodes:
         if isinstance(node, PolledNode):
-            node.close()
+            with node.guarded("close"):
+                node.close()
     # An executor that still holds the node's entities would keep them alive.
     for executor in executors.values():
         executor.shutdown()
