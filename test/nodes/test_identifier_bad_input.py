@@ -220,6 +220,19 @@ def test_a_gap_is_refused_by_a_method_that_needs_an_unbroken_record(client, name
     identifies_the_next_record(client)
 
 
+def test_cleared_while_the_stem_moves(client):
+    """The first samples after `clear` are refused as too few, and the node's level stays."""
+    send(client)
+    assert client.identify_all(2 * len(RECORD)).success
+    level = client.statuses[-1][1].level
+    assert client.trigger("clear").success
+    send(client, slice(200, 203), stamps=STAMPS + 2 * round(RECORD.duration * SECOND))
+    response = client.identify_all(6)
+    assert not response.success
+    assert response.message.startswith("the record is too short: 3 samples")
+    assert client.statuses[-1][1].level == level
+
+
 @pytest.mark.parametrize("signal", ["pressure", "stem"])
 def test_stamps_that_go_back_clear_the_buffer(client, signal):
     send(client)

@@ -138,8 +138,20 @@ def breakaway_points(strokes: Sequence[SignatureStroke]) -> tuple[BreakawayPoint
 
 
 def mean_spring_constant(ways: Ways) -> float:
-    """Return k of (15), N/m, averaged over the strokes of both ways."""
-    return float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
+    """Return k of (15), N/m, averaged over the strokes of both ways.
+
+    Raises
+    ------
+    RefusalError
+        If it is not above zero.
+    """
+    found = float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
+    if not found > 0:
+        raise RefusalError(
+            f"the drive does not rise with the sliding stem (spring constant {found:.3g} N/m): "
+            "check that both signals belong to this valve, and share one clock"
+        )
+    return found
 
 
 def mean_position_bias(ways: Ways, spring_constant: float) -> float:
