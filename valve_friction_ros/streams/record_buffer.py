@@ -21,6 +21,7 @@ _REJECTIONS_KEPT = 10_000
 """Rejections in memory. Chosen: ten seconds at 1 kHz, so a broken sensor does not fill the
 memory."""
 
+_OVERTAKEN = "{} was overtaken on its way: its stamp is a little before the last one"
 _CLEARED = ": the buffer was cleared"
 
 
@@ -81,7 +82,8 @@ class RecordBuffer:
     """The last `window` seconds of pressure and stem position of one valve.
 
     An impossible sample, such as a pressure outside the sensor's range, is rejected and kept with
-    its cause. A stamp that goes back means that the clock has jumped, and clears the buffer.
+    its cause. A stamp that goes back means that the clock has jumped, and clears the buffer; one
+    that goes back by 1.5 sampling periods at most was overtaken on its way, and is left out alone.
     """
 
     def __init__(self, valve: Valve, window: float) -> None:
@@ -120,10 +122,14 @@ class RecordBuffer:
         return self._pressure.nbytes + self._position.nbytes
 
     @property
+    def last_stamps(self) -> tuple[int | None, int | None]:
+        """Stamps of the newest pressure and of the newest position, ns, or None."""
+        return self._pressure.last_stamp, self._position.last_stamp
+
+    @property
     def newest_stamp(self) -> int | None:
         """Stamp of the newest sample of either signal, ns, or None."""
-        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
-        return max((stamp for stamp in last_stamps if stamp is not None), default=None)
+        return max((stamp for stamp in self.last_stamps if stamp is not None), default=None)
 
     def add_pressure(self, stamp: int, pressure: float) -> str | None:
         """Take a pressure (Pa) stamped `stamp` (ns); return the cause of a rejection."""
@@ -141,6 +147,22 @@ class RecordBuffer:
         if position is None:
             return self._reject(stamp, "stem_state without a position of the joint")
         return self._add("stem_state", self._position, stamp, position, None)
+
+    def in_order(self, arrivals: Arrivals) -> Arrivals:
+        """Leave out the samples that were overtaken on their way, and count them as rejected."""
+        found = np.zeros(arrivals.stamps.size, np.bool_)
+        for kind, name, buffer in (
+            (Kind.PRESSURE, "actuator_pressure", self._pressure),
+            (Kind.POSITION, "stem_state", self._position),
+        ):
+            places = np.flatnonzero(arrivals.kinds == kind)
+            found[places] = overtaken = buffer.overtaken(arrivals.stamps[places])
+            if overtaken.any():
+                self._rejected[_OVERTAKEN.format(name)] += int(overtaken.sum())
+        if not found.any():
+            return arrivals
+        kinds, stamps, values = arrivals
+        return Arrivals(kinds[~found], stamps[~found], values[~found])
 
     def add_arrivals(self, arrivals: Arrivals) -> Complaints:
         """Take samples of both signals in the order in which they came.
@@ -182,6 +204,9 @@ class RecordBuffer:
         self, name: str, buffer: SampleBuffer, stamp: int, value: float, cause: str | None
     ) -> str | None:
         last = buffer.last_stamp
+        if buffer.overtaken(np.array([stamp], np.int64)).any():
+            self._rejected[overtaken := _OVERTAKEN.format(name)] += 1
+            return overtaken
         if last is not None and stamp < last:
             cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
             self.clear(cause)

@@ -200,7 +200,9 @@ class Identifier(PolledNode):
         return stuck_status(self._status_name, self._history.valve.tag, problem)
 
     def _take_samples(self, arrivals: Arrivals) -> None:
+        arrivals = self._monitor.buffer.in_order(arrivals)
         rejected, cleared = self._monitor.buffer.add_arrivals(arrivals)
+        self._identification.follow()
         for watch in self._watches:
             watch.take(arrivals)
         # Each call is throttled for itself, so bad samples do not hide that the buffer was cleared.
