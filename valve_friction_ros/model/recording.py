@@ -88,6 +88,11 @@ class Recording:
                 f"position {self.position.size}"
             )
 
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Freeze the arrays of a copy, too."""
+        self.__dict__.update(state)
+        self.drive.flags.writeable = self.position.flags.writeable = False
+
     def __len__(self) -> int:
         """Count the samples."""
         return self.position.size

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
 from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
@@ -262,6 +262,6 @@ def valve_signature(
         strokes,
         **found.values,
         dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.drive)),
-        standard_errors=MappingProxyType(dict(found.standard_errors)),
+        standard_errors=frozen(found.standard_errors),
         window=window,
     )
