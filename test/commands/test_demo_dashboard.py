@@ -28,8 +28,12 @@ def processes_of(session_home):
     return found
 
 
-@pytest.fixture
-def demo(ros_environment, tmp_path):
+IN_THE_BACKGROUND = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
+"""What a script does with a command before `&`: Ctrl-C is ignored."""
+
+
+@pytest.fixture(params=[[]], ids=["as typed"])
+def demo(request, ros_environment, tmp_path):
     """The running demo, whose temporary files are in `tmp_path`, and the address it opens."""
     log = tmp_path / "demo.log"
     folder = tmp_path / "temporary"
@@ -39,7 +43,7 @@ def demo(ros_environment, tmp_path):
     environment.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI behaves otherwise within a test
     with log.open("w") as stream:
         process = subprocess.Popen(
-            [sys.executable, HERE / "quick_plant.py", "demo", "--dashboard"],
+            [*request.param, sys.executable, HERE / "quick_plant.py", "demo", "--dashboard"],
             stdout=stream,
             stderr=subprocess.STDOUT,
             cwd=tmp_path,
@@ -60,7 +64,7 @@ def demo(ros_environment, tmp_path):
         yield process
     finally:
         if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGTERM)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(60)
         process.kill()
@@ -96,6 +100,9 @@ def test_three_valves_their_verdicts_and_a_clean_end(demo):
     ends_clean(demo, signal.SIGINT)
 
 
+@pytest.mark.parametrize(
+    "demo", [[], IN_THE_BACKGROUND], indirect=True, ids=["as typed", "in the background"]
+)
 def test_sigterm_while_it_starts_leaves_nothing_behind(demo):
     demo.said(r"the dashboard is at (\S+)")
     ends_clean(demo, signal.SIGTERM)

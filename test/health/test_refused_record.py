@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from records import quick_record, stroked_record
 
-from valve_friction_ros.health import Baseline, KnownNumbers, valve_numbers
+from valve_friction_ros.health import (
+    Baseline,
+    KnownNumbers,
+    MonitorSettings,
+    RefusedRecordError,
+    identify_snapshot,
+    valve_numbers,
+)
 from valve_friction_ros.health.refused_record import numbers_of_refused
 from valve_friction_ros.health.stem_reach import stem_reach
 from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify
@@ -18,6 +25,7 @@ from valve_friction_ros.model import (
     SensorNoise,
     simulate,
 )
+from valve_friction_ros.streams import RecordBuffer, rows_arrived
 
 TRAVEL = BENCH_VALVE.travel
 NOISES = {"drive_noise", "stem_noise"}
@@ -79,6 +87,19 @@ def test_signals_that_cannot_be_a_valves_show_nothing(change, shown):
     """Unchanged; still; inverted; a still drive; wrong units; swapped."""
     record = SensorNoise(5e-6, 50.0, 3).applied_to(quick_record())
     assert numbers(change(record)).keys() - {"lower_stop", "upper_stop"} == shown
+
+
+@pytest.mark.parametrize("count", [2, 5, 30, 31, 300])
+def test_a_few_samples_of_a_moving_stem_are_too_few(count):
+    """As after `clear`, while the stem moves: a refusal, not an error within what it shows."""
+    record = quick_record()
+    few = Recording(0.01, record.drive[200 : 200 + count], record.position[200 : 200 + count])
+    assert numbers(few).keys() <= NOISES
+    buffer = RecordBuffer(BENCH_VALVE, 60.0)
+    times = 0.01 * np.arange(count)
+    buffer.add_arrivals(rows_arrived(np.column_stack((times, few.drive, few.position))))
+    with pytest.raises(RefusedRecordError, match=f"too short: {count} samples"):
+        identify_snapshot(buffer.snapshot(), MonitorSettings(BENCH_VALVE))
 
 
 def test_a_stem_that_is_seen_late_meets_no_stop():

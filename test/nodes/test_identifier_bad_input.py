@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from live_nodes import NAMESPACE, SECOND, stamps_of
+from builtin_interfaces.msg import Time
+from live_nodes import NAMESPACE, SECOND, STREAM, stamps_of, values_of
 from records import quick_record
+from rosgraph_msgs.msg import Clock
 
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
@@ -220,6 +222,19 @@ def test_a_gap_is_refused_by_a_method_that_needs_an_unbroken_record(client, name
     identifies_the_next_record(client)
 
 
+def test_cleared_while_the_stem_moves(client):
+    """The first samples after `clear` are refused as too few, and the node's level stays."""
+    send(client)
+    assert client.identify_all(2 * len(RECORD)).success
+    level = client.statuses[-1][1].level
+    assert client.trigger("clear").success
+    send(client, slice(200, 203), stamps=STAMPS + 2 * round(RECORD.duration * SECOND))
+    response = client.identify_all(6)
+    assert not response.success
+    assert response.message.startswith("the record is too short: 3 samples")
+    assert client.statuses[-1][1].level == level
+
+
 @pytest.mark.parametrize("signal", ["pressure", "stem"])
 def test_stamps_that_go_back_clear_the_buffer(client, signal):
     send(client)
@@ -262,3 +277,52 @@ def test_bad_samples_are_forgotten_once_they_have_left_the_window(live):
     assert "not finite" in response.message
     send(client, stamps=STAMPS + round(len(RECORD) * RECORD.sample_period * SECOND))
     client.wait_until(lambda: client.trigger("identify").success, "success")
+
+
+@pytest.mark.parametrize("late", ["pressure", "stem"])
+def test_a_record_that_ended_long_ago_is_refused(live, late):
+    """By the node's clock, whatever its stamps: of both signals, or of one that fell silent."""
+    live.start_identifier({"use_sim_time": True, "input_timeout": 3.0})
+    client = live.client
+    clock, now = client.node.create_publisher(Clock, "/clock", STREAM), 1_000
+    client.wait_until(clock.get_subscription_count, "a subscription to the clock")
+
+    def clock_shows():
+        clock.publish(Clock(clock=Time(sec=now)))
+        return any(stamp.sec == now for stamp, _ in client.statuses[-2:])
+
+    client.wait_until(clock_shows, "the time")
+    client.identified(RECORD)
+    estimate = client.last_values()
+    now += 59
+    client.wait_until(clock_shows, "a time within the window")
+    assert client.trigger("identify").success
+    now += 165
+    client.wait_until(clock_shows, "a time long after the record")
+    after = STAMPS[-1] + 165 * SECOND
+    if late == "pressure":
+        client.send_stem(after, RECORD.position[0])
+    else:
+        client.send_pressure(after, RECORD.pressure[0])
+    client.wait_until(
+        lambda: client.last_values()["samples_taken"] == str(2 * len(RECORD) + 1), "the sample"
+    )
+    response = client.trigger("identify")
+    assert not response.success
+    topic = {"pressure": "actuator_pressure", "stem": "stem_state"}[late]
+    reason = f"the record is old: its last usable sample of {topic} came 224 s ago"
+    assert reason in response.message
+    status = client.next_status(lambda one: "the record is old" in one.message, "the refusal")
+    shown = values_of(status)
+    assert shown["estimate_valid"] == "false"
+    assert shown["reason"].startswith(reason)
+    assert float(shown["estimate_age [s]"]) == 165.0
+    assert shown["coulomb_friction [N]"] == estimate["coulomb_friction [N]"]
+
+
+def test_a_stamp_within_a_period_of_the_last_costs_its_sample_alone(client):
+    send(client, slice(250))
+    client.send_stem(STAMPS[249] - 4_000_000, 1.0)
+    send(client, slice(250, 500))
+    assert client.identify_all(2 * len(RECORD)).success
+    assert "stem_state was overtaken on its way" in client.last_values()["samples_rejected causes"]

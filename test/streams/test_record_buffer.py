@@ -7,7 +7,7 @@ import pytest
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
-from valve_friction_ros.streams import RecordBuffer, rows_arrived
+from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer, rows_arrived
 
 MILLISECOND = 1_000_000
 START = 1_700_000_000_000_000_000
@@ -162,6 +162,56 @@ class TestStampsThatGoBack:
         record = buffer.snapshot().recording()
         assert len(record) == 300
         assert record.start_time == stamp(-4999) / 1e9
+
+
+class TestStampsThatWereOvertaken:
+    """A stamp that goes back by less than a sampling period costs its sample, and nothing else."""
+
+    PERIOD = 4  # ms
+
+    @pytest.fixture
+    def buffer(self, buffer):
+        fill(buffer, 200, period=self.PERIOD)
+        return buffer
+
+    @pytest.mark.parametrize("signal", ["pressure", "position"])
+    @pytest.mark.parametrize("back", [1, 2, 4])
+    def test_one_is_left_out_and_the_window_is_a_recording(self, buffer, signal, back):
+        name = {"pressure": "actuator_pressure", "position": "stem_state"}[signal]
+        cause = f"{name} was overtaken on its way: its stamp is a little before the last one"
+        last = 199 * self.PERIOD
+        assert getattr(buffer, f"add_{signal}")(stamp(last - back), 7.0) == cause
+        fill(buffer, 10, first=last + self.PERIOD, period=self.PERIOD)
+        assert buffer.counts == (210, 210)
+        assert buffer.rejected == {cause: 1}
+        assert buffer.snapshot().cleared_because is None
+        record = buffer.snapshot().recording()
+        assert len(record) == 210
+        assert 7.0 not in (*record.drive, *record.position)
+
+    def test_further_back_the_clock_has_jumped(self, buffer):
+        found = buffer.add_pressure(stamp(199 * self.PERIOD - 7), 1e5)
+        assert found.endswith("went back by 0.007 s: the buffer was cleared")
+
+    def test_a_block_without_them_is_what_the_watches_take(self, buffer):
+        at = 200 * self.PERIOD + np.array([0, 4, 2, 8, 12, 11, 16])
+        stamps, kinds = (START + MILLISECOND * at).astype(np.int64), np.zeros(7, np.uint8)
+        whole = Arrivals(kinds, stamps, np.arange(7.0))
+        left = buffer.in_order(whole)
+        np.testing.assert_array_equal(left.values, [0, 1, 3, 4, 6])
+        assert buffer.add_arrivals(left) == (None, None)
+        assert buffer.counts == (205, 200)
+        assert sum(buffer.rejected.values()) == 2
+
+    def test_in_the_first_block_of_all(self):
+        buffer, at = RecordBuffer(BENCH_VALVE, 1.0), MILLISECOND * np.array([0, 4, 8, 6, 12])
+        whole = Arrivals(np.full(5, Kind.POSITION, np.uint8), START + at, np.arange(5.0))
+        np.testing.assert_array_equal(buffer.in_order(whole).values, [0, 1, 2, 4])
+
+    def test_blocks_in_order_stay_as_they_are(self, buffer):
+        for table in ([], [[0.0, 1e5, 0.0]], [[2e9, 1e5, 0.0], [2e9, 1e5, 0.0]]):
+            whole = rows_arrived(np.reshape(table, (-1, 3)))
+            assert buffer.in_order(whole) is whole
 
 
 class TestTheCauseOfAClear:

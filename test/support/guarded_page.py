@@ -59,7 +59,7 @@ def main():
         tailwind=False,
         show_welcome_message=False,
         timeout_graceful_shutdown=1,
-        **server_options(access),
+        **server_options(access, say),
     )
 
 

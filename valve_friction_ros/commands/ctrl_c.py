@@ -1,4 +1,7 @@
-"""Ctrl-C while a sub-command runs: an exception, which is not lost where others would lose it."""
+"""Ctrl-C while a sub-command runs: an exception, which is not lost where others would lose it.
+
+SIGTERM can do the same. A process that a script starts by ``&`` has Ctrl-C ignored, never SIGTERM.
+"""
 
 import os
 import signal
@@ -10,24 +13,25 @@ from types import FrameType
 
 from valve_friction_ros.commands.start import end_at_once
 
-__all__ = ["has_been_interrupted", "interrupt_raises"]
+__all__ = ["has_been_interrupted", "interrupt_raises", "sigterm_raises"]
 
 _REPEAT = 0.02
 """Time until a lost Ctrl-C is repeated, s: callbacks are shorter."""
-_came = threading.Event()
+_came: list[int] = []
+"""Numbers of the signals that have come."""
 
 
 def has_been_interrupted() -> bool:
-    """Return whether Ctrl-C has come."""
-    return _came.is_set()
+    """Return whether Ctrl-C has come, or SIGTERM in its place."""
+    return bool(_came)
 
 
 def _repeat() -> None:
-    threading.Timer(_REPEAT, os.kill, (os.getpid(), signal.SIGINT)).start()
+    threading.Timer(_REPEAT, os.kill, (os.getpid(), _came[-1])).start()
 
 
 def _repeat_if_importing() -> None:
-    """Repeat a Ctrl-C that a library has caught while it was imported: it is imported still."""
+    """Repeat a signal that a library has caught while it was imported: it is imported still."""
     frames = sys._current_frames()  # noqa: SLF001 - documented, for debuggers
     frame = frames.get(threading.main_thread().ident or 0)
     while frame is not None:
@@ -38,14 +42,14 @@ def _repeat_if_importing() -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    _came.set()
+    _came.append(number)
     threading.Timer(_REPEAT, _repeat_if_importing).start()
     signal.default_int_handler(number, frame)
 
 
 def _interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
-    """Repeat a Ctrl-C that Python ignores, since it came within a callback."""
-    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+    """Repeat a signal that Python ignores, since it came within a callback."""
+    if _came and issubclass(unraisable.exc_type, KeyboardInterrupt):
         _repeat()
     else:
         sys.__unraisablehook__(unraisable)
@@ -58,3 +62,9 @@ def interrupt_raises() -> Iterator[None]:
         signal.signal(signal.SIGINT, _interrupt)
         sys.unraisablehook = _interrupt_again
     yield
+
+
+def sigterm_raises() -> None:
+    """Let SIGTERM raise KeyboardInterrupt from now on, also where Ctrl-C is ignored."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    sys.unraisablehook = _interrupt_again

@@ -1,5 +1,6 @@
 """The page of a figure: its size, its title, the style of its panels."""
 
+import io
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -19,12 +20,21 @@ _LEGEND_PAD = 0.2
 """Room above and below the legend of a figure, in heights of its letters."""
 
 
+class _Shown(Figure):
+    """A figure that a notebook shows, also where nobody has imported pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        self.savefig(content, format="png")
+        return content.getvalue()
+
+
 def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
     """Return an empty figure with `title`, wrapped, above it, and the first notes below it.
 
     The title is of this package; notes may hold text from outside, which is never read as maths.
     """
-    figure = Figure(figsize=(11, 8.5), layout="constrained", dpi=110)
+    figure = _Shown(figsize=(11, 8.5), layout="constrained", dpi=110)
     title = title.replace(" %", "\N{NO-BREAK SPACE}%")  # which textwrap leaves whole
     figure.suptitle(
         textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from valve_friction_ros.identification.signature.valve_signature import ValveSig
 from valve_friction_ros.identification.trust.calibration import with_calibration
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
@@ -139,8 +139,8 @@ class Result:
         parameters, evidence = with_calibration(
             self.parameters, self.evidence, self.settings, self.recording.driven_by
         )
-        object.__setattr__(self, "parameters", MappingProxyType(parameters))
-        object.__setattr__(self, "evidence", MappingProxyType(evidence))
+        object.__setattr__(self, "parameters", frozen(parameters))
+        object.__setattr__(self, "evidence", frozen(evidence))
 
     @property
     def values(self) -> dict[str, float]:

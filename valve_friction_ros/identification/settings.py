@@ -1,15 +1,15 @@
 """Settings of an identification."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 from valve_friction_ros.model.checks import (
     require_finite,
     require_non_negative,
     require_positive,
 )
+from valve_friction_ros.model.frozen import frozen
 
 __all__ = [
     "CALIBRATION",
@@ -136,7 +136,7 @@ class IdentificationSettings:
                     f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got "
                     f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
                 )
-        object.__setattr__(self, "fixed", MappingProxyType(self._checked_fixed()))
+        object.__setattr__(self, "fixed", frozen(self._checked_fixed()))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)
             if "spring_preload" in self.fixed:
@@ -146,11 +146,6 @@ class IdentificationSettings:
     def published_window(self) -> int:
         """Derivative window of the published method, samples."""
         return PUBLISHED_WINDOW if self.derivative_window is None else self.derivative_window
-
-    def __reduce__(self) -> tuple[type["IdentificationSettings"], tuple[Any, ...]]:
-        """Let pickle rebuild the settings in another process; it cannot copy `fixed`."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return type(self), (*(values | {"fixed": dict(self.fixed)}).values(),)
 
     def _checked_fixed(self) -> dict[str, float]:
         checked = {}

@@ -11,6 +11,11 @@ from valve_friction_ros.model.stamped import StampedRecord
 
 __all__ = ["Recording"]
 
+_LARGEST = 1e12
+"""Largest value of a sample, Pa, N or m.
+
+Chosen: a million times beyond any sensor, and far below what overflows where it is squared."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -38,7 +43,7 @@ class Recording:
     ------
     ValueError
         If the arrays differ in shape, are not one-dimensional, are empty, or hold a value
-        that is not finite; the message names the array and the first such sample.
+        that is not finite or above 1e12; the message names the array and the sample.
 
     Examples
     --------
@@ -70,6 +75,11 @@ class Recording:
             finite = np.isfinite(values)
             if not finite.all():
                 raise ValueError(f"{words} is not finite at sample {int(np.argmin(finite))}")
+            largest = int(np.argmax(np.abs(values)))
+            if abs(values[largest]) > _LARGEST:
+                raise ValueError(
+                    f"{words} is {values[largest]:.3g} at sample {largest}, beyond any sensor"
+                )
             values.flags.writeable = False
             object.__setattr__(self, name, values)
         if self.drive.shape != self.position.shape:
@@ -77,6 +87,11 @@ class Recording:
                 f"{self.driven_by.words} has {self.drive.size} samples, "
                 f"position {self.position.size}"
             )
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Freeze the arrays of a copy, too."""
+        self.__dict__.update(state)
+        self.drive.flags.writeable = self.position.flags.writeable = False
 
     def __len__(self) -> int:
         """Count the samples."""

@@ -47,6 +47,11 @@ class StampedSignal:
         if not (np.diff(self.time) > 0).all():
             raise ValueError("times must increase")
 
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Freeze the arrays of a copy, too."""
+        self.__dict__.update(state)
+        self.time.flags.writeable = self.value.flags.writeable = False
+
     @property
     def period(self) -> float:
         """Median time between two samples, s."""

@@ -15,6 +15,7 @@ from valve_friction_ros.identification import (
     require_valve_units,
 )
 from valve_friction_ros.model import KarnoppParameters, Valve
+from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.spelling import nearest, resembling
 from valve_friction_ros.records.valve_keys import (
@@ -175,7 +176,7 @@ def _described(values: Mapping[str, Any]) -> ValveFile:
     )
     valve = Valve(**{name: _number(name, values[name]) for name in GEOMETRY if name in values})
     require_valve_units(valve, known)
-    return ValveFile(valve, MappingProxyType(known), columns, MappingProxyType(settings))
+    return ValveFile(valve, frozen(known), columns, frozen(settings))
 
 
 def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> ValveFile:

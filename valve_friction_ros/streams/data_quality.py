@@ -148,6 +148,7 @@ class DataFault:
             SampleFault.OUT_OF_RANGE: f"{self.reading:.4g} {unit} is outside {span}: {remedy}",
             SampleFault.REPEATED: "they repeat a stamp: give each sample the time at which it was "
             "measured",
+            SampleFault.OVERTAKEN: "they arrive out of order: look at the network between them",
             SampleFault.BACK: "their stamps go back: check for a second publisher, and the clock "
             "of the sensor",
         }[cause]

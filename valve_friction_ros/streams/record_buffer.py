@@ -22,6 +22,7 @@ _REJECTIONS_KEPT = 10_000
 """Rejections in memory. Chosen: ten seconds at 1 kHz, so a broken sensor does not fill the
 memory."""
 
+_OVERTAKEN = "{} was overtaken on its way: its stamp is a little before the last one"
 _CLEARED = ": the buffer was cleared"
 
 
@@ -46,6 +47,8 @@ class SampleFault(Enum):
     NOT_FINITE = "not finite"
     OUT_OF_RANGE = "out of range"
     REPEATED = "repeated"
+    OVERTAKEN = "overtaken"
+    """Its stamp is a little before the last one, which costs this sample alone."""
     BACK = "back"
     """Its stamp goes back, which clears the buffer."""
 
@@ -136,7 +139,8 @@ class RecordBuffer:
     """The last `window` seconds of pressure and stem position of one valve.
 
     An impossible sample, such as a pressure outside the sensor's range, is rejected and kept with
-    its cause. A stamp that goes back means that the clock has jumped, and clears the buffer.
+    its cause. A stamp that goes back means that the clock has jumped, and clears the buffer; one
+    that goes back by 1.5 sampling periods at most was overtaken on its way, and is left out alone.
     """
 
     def __init__(self, valve: Valve, window: float) -> None:
@@ -175,10 +179,14 @@ class RecordBuffer:
         return self._pressure.nbytes + self._position.nbytes
 
     @property
+    def last_stamps(self) -> tuple[int | None, int | None]:
+        """Stamps of the newest pressure and of the newest position, ns, or None."""
+        return self._pressure.last_stamp, self._position.last_stamp
+
+    @property
     def newest_stamp(self) -> int | None:
         """Stamp of the newest sample of either signal, ns, or None."""
-        last_stamps = (self._pressure.last_stamp, self._position.last_stamp)
-        return max((stamp for stamp in last_stamps if stamp is not None), default=None)
+        return max((stamp for stamp in self.last_stamps if stamp is not None), default=None)
 
     def add_pressure(self, stamp: int, pressure: float) -> str | None:
         """Take a pressure (Pa) stamped `stamp` (ns); return the cause of a rejection."""
@@ -192,6 +200,22 @@ class RecordBuffer:
         """
         _, cause = self._add(Signal.POSITION, stamp, position)
         return cause
+
+    def in_order(self, arrivals: Arrivals) -> Arrivals:
+        """Leave out the samples that were overtaken on their way, and count them as rejected."""
+        found = np.zeros(arrivals.stamps.size, np.bool_)
+        for kind, name, buffer in (
+            (Kind.PRESSURE, Signal.PRESSURE.value, self._pressure),
+            (Kind.POSITION, Signal.POSITION.value, self._position),
+        ):
+            places = np.flatnonzero(arrivals.kinds == kind)
+            found[places] = overtaken = buffer.overtaken(arrivals.stamps[places])
+            if overtaken.any():
+                self._rejected[_OVERTAKEN.format(name)] += int(overtaken.sum())
+        if not found.any():
+            return arrivals
+        kinds, stamps, values = arrivals
+        return Arrivals(kinds[~found], stamps[~found], values[~found])
 
     def add_arrivals(self, arrivals: Arrivals) -> Intake:
         """Take samples of both signals in the order in which they came.
@@ -243,6 +267,9 @@ class RecordBuffer:
             return self._reject(
                 stamp, SampleFault.NO_JOINT, f"{name} without a position of the joint"
             )
+        if buffer.overtaken(np.array([stamp], np.int64)).any():
+            self._rejected[overtaken := _OVERTAKEN.format(name)] += 1
+            return SampleFault.OVERTAKEN, overtaken
         if last is not None and stamp < last:
             cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
             self.clear(cause)
@@ -250,20 +277,26 @@ class RecordBuffer:
             return SampleFault.BACK, cause + _CLEARED
         if last is not None and stamp == last:
             return self._reject(stamp, SampleFault.REPEATED, f"{name} repeats a stamp")
-        if not math.isfinite(value):
-            return self._reject(stamp, SampleFault.NOT_FINITE, f"{name} is not finite")
-        lowest, highest = self.bounds(signal)
-        if not lowest <= value <= highest:
-            whose = (
-                f"the sensor's range {lowest:g} to {highest:g} Pa"
-                if signal is Signal.PRESSURE
-                else f"the range of any valve, {lowest:g} to {highest:g} m"
-            )
-            return self._reject(stamp, SampleFault.OUT_OF_RANGE, f"{name} outside {whose}")
+        if (fault := self._unusable(signal, value)) is not None:
+            return self._reject(stamp, *fault)
         buffer.append(stamp, value)
         self._taken += 1
         self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
         return None, None
+
+    def _unusable(self, signal: Signal, value: float) -> tuple[SampleFault, str] | None:
+        """Return why no valve reads this value; None if one may."""
+        name, (lowest, highest) = signal.value, self.bounds(signal)
+        if not math.isfinite(value):
+            return SampleFault.NOT_FINITE, f"{name} is not finite"
+        if lowest <= value <= highest:
+            return None
+        whose = (
+            f"the sensor's range {lowest:g} to {highest:g} Pa"
+            if signal is Signal.PRESSURE
+            else f"the range of any valve, {lowest:g} to {highest:g} m"
+        )
+        return SampleFault.OUT_OF_RANGE, f"{name} outside {whose}"
 
     def bounds(self, signal: Signal) -> tuple[float, float]:
         """Return the lowest and the highest reading that is taken, Pa or m."""

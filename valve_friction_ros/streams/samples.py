@@ -11,6 +11,13 @@ __all__ = ["SampleBuffer", "Samples", "nanoseconds"]
 _CHUNK = 1024
 """Samples that are kept and dropped together. Chosen: about 1 s at 1 kHz."""
 
+_FEWEST_RECENT = 100
+"""Stamps that the sampling period is the median of, if there are as many. Chosen."""
+
+_OVERTAKEN = 1.5
+"""Sampling periods by which a stamp may go back without a jump of the clock: two neighbours that
+changed places on their way, with jitter, go back by one."""
+
 _LONGEST_OFFSET = int(np.iinfo(np.uint32).max)
 
 
@@ -175,6 +182,33 @@ class SampleBuffer:
             if before < len(chunk.values):
                 return outside
         return outside + int(np.searchsorted(self._open.stamps[: self._filled], begin))
+
+    def overtaken(self, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell which of the next stamps, ns, are a little before a stamp that came earlier.
+
+        A little is 1.5 sampling periods, of the median that these and the last stamps have.
+        """
+        found = np.zeros(stamps.size, np.bool_)
+        if not stamps.size:
+            return found
+        last = int(stamps[0]) if self._last_stamp is None else self._last_stamp
+        if stamps[0] >= last and (stamps[1:] >= stamps[:-1]).all():
+            return found
+        steps = np.diff(np.concatenate((self._recent(), stamps)))
+        if not (forward := steps[steps > 0]).size:
+            return found
+        most = _OVERTAKEN * float(np.median(forward))
+        for place, stamp in enumerate(stamps.tolist()):
+            found[place] = 0 < last - stamp <= most
+            last = last if found[place] else stamp
+        return found
+
+    def _recent(self) -> NDArray[np.int64]:
+        """Return the last stamps, at most 1024 and at least as many as there are up to 100."""
+        filled = self._open.stamps[: self._filled]
+        if self._filled < _FEWEST_RECENT and self._closed:
+            return np.concatenate((self._closed[-1].stamps[-_FEWEST_RECENT:], filled))
+        return filled
 
     def samples(self) -> Samples:
         """Copy the samples of the last window."""

@@ -113,7 +113,8 @@ def uniform_recording(
     Raises
     ------
     RefusalError
-        If a signal is empty, gaps take more than half of its time, or the two do not overlap.
+        If a signal is empty or beyond any sensor, gaps take more than half of its time, or the two
+        do not overlap.
     """
     period_of_drive = _period(names[0], drive)
     period = _period(names[1], position)
@@ -136,15 +137,18 @@ def uniform_recording(
         np.interp(grid, (signal.stamps - origin).astype(np.float64), signal.values)
         for signal in (drive, position)
     ]
-    return Recording(
-        period / 1e9,
-        on_grid[0],
-        on_grid[1],
-        start_time=float(origin) / 1e9,
-        stamped=_at_own_stamps(drive, position, int(origin), period, driven_by),
-        driven_by=driven_by,
-        gap=refusal_of(gaps[0]) if gaps else "",
-    )
+    try:
+        return Recording(
+            period / 1e9,
+            on_grid[0],
+            on_grid[1],
+            start_time=float(origin) / 1e9,
+            stamped=_at_own_stamps(drive, position, int(origin), period, driven_by),
+            driven_by=driven_by,
+            gap=refusal_of(gaps[0]) if gaps else "",
+        )
+    except ValueError as error:
+        raise RefusalError(f"{error}: check sensor and unit") from None
 
 
 def _at_own_stamps(

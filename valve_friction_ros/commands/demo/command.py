@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from valve_friction_ros.commands.ctrl_c import sigterm_raises
 from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
 from valve_friction_ros.commands.demo.bench_processes import (
     NodeProcess,
@@ -162,8 +162,7 @@ def run(options: argparse.Namespace) -> int:
     with console.status("preparing"):  # beside each other, several nodes would compile the same
         compile_methods()
     os.environ.update(quick_discovery())
-    # SIGTERM ends it as Ctrl-C does: the nodes have sessions of their own, and would stay.
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    sigterm_raises()  # the nodes have sessions of their own, and would stay
     with free_domain() as domain, TemporaryDirectory(prefix="valve_friction_demo") as home:
         os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_HOME": home}  # a demo is no plant's
         if options.dashboard:

@@ -9,6 +9,7 @@ from nicegui import App, context, core, ui
 
 from valve_friction_ros.dashboard.access.access import Access
 from valve_friction_ros.dashboard.access.accounts import Account, Role
+from valve_friction_ros.dashboard.access.connections import bounded_protocol
 from valve_friction_ros.dashboard.access.gate import LOG_IN, STATE, Gate, token_of
 from valve_friction_ros.dashboard.access.headers import is_own_origin
 from valve_friction_ros.dashboard.access.sessions import Sessions
@@ -99,13 +100,17 @@ def _is_own(origin: str | None, request: dict[str, Any], is_encrypted: bool) -> 
     return is_own_origin(origin, request.get("HTTP_HOST", ""), is_encrypted)
 
 
-def server_options(access: Access) -> dict[str, Any]:
-    """Return what `ui.run` needs to know of the access."""
+def server_options(access: Access, log: Callable[[str], None]) -> dict[str, Any]:
+    """Return what `ui.run` needs to know of the access.
+
+    `log` takes the lines on connections that were ended.
+    """
     options: dict[str, Any] = {
         "host": access.host,
         # Else a header of the request would say its address, by which attempts are counted.
         "proxy_headers": False,
         "server_header": False,
+        "http": bounded_protocol(log),
     }
     if access.certificate is not None and access.key is not None:
         options |= {"ssl_certfile": str(access.certificate), "ssl_keyfile": str(access.key)}

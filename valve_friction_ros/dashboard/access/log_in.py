@@ -11,7 +11,7 @@ from valve_friction_ros.dashboard.access.attempt_limit import AttemptLimit
 from valve_friction_ros.dashboard.access.passwords import HashedPassword
 from valve_friction_ros.dashboard.access.sessions import Sessions
 
-__all__ = ["LogIn", "Refusal"]
+__all__ = ["LogIn", "Refusal", "network_of"]
 
 _PERIOD = 900.0
 _MOST_OF_ADDRESS, _MOST_OF_NAME = 10, 20
@@ -31,7 +31,7 @@ class Refusal:
     wait: int
 
 
-def _network(address: str) -> str:
+def network_of(address: str) -> str:
     """Return what one household has of addresses: an IPv4 address, or 64 bits of IPv6."""
     try:
         known = ipaddress.ip_address(address)
@@ -78,7 +78,7 @@ class LogIn:
 
         An attempt counts before it is compared: many at once get no further than one by one.
         """
-        network, name = _network(address), name[:64]
+        network, name = network_of(address), name[:64]
         wait = max(self._addresses.wait(network), self._names.wait(name))
         if wait == 0 and self._waiting >= _MOST_WAITING:
             wait = 1

@@ -55,8 +55,11 @@ def guarded(access: Access, log: Callable[[str], None]) -> Guard:
     return guard(app, access, log)
 
 
-def serve(board: Board, started: Callable[[], None]) -> None:
-    """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened."""
+def serve(board: Board, started: Callable[[], None], log: Callable[[str], None]) -> None:
+    """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened.
+
+    `log` takes the lines on connections that were ended.
+    """
     load_style()
     logging.getLogger("uvicorn.error").addFilter(_Gone())
     pages: dict[str, _Draw] = {"/": plant_page, "/valve": valve_page, "/compare": compare_page}
@@ -71,7 +74,7 @@ def serve(board: Board, started: Callable[[], None]) -> None:
 
     app.on_startup(begin)
     ui.run(
-        **server_options(board.options.access),
+        **server_options(board.options.access, log),
         port=board.options.port,
         title="Valve friction",
         dark=None,

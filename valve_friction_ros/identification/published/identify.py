@@ -52,7 +52,8 @@ class PublishedFit(NamedTuple):
         values = np.array([self.estimate.values[name] for name in regression.names])
         force = regression.force[moving]
         left = regression.columns[moving] @ values - force
-        return 1 - float(np.linalg.norm(left) / np.linalg.norm(force - force.mean()))
+        whole = float(np.linalg.norm(force - force.mean()))
+        return 1 - float(np.linalg.norm(left)) / whole if whole > 0 else 0.0
 
     @property
     def sliding_speed(self) -> float:

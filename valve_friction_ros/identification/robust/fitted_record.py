@@ -26,6 +26,9 @@ _LONGEST_PERIOD = 5e-3
 _MOST_STEPS = 12_500
 """Steps of the simulation in a record; those of a longer record are longer, up to four times."""
 
+_MOST_FINE_STEPS = 5_000_000
+"""Steps finer than the samples. Chosen: 28 h, some GB; a wrong unit of time asks for far more."""
+
 _MOST_SAMPLES = 16_000
 """Steps of a record whose pressure cannot be smoothed: there they are means of its samples."""
 
@@ -295,7 +298,7 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     Raises
     ------
     RefusalError
-        If the signals have too little time in common.
+        If the signals have too little time in common, or far too much for their sampling.
     """
     sampled, measured = without_repeats(record.drive), without_repeats(record.position)
     begin = max(sampled.time[0], measured.time[0])
@@ -313,6 +316,12 @@ def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
     pressure = _smoothed(drive, grid)
     longest = min(max((end - begin) / _MOST_STEPS, _LONGEST_PERIOD), 4.0 * _LONGEST_PERIOD)
     if finest > longest:
+        if end - begin > _MOST_FINE_STEPS * longest:
+            raise RefusalError(
+                f"the record is too long for its sampling: {(end - begin) / 3600:.3g} h with a "
+                f"sample every {finest:.3g} s; use a stretch of "
+                f"{_MOST_FINE_STEPS * longest / 3600:.0f} h at most, and check the unit of time"
+            )
         period = finest / math.ceil(finest / longest - 1e-9)
         fine = np.arange(0.0, grid[-1], period, dtype=np.float64)
         pressure, grid = pressure.at(grid, fine), fine

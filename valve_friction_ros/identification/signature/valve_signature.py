@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
 from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
@@ -138,8 +138,20 @@ def breakaway_points(strokes: Sequence[SignatureStroke]) -> tuple[BreakawayPoint
 
 
 def mean_spring_constant(ways: Ways) -> float:
-    """Return k of (15), N/m, averaged over the strokes of both ways."""
-    return float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
+    """Return k of (15), N/m, averaged over the strokes of both ways.
+
+    Raises
+    ------
+    RefusalError
+        If it is not above zero.
+    """
+    found = float(np.mean([stroke.spring_constant for way in ways for stroke in way]))
+    if not found > 0:
+        raise RefusalError(
+            f"the drive does not rise with the sliding stem (spring constant {found:.3g} N/m): "
+            "check that both signals belong to this valve, and share one clock"
+        )
+    return found
 
 
 def mean_position_bias(ways: Ways, spring_constant: float) -> float:
@@ -250,6 +262,6 @@ def valve_signature(
         strokes,
         **found.values,
         dead_zone_share=found.values["dead_zone"] / float(np.ptp(recording.drive)),
-        standard_errors=MappingProxyType(dict(found.standard_errors)),
+        standard_errors=frozen(found.standard_errors),
         window=window,
     )

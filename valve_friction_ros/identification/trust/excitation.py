@@ -77,6 +77,9 @@ _FOLLOWED_BLOCK = 0.1
 Chosen: 100 samples at 1 kHz average noise. It is absolute, a tenth of the bench's lag; a share of
 the time of a stroke would suit other valves."""
 
+_FEWEST_BLOCKS = 20
+"""Fewest of these blocks. Chosen: a fit of three numbers; a short record has shorter ones."""
+
 _MOVING_SHARE = 0.05
 """Speed over the top speed from which the stem counts as moving in that test. Chosen: leaves the
 rests out, where pressure changes within the dead band."""
@@ -155,6 +158,7 @@ def require_two_directions(recording: Recording, window: int) -> None:
 
     The position is averaged over `window` samples first; turns within its noise do not count.
     """
+    require_enough_samples(recording, window)
     means = len(recording) // window
     position = recording.position[: means * window].reshape(means, window).mean(axis=1)
     noise = measured(recording).white_noise / np.sqrt(window)
@@ -220,7 +224,8 @@ def _followed(recording: Recording) -> tuple[float, float]:
     moves, its drive follows position, shifted up or down by the friction. While it rests, any drive
     within the dead band is possible, so rests are left out.
     """
-    length = max(round(_FOLLOWED_BLOCK / recording.sample_period), 1)
+    longest = max(len(recording) // _FEWEST_BLOCKS, 1)
+    length = max(min(round(_FOLLOWED_BLOCK / recording.sample_period), longest), 1)
     blocks = len(recording) // length
     position, drive = (
         signal[: blocks * length].reshape(blocks, length).mean(axis=1)
@@ -228,6 +233,8 @@ def _followed(recording: Recording) -> tuple[float, float]:
     )
     moves = np.diff(position)
     moving = np.abs(moves) > _MOVING_SHARE * np.abs(moves).max()
+    if not moving.any():
+        return 0.0, 0.0
     place, target = (0.5 * (one[1:] + one[:-1])[moving] for one in (position, drive))
     columns = np.column_stack([place - place.mean(), np.sign(moves[moving]), np.ones(place.size)])
     fitted, *_ = np.linalg.lstsq(columns, target, rcond=None)

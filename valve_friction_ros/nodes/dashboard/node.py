@@ -144,7 +144,7 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
         log(f"ready: open {options.address}")
 
     if not stop.has_come:
-        server.serve(board, tell)
+        server.serve(board, tell, log)
     stop.is_followed = True
     return 0
 

@@ -9,6 +9,7 @@ from valve_friction_ros.health import (
     identify_snapshot,
 )
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.parameters import INPUT_TIMEOUT
 from valve_friction_ros.nodes.identifier.results import NumberTopics
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
@@ -29,6 +30,40 @@ class Identification:
         self._node, self._monitor, self._results, self._worker = node, monitor, results, worker
         self._is_running = False
         self._until: int | None = None
+        self._last_stamps: tuple[int | None, int | None] = (None, None)
+        self._came = [0, 0]
+
+    def follow(self) -> None:
+        """Note when usable samples of either signal have come, by the node's clock.
+
+        Stamps tell no age: those of a bag that is played without its clock are of another day.
+        """
+        now, last_stamps = (
+            self._node.get_clock().now().nanoseconds,
+            self._monitor.buffer.last_stamps,
+        )
+        for signal, (before, last) in enumerate(zip(self._last_stamps, last_stamps, strict=True)):
+            if last != before:
+                self._came[signal] = now
+        self._last_stamps = last_stamps
+
+    def _require_recent(self) -> None:
+        """Refuse a record of which a signal has ended longer ago than it may be silent."""
+        longest = max(
+            self._monitor.settings.window, self._node.get_parameter(INPUT_TIMEOUT.name).value
+        )
+        now = self._node.get_clock().now().nanoseconds
+        for name, came, stamp in zip(
+            ("actuator_pressure", "stem_state"), self._came, self._last_stamps, strict=True
+        ):
+            age = (now - came) / 1e9
+            if stamp is not None and age > longest:
+                raise RefusedRecordError(
+                    f"the record is old: its last usable sample of {name} came {age:.0f} s ago, "
+                    f"and window and input_timeout allow {longest:g} s: check the source of {name}"
+                    ", or set a longer window for a sensor that reports rarely",
+                    {},
+                )
 
     @property
     def has_nothing_new(self) -> bool:
@@ -49,10 +84,11 @@ class Identification:
     async def run(self, record: IdentificationInput) -> None:
         """Identify a record in the worker; take over and publish the result.
 
-        Raises RefusedRecordError if the record cannot be identified, InternalError if a bug is met;
-        the monitor shows the bug until an identification succeeds. What a refused record shows of
-        the valve is taken over, too.
+        Raises RefusedRecordError if the record cannot be identified or is old, InternalError if a
+        bug is met; the monitor shows the bug until an identification succeeds. What a refused
+        record shows of the valve is taken over, too.
         """
+        self._require_recent()
         self._is_running = True
         try:
             with bugs_reported(self._node, known=self._monitor.internal_error):

@@ -223,7 +223,9 @@ class Identifier(PolledNode):
         return stuck_status(self._status_name, self._history.valve.tag, problem)
 
     def _take_samples(self, arrivals: Arrivals) -> None:
+        arrivals = self._monitor.buffer.in_order(arrivals)
         intake = self._monitor.buffer.add_arrivals(arrivals)
+        self._identification.follow()
         self._judge(arrivals, intake)
         plausible = arrivals.plausible()
         for watch in self._watches:

@@ -8,9 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
-from multiprocessing.reduction import ForkingPickler
-from types import MappingProxyType
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.plumbing.worker import Worker
@@ -19,14 +17,6 @@ __all__ = ["ProcessWorker"]
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
-
-
-def _frozen(mapping: dict[Any, Any]) -> MappingProxyType[Any, Any]:
-    return MappingProxyType(mapping)
-
-
-# Results hold mappings that nobody can change, which Python does not pickle.
-ForkingPickler.register(MappingProxyType, lambda one: (_frozen, (dict(one),)))
 
 
 def _begin() -> None:
