@@ -22,6 +22,7 @@ from valve_friction_ros.streams import (
 START = 1_700_000_000  # s
 FAULTS = {
     "without a position": SampleFault.NO_JOINT,
+    "overtaken": SampleFault.OVERTAKEN,
     "went back": SampleFault.BACK,
     "repeats a stamp": SampleFault.REPEATED,
     "not finite": SampleFault.NOT_FINITE,
