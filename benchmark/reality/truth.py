@@ -1,7 +1,7 @@
 """What is true of a record: numbers that an identification is compared with."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,10 @@ class Truth:
     viscous_asymmetry: TrueValue
     clock_offset: TrueValue
     distance: float
+
+    def as_mapping(self) -> dict[str, TrueValue]:
+        """Return its numbers by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.name in NAMES}
 
 
 def _among(value: float, others: Iterable[float]) -> TrueValue:
@@ -184,7 +188,7 @@ def truth_of(plant: Plant, motion: Motion, instruments: Instruments, duration: f
         viscous_friction=_among(friction.viscous, (friction.viscous / area,)),
         coulomb_friction=coulomb,
         static_friction=static,
-        spring_constant=spring,
+        spring_constant=spring if body.spring else TrueValue(float("nan")),
         spring_preload=preload,
         limit_velocity=TrueValue(_limit_velocity(friction)),
         sliding_friction=_sliding(motion, recorded),
