@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import track
 
 from benchmark.reality.motions import Kind
+from benchmark.reality.real import real_rows
 from benchmark.reality.records import Case
 from benchmark.reality.report import bounds, report
 from benchmark.reality.trial import Row, Task, rows_of, tried
@@ -19,48 +20,52 @@ from benchmark.reality.trial import Row, Task, rows_of, tried
 __all__ = ["main"]
 
 _PROCESSES = 2
-_RECORDS, _BRIEF = 40, 4
-_ALARM_MOTIONS = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.LOOP, Kind.FROM_MIDDLE)
-_SLIP_MOTIONS = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.HUNTING)
-_PARTS = ("plain", "alarms", "stickslip")
+_PARTS = ("plain", "stickslip", "alarms")
+_RECORDS, _BRIEF = (30, 16, 8), (3, 1, 1)
+"""Of each motion, by default and in brief: in each of the parts."""
+
+_SLIPPING = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.HUNTING)
+_WATCHED = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.LOOP, Kind.FROM_MIDDLE)
 _RESERVE = 2.2
-"""Factor by which the friction of a valve of the alarms may grow: it is doubled."""
+"""Factor by which the friction of a valve that is watched may grow: it is doubled."""
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="reality", description=__doc__)
     kinds = [kind.value for kind in Kind]
-    parser.add_argument("--records", type=int, metavar="N", help=f"of each motion ({_RECORDS})")
+    parser.add_argument("--records", type=int, metavar="N", help="of each motion, in each part")
     parser.add_argument("--motions", nargs="+", default=kinds, choices=kinds, help="default: all")
     parser.add_argument("--only", nargs="+", default=_PARTS, choices=_PARTS, help="default: all")
-    parser.add_argument("--brief", action="store_true", help=f"{_BRIEF} records of each motion")
-    parser.add_argument("--entropy", type=int, help="repeat a run; drawn by default")
+    parser.add_argument("--brief", action="store_true", help="few records of each motion")
+    parser.add_argument("--entropy", type=int, metavar="N", help="repeat a run; else it is drawn")
+    parser.add_argument("--jobs", type=int, default=min(_PROCESSES, os.cpu_count() or 1))
     parser.add_argument(
-        "--jobs", type=int, default=min(_PROCESSES, os.cpu_count() or 1), help="processes"
-    )
-    parser.add_argument(
-        "--limit", type=float, default=60.0, help="processor time for one record, s"
+        "--limit", type=float, default=60.0, metavar="S", help="processor time for one record"
     )
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="keep the records as .npz")
+    parser.add_argument(
+        "--real", type=Path, metavar="FOLDER", help="holds the folders cylinders and emps"
+    )
     parser.add_argument("--out", type=Path, default=Path("reality.jsonl"), help="the rows")
     parser.add_argument("--read", action="store_true", help="show the rows of --out; run nothing")
     return parser
 
 
 def _tasks(options: argparse.Namespace, entropy: int) -> Iterator[Task]:
-    count = options.records or (_BRIEF if options.brief else _RECORDS)
+    counts = dict(zip(_PARTS, _BRIEF if options.brief else _RECORDS, strict=True))
     motions = [Kind(motion) for motion in options.motions]
-    few = max(count // 5, 1)
-    for number in range(count):
-        for motion in motions:
-            if "plain" in options.only:
-                yield Task("plain", Case(entropy, motion, number), options.limit, options.save)
-            if "stickslip" in options.only and motion in _SLIP_MOTIONS and number < 2 * few:
-                case = Case(entropy + 1, motion, number, slips=True)
-                yield Task("stickslip", case, options.limit, options.save)
-            if "alarms" in options.only and motion in _ALARM_MOTIONS and number < few:
-                case = Case(entropy + 2, motion, number, reserve=_RESERVE)
-                yield Task("alarms", case, options.limit, options.save)
+    for place, part in enumerate(_PARTS):
+        some = {"plain": motions, "stickslip": _SLIPPING, "alarms": _WATCHED}[part]
+        for number in range(options.records or counts[part]):
+            for motion in motions:
+                if part not in options.only or motion not in some:
+                    continue
+                case = Case(entropy + place, motion, number)
+                if part == "stickslip":
+                    case = case._replace(slips=True)
+                if part == "alarms":
+                    case = case._replace(reserve=_RESERVE)
+                yield Task(part, case, options.limit, options.save)
 
 
 def _run(options: argparse.Namespace, console: Console) -> list[Row]:
@@ -69,21 +74,13 @@ def _run(options: argparse.Namespace, console: Console) -> list[Row]:
     console.print(f"--entropy {entropy}")
     if options.save is not None:
         options.save.mkdir(parents=True, exist_ok=True)
-    tasks = list(_tasks(options, entropy))
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    rows = []
+    tasks, rows = list(_tasks(options, entropy)), []
     with (
         options.out.open("w", encoding="utf-8") as file,
         multiprocessing.get_context("spawn").Pool(options.jobs) as pool,
-        Progress(*columns, console=Console(stderr=True)) as progress,
     ):
         answers = pool.imap_unordered(tried, tasks)
-        for some in progress.track(answers, total=len(tasks), description="reality"):
+        for some in track(answers, "reality", len(tasks), console=Console(stderr=True)):
             rows += some
             file.writelines(row.as_line() + "\n" for row in some)
             file.flush()
@@ -98,12 +95,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"{options.out}: there is no folder {options.out.parent}")
     console = Console(soft_wrap=True, highlight=False, markup=False)
     rows = rows_of(options.out) if options.read else _run(options, console)
-    order = {(part, motion): place for place, (part, motion) in enumerate(
-        (part, kind.value) for part in _PARTS for kind in Kind)}
-    rows.sort(key=lambda row: order[row.part, row.motion])
-    for line in report(rows):
+    motions = [kind.value for kind in Kind]
+    rows.sort(key=lambda row: (_PARTS.index(row.part), motions.index(row.motion)))
+    real = [] if options.real is None else list(real_rows(options.real))
+    for line in report(rows, real):
         console.print(line)
-    return 0 if all(one.met for one in bounds(rows)) else 1
+    if not real:
+        console.print("\nReal machines: not measured; --real FOLDER names where they are.")
+    return 0 if all(one.met for one in bounds(rows, real)) else 1
 
 
 if __name__ == "__main__":

@@ -64,6 +64,11 @@ class Draft:
         )
 
     @property
+    def travel(self) -> float:
+        """Nominal travel, m."""
+        return self.valve.plant.body.travel
+
+    @property
     def period(self) -> float:
         """Time between two samples, s."""
         return 1.0 / self.instruments.position_stamping.rate
@@ -131,6 +136,10 @@ def _jitter(draft: Draft, random: _Random) -> Draft:
     return draft.clocks(False, jitter=shares[0], stamp_error=shares[1])
 
 
+def _cut(draft: Draft, random: _Random) -> Draft:
+    return draft.clocks(False, jitter=0.2, resolution=draft.period * random.uniform(0.2, 1.0))
+
+
 def _drops(draft: Draft, random: _Random) -> Draft:
     if random.random() < 0.3:
         number, length = int(random.integers(1, 4)), log_uniform(random, 0.2, 2.0)
@@ -183,16 +192,23 @@ def _curved(draft: Draft, random: _Random) -> Draft:
     return draft.body(flow_force=force, flow_exponent=float(random.choice([2.0, 3.0])))
 
 
-def _presliding(draft: Draft, random: _Random) -> Draft:
+def _bending(law: Law) -> Callable[[Draft, _Random], Draft]:
     """Let the packing bend before it slides, by up to 0.2 % of the travel."""
-    travel = draft.valve.plant.body.travel
-    law = Law.LUGRE if random.random() < 0.6 else Law.MAXWELL
-    return draft.friction(law=law, presliding=travel * log_uniform(random, 2e-4, 2e-3))
+    return lambda draft, random: draft.friction(
+        law=law, presliding=draft.travel * log_uniform(random, 2e-4, 2e-3)
+    )
 
 
-def _dead_zone(draft: Draft, random: _Random) -> Draft:
-    law = Law.KARNOPP if random.random() < 0.5 else Law.LATCHED
-    return draft.friction(law=law, limit_velocity=log_uniform(random, 0.1e-3, 1e-3))
+def _dead_zone(law: Law) -> Callable[[Draft, _Random], Draft]:
+    return lambda draft, random: draft.friction(
+        law=law, limit_velocity=log_uniform(random, 0.1e-3, 1e-3)
+    )
+
+
+def _stops(draft: Draft, random: _Random) -> Draft:
+    """Move both stops by up to 2 % of the travel."""
+    seat, top = draft.travel * random.uniform(-0.02, 0.02, 2)
+    return draft.body(seat=float(seat), top=float(top))
 
 
 IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = MappingProxyType(
@@ -206,6 +222,7 @@ IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = Map
         "clock offset": _offset,
         "low rate": _rate,
         "jitter": _jitter,
+        "cut stamps": _cut,
         "drops": _drops,
         "held": _held,
         "dead band": _dead_band,
@@ -214,8 +231,11 @@ IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = Map
         "along travel": _along,
         "in record": _in_record,
         "curved": _curved,
-        "presliding": _presliding,
-        "dead zone": _dead_zone,
+        "stops": _stops,
+        "LuGre": _bending(Law.LUGRE),
+        "Maxwell": _bending(Law.MAXWELL),
+        "Karnopp": _dead_zone(Law.KARNOPP),
+        "latched": _dead_zone(Law.LATCHED),
     }
 )
 """Imperfections by name: each draws its own size."""
@@ -223,9 +243,9 @@ IMPERFECTIONS: Mapping[str, Callable[[Draft, np.random.Generator], Draft]] = Map
 _EXCLUDE = (
     {"noise", "coloured noise", "quantised"},
     {"stem lag", "pressure lag", "volume", "clock offset"},
-    {"low rate", "jitter", "drops", "held", "dead band"},
+    {"low rate", "jitter", "cut stamps", "drops", "held", "dead band"},
     {"asymmetric", "along travel", "in record"},
-    {"presliding", "dead zone"},
+    {"LuGre", "Maxwell", "Karnopp", "latched"},
 )
 """Of each of these, one at a time."""
 
@@ -235,20 +255,15 @@ def drawn_imperfections(
 ) -> tuple[Draft, tuple[str, ...]]:
     """Add one to three imperfections to a valve with ordinary instruments; return their names."""
     draft = Draft(valve, instruments_of(valve, random))
-    wanted, names = int(random.integers(1, _MOST + 1)), []
-    candidates = [
-        name
-        for name in random.permutation(list(IMPERFECTIONS))
-        # A cylinder has no spring that could be curved, a slipping packing no other curve.
-        if not (name == "curved" and not valve.plant.body.spring)
-        and not (name == "dead zone" and valve.slips)
-    ]
-    for name in map(str, candidates):
-        if len(names) == wanted:
-            break
-        if any(name in group and group & set(names) for group in _EXCLUDE):
+    wanted = int(random.integers(1, _MOST + 1))
+    names: list[str] = []
+    for name in map(str, random.permutation(list(IMPERFECTIONS))):
+        # There is no spring that could be curved, or the packing has a curve of its own already.
+        is_odd = name == "curved" and not valve.plant.body.spring
+        is_odd |= name in ("Karnopp", "latched") and valve.slips
+        if is_odd or any(name in group and group & set(names) for group in _EXCLUDE):
             continue
-        names.append(name)
+        names = [*names, name][:wanted]
     # The rate first: others depend on it.
     for name in sorted(names, key=lambda one: one != "low rate"):
         draft = IMPERFECTIONS[name](draft, random)

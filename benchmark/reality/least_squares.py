@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from benchmark.reality.records import Record
@@ -23,12 +22,14 @@ def sliding_friction(record: Record) -> float:
     stamps, position = record.position.stamps / 1e9, record.position.values
     pressure_stamps = record.pressure.stamps / 1e9
     period = float(np.median(np.diff(stamps)))
-    time = np.arange(max(stamps[0], pressure_stamps[0]), min(stamps[-1], pressure_stamps[-1]), period)
+    time = np.arange(
+        max(stamps[0], pressure_stamps[0]), min(stamps[-1], pressure_stamps[-1]), period
+    )
     window = 2 * max(round(_WINDOW / period / 2), 2) + 1
     stem = np.interp(time, stamps, position)
     pressure = np.interp(time, pressure_stamps, record.pressure.values)
-    place: NDArray[np.float64] = savgol_filter(stem, window, 2)
-    speed: NDArray[np.float64] = savgol_filter(stem, window, 2, deriv=1, delta=period)
+    place = savgol_filter(stem, window, 2)
+    speed = savgol_filter(stem, window, 2, deriv=1, delta=period)
     force = record.nominal.diaphragm_area * savgol_filter(pressure, window, 2)
     slides = np.abs(speed) > _SURELY * np.abs(speed).max()
     columns = np.column_stack([np.sign(speed), speed, place, np.ones_like(speed)])[slides]

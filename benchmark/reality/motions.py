@@ -235,9 +235,7 @@ def _command(valve: DrawnValve, place: float, way: float) -> float:
     return (pressure - valve.low) / (valve.high - valve.low)
 
 
-def _partial(
-    valve: DrawnValve, random: _Random, place: float, start: float, away: float, back: float
-) -> Drive:
+def _partial(valve: DrawnValve, random: _Random, start: float, away: float, back: float) -> Drive:
     """Go from a command to another one and back, once, by ramps; rest before and after."""
     moving = max(log_uniform(random, 3.0, 15.0), 2.0 * valve.settling)
     rests = [log_uniform(random, 2.0, 15.0) for _ in range(3)]
@@ -254,14 +252,14 @@ def _from_stop(valve: DrawnValve, random: _Random) -> Drive:
     place, way = (1.0, -1.0) if upper else (0.0, 1.0)
     pressed = _command(valve, place, -way) - way * random.uniform(0.0, 0.1)
     away = _command(valve, place + 0.1 * way, way)
-    return _partial(valve, random, place, pressed, away, pressed)
+    return _partial(valve, random, pressed, away, pressed)
 
 
 def _from_middle(valve: DrawnValve, random: _Random) -> Drive:
     place, way = random.uniform(0.35, 0.65), float(random.choice([-1.0, 1.0]))
     start = _command(valve, place, 0.0)
     away = _command(valve, place + 0.1 * way, way)
-    return _partial(valve, random, place, start, away, _command(valve, place, -way))
+    return _partial(valve, random, start, away, _command(valve, place, -way))
 
 
 _FAST = 0.002

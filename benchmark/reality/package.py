@@ -4,31 +4,48 @@ The only file here that knows the package.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
 from benchmark.reality.records import Nominal, Record
+from valve_friction_ros import read_recording
 from valve_friction_ros.health import Baseline, Level, StatusSignal, diagnose_valve
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     IdentificationSettings,
     RefusalError,
+    Result,
     method_named,
 )
-from valve_friction_ros.identification.robust.fitted_record import fitted_record
+from valve_friction_ros.identification.robust import method as engine
 from valve_friction_ros.identification.robust.intervals import estimated
-from valve_friction_ros.identification.robust.method import prior_of, stamped_record
-from valve_friction_ros.identification.robust.search import posteriors_at, search
+from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.robust.search import _Search, search
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
 
-__all__ = ["Answer", "Modes", "Number", "alarms", "identify", "is_baseline", "modes"]
+__all__ = [
+    "Answer",
+    "Ends",
+    "Number",
+    "alarms",
+    "ends",
+    "identify",
+    "identify_file",
+    "is_baseline",
+]
 
 _WINDOW = 1e4
 """Longer than any record, s."""
+
+_STEPS = 25
+"""Of a fit that begins at the truth; few are taken."""
 
 
 @dataclass(frozen=True)
@@ -52,38 +69,38 @@ class Answer:
         Why there is no result; empty if there is one.
     warnings : tuple of str
         What it warns of.
-    native : object
-        The result itself.
+    native, fits : object
+        The result itself, and the fits behind it.
     """
 
     numbers: Mapping[str, Number] = field(default_factory=dict)
     refusal: str = ""
     warnings: tuple[str, ...] = ()
-    native: Any = None
+    native: Result | None = None
+    fits: Sequence[PosteriorFit] = ()
 
 
-@dataclass(frozen=True)
-class Modes:
-    """Where the search ends, beside a fit that is begun at the truth.
+class Ends(NamedTuple):
+    """Where the search ended, beside a fit that was begun at the truth.
 
     Attributes
     ----------
     found, begun : float
-        Their sums of squares, over the inflation of the second.
-    coulomb : tuple of Number
+        Sums of squares of both, in variances of the residual of the second.
+    coulomb_found, coulomb_begun : Number
         F_c of both.
     half_widths : mapping of str to float
-        Of the posterior begun at the truth.
+        Of the fit that was begun at the truth.
     """
 
     found: float
     begun: float
-    coulomb: tuple[Number, Number]
+    coulomb_found: Number
+    coulomb_begun: Number
     half_widths: Mapping[str, float]
 
 
-def valve_of(nominal: Nominal) -> Valve:
-    """Return the valve as its user describes it."""
+def _valve(nominal: Nominal) -> Valve:
     return Valve(
         nominal.diaphragm_area,
         nominal.pressure_reference,
@@ -93,9 +110,9 @@ def valve_of(nominal: Nominal) -> Valve:
     )
 
 
-def _settings(nominal: Nominal) -> IdentificationSettings:
+def _settings(has_spring: bool) -> IdentificationSettings:
     """Return the defaults; that there is no spring is said, as a user has to."""
-    return IdentificationSettings(fixed={} if nominal.has_spring else {"spring_constant": 0.0})
+    return IdentificationSettings(fixed={} if has_spring else {"spring_constant": 0.0})
 
 
 def _recording(record: Record) -> Recording:
@@ -107,26 +124,58 @@ def _recording(record: Record) -> Recording:
         stamps.append(signal.stamps[new])
         values.append(signal.values[new])
     order = np.argsort(np.concatenate(stamps), kind="stable")
-    every = (np.concatenate(one)[order] for one in (kinds, stamps, values))
-    buffer = RecordBuffer(valve_of(record.nominal), _WINDOW)
-    buffer.add_arrivals(Arrivals(*every))
+    buffer = RecordBuffer(_valve(record.nominal), _WINDOW)
+    arrivals = Arrivals(
+        np.concatenate(kinds)[order], np.concatenate(stamps)[order], np.concatenate(values)[order]
+    )
+    buffer.add_arrivals(arrivals)
     return buffer.snapshot().recording()
+
+
+@contextmanager
+def _seen_fits() -> Iterator[list[PosteriorFit]]:
+    """Collect the fits that an identification ends with; a second search would double the time."""
+    seen: list[PosteriorFit] = []
+
+    def collecting(*arguments: Any) -> list[PosteriorFit]:
+        seen[:] = search(*arguments)
+        return seen
+
+    with patch.object(engine, "search", collecting):
+        yield seen
+
+
+def _answer(recording: Recording, valve: Valve, has_spring: bool, method: str) -> Answer:
+    with _seen_fits() as fits:
+        try:
+            result = method_named(method)(recording, valve, _settings(has_spring))
+        except RefusalError as refusal:
+            return Answer(refusal=str(refusal), fits=tuple(fits))
+    numbers = {
+        name: Number(one.value, one.half_width, one.verdict.value)
+        for name, one in result.parameters.items()
+    }
+    return Answer(numbers, "", tuple(result.warnings), result, tuple(fits))
 
 
 def identify(record: Record, method: str = DEFAULT_METHOD) -> Answer:
     """Identify a record as a node does, through the buffer, with the stamps as they are."""
     try:
         recording = _recording(record)
-        result = method_named(method)(
-            recording, valve_of(record.nominal), _settings(record.nominal)
-        )
     except RefusalError as refusal:
         return Answer(refusal=str(refusal))
-    numbers = {
-        name: Number(one.value, one.half_width, one.verdict.value)
-        for name, one in result.parameters.items()
-    }
-    return Answer(numbers, warnings=tuple(result.warnings), native=result)
+    nominal = record.nominal
+    return _answer(recording, _valve(nominal), nominal.has_spring, method)
+
+
+def identify_file(path: Path, method: str = DEFAULT_METHOD) -> Answer:
+    """Identify a file of a machine without a spring that a force drives."""
+    valve = Valve()
+    try:
+        recording = read_recording(path, valve)
+    except RefusalError as refusal:
+        return Answer(refusal=str(refusal))
+    return _answer(recording, valve, False, method)
 
 
 def is_baseline(answer: Answer) -> bool:
@@ -140,7 +189,7 @@ def is_baseline(answer: Answer) -> bool:
     return True
 
 
-def alarms(answer: Answer, healthy: Answer | None) -> dict[str, str]:
+def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     """Compare with the result of the healthy valve, as the monitor does.
 
     The keys are "high" and "low" for its friction, and "other" for all else that is more than OK
@@ -148,57 +197,53 @@ def alarms(answer: Answer, healthy: Answer | None) -> dict[str, str]:
     """
     if answer.native is None:
         return {}
-    baseline = Baseline.of(healthy.native) if healthy and is_baseline(healthy) else None
-    diagnosis = diagnose_valve(answer.native, baseline)
+    baseline = Baseline.of(healthy.native) if healthy.native and is_baseline(healthy) else None
+    friction, findings = diagnose_valve(answer.native, baseline)
     found = {}
-    for one in (diagnosis.friction, *diagnosis.findings):
-        if one.level is Level.OK and one.status_signal is StatusSignal.GOOD:
-            continue
-        ratio = getattr(one, "ratio", None)
+    if friction.status_signal is not StatusSignal.GOOD or friction.level is not Level.OK:
         side = "other"
-        if one is diagnosis.friction and one.status_signal is not StatusSignal.CHECK_FUNCTION:
-            is_low = one.status_signal is StatusSignal.OUT_OF_SPECIFICATION
-            side = "low" if is_low or (ratio is not None and ratio.value < 1.0) else "high"
-        found[side] = f"{one.level.name} {one.status_signal.value}: {one.message}"
+        if friction.status_signal is not StatusSignal.CHECK_FUNCTION:
+            is_low = friction.status_signal is StatusSignal.OUT_OF_SPECIFICATION
+            side = "low" if is_low else "high"
+        found[side] = _words(friction)
+    for finding in findings:
+        if finding.status_signal is not StatusSignal.GOOD or finding.level is not Level.OK:
+            found["other"] = _words(finding)
     return found
 
 
-_AT_TRUTH = {
-    "coulomb_friction": "coulomb_friction",
-    "viscous_friction": "viscous_friction",
-    "spring_constant": "spring_constant",
-    "spring_preload": "spring_preload",
-    "mass": "mass",
-}
+def _words(one: Any) -> str:
+    return f"{one.level.name} {one.status_signal.value}: {one.message}"
 
 
-def modes(record: Record) -> Modes | None:
-    """Search, and fit from the truth; None where the package does not simulate such a valve."""
-    if not record.nominal.has_spring:
+def ends(record: Record, answer: Answer) -> Ends | None:
+    """Compare the search with a fit begun at the truth; None where nothing was simulated."""
+    if not answer.fits:
         return None
-    settings, truth = _settings(record.nominal), record.truth
-    at = {name: truth[other].value for name, other in _AT_TRUTH.items()}
+    found, truth = answer.fits[0], record.truth
+    at = {
+        name: truth[name].value
+        for name in (
+            "coulomb_friction",
+            "viscous_friction",
+            "spring_constant",
+            "spring_preload",
+            "mass",
+        )
+    }
+    at |= {**record.late, "start_position": record.start}
     at["slip_force"] = truth["static_friction"].value - truth["coulomb_friction"].value
-    at["delay"] = truth["clock_offset"].value
-    at["start_position"] = record.start
+    engine_at = _Search(found.model.record, engine.prior_of(_settings(True)))
+    names = engine_at.all
     if math.isfinite(truth["stribeck_velocity"].value):
         at["stribeck_velocity"] = truth["stribeck_velocity"].value
-    recording, valve = _recording(record), valve_of(record.nominal)
-    try:
-        fitted = fitted_record(stamped_record(recording), valve)
-        prior = prior_of(settings)
-        found = search(fitted, prior)
-        begun = posteriors_at(fitted, prior, at, True)
-    except RefusalError:
-        return None
-    ends = [estimated(found), estimated(begun)]
-    scale = begun[0].inflation
-    return Modes(
-        found[0].objective / scale,
-        begun[0].objective / scale,
-        tuple(
-            Number(one["coulomb_friction"].value, one["coulomb_friction"].half_width, "")
-            for one in ends
-        ),
-        {name: one.half_width for name, one in ends[1].items()},
+        names = (*(name for name in names if name != "at_low_speed"), "stribeck_velocity")
+    begun = engine_at.fit({**engine_at.base, **at}, names, _STEPS, engine_at.exact)
+    numbers = [estimated(fits) for fits in (answer.fits, [begun])]
+    first, second = (
+        Number(one["coulomb_friction"].value, one["coulomb_friction"].half_width, "")
+        for one in numbers
     )
+    scale = begun.inflation
+    widths = {name: one.half_width for name, one in numbers[1].items()}
+    return Ends(found.objective / scale, begun.objective / scale, first, second, widths)

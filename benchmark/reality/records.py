@@ -2,18 +2,18 @@
 
 import json
 import math
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmark.reality.imperfections import Draft, drawn_imperfections
 from benchmark.reality.motions import Drive, Kind, drawn_drive
-from benchmark.reality.plants import Law, Motion, move
+from benchmark.reality.plants import Motion, move
 from benchmark.reality.plants.kernel import GRID
 from benchmark.reality.sensors import Signal, measured
 from benchmark.reality.truth import TrueValue, truth_of
@@ -28,7 +28,7 @@ _LEAST_MOVE = 0.008
 slides."""
 
 _REVERSALS = 6
-_LEAST_SWING = 0.003
+_LEAST_SWING = 0.005
 
 
 class Case(NamedTuple):
@@ -116,6 +116,9 @@ class Record:
         What is imperfect.
     start : float
         True position at the begin of the record, m.
+    late : mapping of str to float
+        Clock offset of the stem ("delay"), lag of its sensor ("stem_lag"), and volume less lag of
+        the pressure sensor ("force_lag"), s.
     """
 
     nominal: Nominal
@@ -129,6 +132,7 @@ class Record:
     rate: float = math.nan
     imperfections: tuple[str, ...] = ()
     start: float = math.nan
+    late: Mapping[str, float] = field(default_factory=dict)
 
 
 def _draft(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...]]:
@@ -207,6 +211,7 @@ def make_record(case: Case) -> Record:
     plant = replace(valve.plant, friction=friction)
     truth = truth_of(plant, motion, instruments, drive.duration)
     begin = round(drive.before / GRID)
+    clocks = instruments.pressure_stamping.offset, instruments.position_stamping.offset
     return Record(
         nominal=Nominal(
             body.area,
@@ -218,14 +223,19 @@ def make_record(case: Case) -> Record:
         ),
         pressure=pressure,
         position=position,
-        truth=truth.as_mapping(),
+        truth=truth,
         name=case.name,
         kind=valve.kind,
         slips=valve.slips,
         share=valve.friction_share,
         rate=instruments.position_stamping.rate,
-        imperfections=(*names, *(("law " + friction.law.value,) if friction.law is not Law.MOREAU else ())),
+        imperfections=names,
         start=float(motion.position[begin]),
+        late={
+            "delay": clocks[1] - clocks[0],
+            "stem_lag": instruments.position.lag,
+            "force_lag": body.volume_lag - instruments.pressure.lag,
+        },
     )
 
 
@@ -241,7 +251,7 @@ def save(record: Record, path: Path) -> None:
     }
     parts |= {"nominal": asdict(record.nominal)}
     parts |= {"truth": {name: asdict(one) for name, one in record.truth.items()}}
-    arrays = {}
+    arrays: dict[str, NDArray[Any]] = {}
     for name in _SIGNALS:
         signal = getattr(record, name)
         arrays |= {f"{name}_stamps": signal.stamps, name: signal.values}
@@ -252,9 +262,9 @@ def load(folder: Path) -> Iterator[Record]:
     """Read what `save` wrote, in the order of the names."""
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as file:
-            parts = json.loads(str(file["about"]))
-            signals = {name: Signal(file[f"{name}_stamps"], file[name]) for name in _SIGNALS}
+            parts: dict[str, Any] = json.loads(str(file["about"]))
+            parts |= {name: Signal(file[f"{name}_stamps"], file[name]) for name in _SIGNALS}
         parts["nominal"] = Nominal(**parts["nominal"])
         parts["truth"] = {name: TrueValue(**one) for name, one in parts["truth"].items()}
         parts["imperfections"] = tuple(parts["imperfections"])
-        yield Record(**signals, **parts)
+        yield Record(**parts)

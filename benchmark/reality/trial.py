@@ -1,4 +1,4 @@
-"""One valve tried: its records made, identified within a time limit, and compared with the truth."""
+"""One valve tried: its records made, identified within a time limit, and compared."""
 
 import json
 import math
@@ -6,7 +6,8 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -183,19 +184,19 @@ def _row(task: Task, case: Case, record: Record) -> tuple[Row, Answer]:
     return row, answer
 
 
-def _with_modes(task: Task, row: Row, record: Record) -> Row:
+def _with_ends(task: Task, row: Row, record: Record, answer: Answer) -> Row:
     """Add how the search compares with a fit begun at the truth."""
-    modes, _, _ = _within(2.0 * task.limit, lambda: package.modes(record))
-    if modes is None:
-        return row
-    found, begun = modes.coulomb
-    parts = {
-        "found": modes.found,
-        "begun": modes.begun,
-        "coulomb_apart": abs(found.value - begun.value) / max(found.half_width, 1e-12),
-        "widths": modes.half_widths,
-    }
-    return Row(**{**vars(row), **parts})
+    ends, failure, _ = _within(task.limit, lambda: package.ends(record, answer))
+    if ends is None:
+        return replace(row, failure=row.failure or failure)
+    found, begun = ends.coulomb_found, ends.coulomb_begun
+    return replace(
+        row,
+        found=ends.found,
+        begun=ends.begun,
+        coulomb_apart=abs(found.value - begun.value) / found.half_width,
+        widths=ends.half_widths,
+    )
 
 
 def _made(task: Task, case: Case) -> Record:
@@ -227,17 +228,19 @@ def tried(task: Task) -> list[Row]:
         return [Row(task.part, case.name, case.motion.value, failure=str(error))]
     row, answer = _row(task, case, record)
     if task.part != "alarms":
-        return [_with_modes(task, row, record)]
+        return [_with_ends(task, row, record, answer)]
     has_baseline = answer.native is not None and package.is_baseline(answer)
     rows = []
     for again, change in enumerate(CHANGES, start=1):
         other = case._replace(again=again, change=change)
         row, later = _row(task, other, _made(task, other))
-        alarms, failure, _ = _within(task.limit, lambda one=later: package.alarms(one, answer))  # type: ignore[misc]
-        parts = {
-            "has_baseline": has_baseline,
-            "alarms": alarms or {},
-            "failure": row.failure or failure,
-        }
-        rows.append(Row(**{**vars(row), **parts}))
+        alarms, failure, _ = _within(task.limit, partial(package.alarms, later, answer))
+        rows.append(
+            replace(
+                row,
+                has_baseline=has_baseline,
+                alarms=alarms or {},
+                failure=row.failure or failure,
+            )
+        )
     return rows

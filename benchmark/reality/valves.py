@@ -100,7 +100,7 @@ def _size(random: np.random.Generator, largest_area: float) -> tuple[float, floa
 
 def _by_volume(law: tuple[float, float, float], volume: float, scatter: float) -> float:
     size, reference, power = law
-    return size * (volume / reference) ** power * math.exp(scatter)
+    return size * math.exp(power * math.log(volume / reference) + scatter)
 
 
 def _packing(
@@ -155,7 +155,7 @@ def drawn_valve(random: np.random.Generator, slips: bool, reserve: float = 1.0) 
 def drawn_cylinder(random: np.random.Generator, slips: bool) -> DrawnValve:
     """Draw a cylinder without a spring; its pressure is the difference of both chambers."""
     area, travel = _size(random, 0.03)
-    highest = random.choice([1e5, 3e5, 6e5])
+    highest = float(random.choice([1e5, 3e5, 6e5]))
     volume = area * travel
     filling = 0.1 * _by_volume(_FILLING, volume, random.uniform(-0.7, 0.7))
     mass = _by_volume(_MASS, volume, random.uniform(-0.6, 0.6))
