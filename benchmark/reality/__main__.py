@@ -6,6 +6,7 @@ import os
 import secrets
 import sys
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from rich.console import Console
@@ -21,7 +22,7 @@ __all__ = ["main"]
 
 _PROCESSES = 2
 _PARTS = ("plain", "stickslip", "alarms")
-_RECORDS, _BRIEF = (30, 16, 8), (3, 1, 1)
+_RECORDS, _BRIEF = (50, 24, 12), (4, 2, 1)
 """Of each motion, by default and in brief: in each of the parts."""
 
 _SLIPPING = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.HUNTING)
@@ -74,15 +75,17 @@ def _run(options: argparse.Namespace, console: Console) -> list[Row]:
     console.print(f"--entropy {entropy}")
     if options.save is not None:
         options.save.mkdir(parents=True, exist_ok=True)
-    tasks, rows = list(_tasks(options, entropy)), []
+    rows: list[Row] = []
+    context = multiprocessing.get_context("spawn")
     with (
         options.out.open("w", encoding="utf-8") as file,
-        multiprocessing.get_context("spawn").Pool(options.jobs) as pool,
+        ProcessPoolExecutor(options.jobs, context) as pool,
     ):
-        answers = pool.imap_unordered(tried, tasks)
-        for some in track(answers, "reality", len(tasks), console=Console(stderr=True)):
-            rows += some
-            file.writelines(row.as_line() + "\n" for row in some)
+        answers = [pool.submit(tried, task) for task in _tasks(options, entropy)]
+        console = Console(stderr=True)
+        for one in track(as_completed(answers), "reality", len(answers), console=console):
+            rows += one.result()
+            file.writelines(row.as_line() + "\n" for row in one.result())
             file.flush()
     return rows
 

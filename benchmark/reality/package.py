@@ -87,16 +87,15 @@ class Ends(NamedTuple):
     ----------
     found, begun : float
         Sums of squares of both, in variances of the residual of the second.
-    coulomb_found, coulomb_begun : Number
-        F_c of both.
+    coulomb : float
+        F_c where the search ended, N.
     half_widths : mapping of str to float
         Of the fit that was begun at the truth.
     """
 
     found: float
     begun: float
-    coulomb_found: Number
-    coulomb_begun: Number
+    coulomb: float
     half_widths: Mapping[str, float]
 
 
@@ -239,11 +238,7 @@ def ends(record: Record, answer: Answer) -> Ends | None:
         at["stribeck_velocity"] = truth["stribeck_velocity"].value
         names = (*(name for name in names if name != "at_low_speed"), "stribeck_velocity")
     begun = engine_at.fit({**engine_at.base, **at}, names, _STEPS, engine_at.exact)
-    numbers = [estimated(fits) for fits in (answer.fits, [begun])]
-    first, second = (
-        Number(one["coulomb_friction"].value, one["coulomb_friction"].half_width, "")
-        for one in numbers
-    )
+    widths = {name: one.half_width for name, one in estimated([begun]).items()}
+    coulomb = estimated(answer.fits)["coulomb_friction"].value
     scale = begun.inflation
-    widths = {name: one.half_width for name, one in numbers[1].items()}
-    return Ends(found.objective / scale, begun.objective / scale, first, second, widths)
+    return Ends(found.objective / scale, begun.objective / scale, coulomb, widths)

@@ -61,10 +61,10 @@ class Row:
         Sentences of the alarms, by their side (`package.alarms`).
     found, begun : float
         Sums of squares where the search ended, and where the fit that was begun at the truth did.
-    coulomb_apart : float
-        Distance of both in F_c, in half widths of the first.
+    coulomb : float
+        F_c where the search ended, N.
     widths : mapping of str to float
-        Half widths of the posterior at the truth.
+        Half widths of the fit that was begun at the truth.
     """
 
     part: str
@@ -88,7 +88,7 @@ class Row:
     alarms: Mapping[str, str] = field(default_factory=dict)
     found: float = math.nan
     begun: float = math.nan
-    coulomb_apart: float = math.nan
+    coulomb: float = math.nan
     widths: Mapping[str, float] = field(default_factory=dict)
 
     def as_line(self) -> str:
@@ -189,14 +189,8 @@ def _with_ends(task: Task, row: Row, record: Record, answer: Answer) -> Row:
     ends, failure, _ = _within(task.limit, lambda: package.ends(record, answer))
     if ends is None:
         return replace(row, failure=row.failure or failure)
-    found, begun = ends.coulomb_found, ends.coulomb_begun
-    return replace(
-        row,
-        found=ends.found,
-        begun=ends.begun,
-        coulomb_apart=abs(found.value - begun.value) / found.half_width,
-        widths=ends.half_widths,
-    )
+    found, begun, coulomb, widths = ends
+    return replace(row, found=found, begun=begun, coulomb=coulomb, widths=widths)
 
 
 def _made(task: Task, case: Case) -> Record:

@@ -233,11 +233,20 @@ def test_least_squares_is_right_within_five_percent():
     assert not is_right(row())
 
 
-def test_mode_of_the_truth():
-    assert in_mode(row(found=1009.0, begun=1000.0, coulomb_apart=1.9))
-    assert in_mode(row(found=900.0, begun=1000.0, coulomb_apart=0.0))
-    assert not in_mode(row(found=1011.0, begun=1000.0, coulomb_apart=0.0))
-    assert not in_mode(row(found=1000.0, begun=1000.0, coulomb_apart=2.1))
+@pytest.mark.parametrize(
+    ("found", "coulomb", "width", "same"),
+    [
+        (1009.0, 104.9, 1.0, True),  # no half width below 2 %, and 1 N beyond is open
+        (1009.0, 105.1, 1.0, False),
+        (1009.0, 110.9, 5.0, True),
+        (1011.0, 100.0, 5.0, False),
+        (900.0, 100.0, 5.0, True),
+        (math.nan, 100.0, 5.0, False),
+    ],
+)
+def test_mode_of_the_truth(found, coulomb, width, same):
+    widths = {"coulomb_friction": width}
+    assert in_mode(row(found=found, begun=1000.0, coulomb=coulomb, widths=widths)) is same
     assert not in_mode(row())
 
 
@@ -246,7 +255,7 @@ def missed(*rows):
 
 
 def test_bounds():
-    good = row(least_squares=100.0, found=1.0, begun=1.0, coulomb_apart=0.0, slips=True)
+    good = row(least_squares=100.0, found=1.0, begun=1.0, coulomb=100.0, slips=True)
     widths = {"coulomb_friction": 0.8, "sliding_friction": 0.8}
     static = {"static_friction": Number(150.0, 1.0, "identified"), **good.numbers}
     good = replace(good, numbers=static, widths=widths)
