@@ -107,12 +107,6 @@ def _closed(
     return Drive(loop, signal, noise, before, duration)
 
 
-def _through(time: _Signal, moments: list[float], values: list[float]) -> _Signal:
-    """Return the lines between points."""
-    line: _Signal = np.interp(time, moments, values)
-    return line
-
-
 def _held(time: _Signal, moments: list[float], values: list[float]) -> _Signal:
     """Return steps: each value from its moment on."""
     return np.array(values)[np.searchsorted(moments, time, side="right") - 1]
@@ -133,7 +127,7 @@ def _ramp(valve: DrawnValve, random: _Random) -> Drive:
     rest = 0.05 * duration
     moments = [0.0, rest, 0.5 * duration, 0.5 * duration + rest, duration - rest]
     time = _time(5.0, duration)
-    return _open(valve, _through(time, moments, [low, low, high, high, low]), 5.0, duration)
+    return _open(valve, np.interp(time, moments, [low, low, high, high, low]), 5.0, duration)
 
 
 def _levels(valve: DrawnValve, random: _Random) -> Drive:
@@ -198,12 +192,18 @@ def _loop(valve: DrawnValve, random: _Random) -> Drive:
 
 def _hunting(valve: DrawnValve, random: _Random) -> Drive:
     """Let a controller of the flow hunt about a set point that hardly changes."""
-    duration, before = log_uniform(random, 90.0, 150.0), 60.0
+    friction = valve.plant.friction
     lag = log_uniform(random, 0.5, 2.0)
     filling = min(valve.filling, lag)
     # Without slip the loop is stable.
     slowest = lag + valve.settling - valve.filling + filling
     gain, integral = random.uniform(0.6, 1.6), slowest * log_uniform(random, 0.8, 1.6)
+    # The integral goes through twice F_c while the error is about F_s − F_c.
+    half = integral * 2.0 * friction.coulomb / (friction.static - friction.coulomb) / gain
+    duration, before = (
+        float(np.clip(20.0 * half, 90.0, 240.0)),
+        float(np.clip(5.0 * half, 20.0, 60.0)),
+    )
     time = _time(before, duration)
     place = random.uniform(0.35, 0.6)
     moved = place + random.uniform(-0.1, 0.1)
@@ -244,7 +244,8 @@ def _partial(valve: DrawnValve, random: _Random, start: float, away: float, back
     duration = moments[-1] + rests[2] + 3.0 * valve.settling
     before = 5.0 + 5.0 * valve.settling
     time = _time(before, duration)
-    return _open(valve, _through(time, moments, [start, start, away, away, back]), before, duration)
+    signal = np.interp(time, moments, [start, start, away, away, back])
+    return _open(valve, signal, before, duration)
 
 
 def _from_stop(valve: DrawnValve, random: _Random) -> Drive:

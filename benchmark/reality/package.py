@@ -59,18 +59,9 @@ class Number:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the package says of a record.
+    """What the package says of a record: numbers, or why there are none.
 
-    Attributes
-    ----------
-    numbers : mapping of str to Number
-        By the names of `truth.NAMES`; others are not compared.
-    refusal : str
-        Why there is no result; empty if there is one.
-    warnings : tuple of str
-        What it warns of.
-    native, fits : object
-        The result itself, and the fits behind it.
+    `native` is its own result, and `fits` are the fits behind it.
     """
 
     numbers: Mapping[str, Number] = field(default_factory=dict)
@@ -83,14 +74,8 @@ class Answer:
 class Ends(NamedTuple):
     """Where the search ended, beside a fit that was begun at the truth.
 
-    Attributes
-    ----------
-    found, begun : float
-        Sums of squares of both, in variances of the residual of the second.
-    coulomb : float
-        F_c where the search ended, N.
-    half_widths : mapping of str to float
-        Of the fit that was begun at the truth.
+    `found` and `begun` are the sums of squares of both, in variances of the residual of the second;
+    `coulomb` is F_c of the first, N, `half_widths` are those of the second.
     """
 
     found: float

@@ -19,18 +19,9 @@ _NEAR_EMPS = 0.03
 
 
 class RealRow(NamedTuple):
-    """A number of a real machine beside what others say of it.
+    """A number of a real machine beside what others say of it, SI unit.
 
-    Attributes
-    ----------
-    machine, name : str
-        Record, and number.
-    known, value, half_width : float
-        SI unit.
-    words : str
-        Verdict, or refusal.
-    met : bool
-        Whether it is as near and as narrow as it must be.
+    `words` are verdict or refusal; `met` tells whether it is as near and narrow as it must be.
     """
 
     machine: str

@@ -21,35 +21,22 @@ from benchmark.reality.valves import drawn_cylinder, drawn_valve
 
 __all__ = ["Case", "Nominal", "Record", "load", "make_record", "save"]
 
-_TRIES = 40
+_TRIES = 100
 _LEAST_MOVE = 0.008
 """A record must hold moves both ways of so much of the travel; hunting, so many reversals of
 `_LEAST_SWING`. Else valve and drive are drawn again: no method finds friction where nothing
 slides."""
 
 _REVERSALS = 6
-_LEAST_SWING = 0.005
+_LEAST_SWING = 0.004
 
 
 class Case(NamedTuple):
-    """A record to be made.
+    """A record to be made: of valve `number` with this `motion` in the run of an `entropy`.
 
-    Attributes
-    ----------
-    entropy : int
-        Of the whole run.
-    motion : Kind
-        What the valve does.
-    number : int
-        Which of that motion.
-    again : int
-        Which record of that valve: another signal, other noise.
-    change : float
-        Friction over that of the drawn valve.
-    slips : bool or None
-        Whether the packing slips; None: drawn too.
-    reserve : float
-        Factor by which the friction may grow before the actuator cannot stroke the valve.
+    `again` chooses another record of that valve, with another signal and other noise, and `change`
+    is its friction over that of the drawn valve. The packing `slips` or not; without a word that
+    is drawn too. By `reserve` the friction may grow before the actuator cannot stroke the valve.
     """
 
     entropy: int
@@ -155,12 +142,15 @@ def _seed(case: Case, attempt: int) -> list[int]:
     return [case.entropy, place, case.number, attempt, 1, case.again]
 
 
-def _moved(draft: Draft, case: Case, attempt: int) -> tuple[Drive, Motion]:
-    random = np.random.default_rng(_seed(case, attempt))
-    drive = drawn_drive(case.motion, draft.valve, random)
+@lru_cache(maxsize=1)
+def _moved(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...], Drive, Motion]:
+    """Draw and move a valve; kept, as the attempt that succeeds becomes the record."""
+    draft, names = _draft(case, attempt)
+    drive = drawn_drive(case.motion, draft.valve, np.random.default_rng(_seed(case, attempt)))
     plant = draft.valve.plant
     plant = replace(plant, friction=plant.friction.scaled(case.change))
-    return drive, move(plant, drive.loop, drive.signal, drive.disturbance, drive.before)
+    motion = move(plant, drive.loop, drive.signal, drive.disturbance, drive.before)
+    return replace(draft, valve=replace(draft.valve, plant=plant)), names, drive, motion
 
 
 def _swings(position: NDArray[np.float64], least: float) -> int:
@@ -187,12 +177,20 @@ def _is_excited(case: Case, draft: Draft, motion: Motion) -> bool:
     return _swings(position, _LEAST_MOVE * travel) >= 2
 
 
+def _jump(draft: Draft) -> float:
+    """Return by how much of its travel a stem that breaks away moves at least."""
+    body, friction = draft.valve.plant.body, draft.valve.plant.friction
+    return (friction.static - friction.coulomb) / (body.spring * body.travel)
+
+
 @lru_cache(maxsize=4)
 def _attempt(case: Case) -> int:
     """Return the first attempt in which the healthy valve moves enough."""
     for attempt in range(_TRIES):
-        draft, _ = _draft(case, attempt)
-        if _is_excited(case, draft, _moved(draft, case, attempt)[1]):
+        if case.motion is Kind.HUNTING and _jump(_draft(case, attempt)[0]) < _LEAST_SWING:
+            continue
+        draft, _, _, motion = _moved(case, attempt)
+        if _is_excited(case, draft, motion):
             return attempt
     raise ValueError(f"{case.name}: no valve moves in {_TRIES} draws")
 
@@ -200,16 +198,14 @@ def _attempt(case: Case) -> int:
 def make_record(case: Case) -> Record:
     """Make a record; the same each time, to the last bit."""
     attempt = _attempt(case._replace(again=0, change=1.0))
-    draft, names = _draft(case, attempt)
-    drive, motion = _moved(draft, case, attempt)
+    draft, names, drive, motion = _moved(case, attempt)
     valve, instruments = draft.valve, draft.instruments
-    body, friction = valve.plant.body, valve.plant.friction.scaled(case.change)
+    body = valve.plant.body
     seed = int(np.random.default_rng(_seed(case, attempt)).integers(2**31))
     pressure, position = measured(motion, instruments, drive.duration, seed)
     low, high = valve.sensor
     margin = 0.1 * (high - low)
-    plant = replace(valve.plant, friction=friction)
-    truth = truth_of(plant, motion, instruments, drive.duration)
+    truth = truth_of(valve.plant, motion, instruments, drive.duration)
     begin = round(drive.before / GRID)
     clocks = instruments.pressure_stamping.offset, instruments.position_stamping.offset
     return Record(
@@ -255,7 +251,8 @@ def save(record: Record, path: Path) -> None:
     for name in _SIGNALS:
         signal = getattr(record, name)
         arrays |= {f"{name}_stamps": signal.stamps, name: signal.values}
-    np.savez_compressed(path, about=np.array(json.dumps(parts)), **arrays)
+    arrays["about"] = np.array(json.dumps(parts))
+    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
 
 
 def load(folder: Path) -> Iterator[Record]:

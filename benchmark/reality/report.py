@@ -1,7 +1,9 @@
 """The rows as tables, and the bounds."""
 
 import math
+import re
 import statistics
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -106,14 +108,6 @@ def is_right(row: Row) -> bool:
     return truth is not None and truth.error(row.least_squares) <= _RIGHT * truth.value
 
 
-def _is_near(row: Row) -> bool:
-    return _near(row, SLIDING, _RIGHT)
-
-
-def _has_coulomb(row: Row) -> bool:
-    return _near(row, "coulomb_friction", 0.1)
-
-
 def in_mode(row: Row) -> bool:
     """Return whether the search ended where a fit that was begun at the truth does."""
     if not _is_fitted(row):
@@ -200,7 +194,9 @@ def _line(name: str, rows: _Rows) -> tuple[object, ...]:
         name,
         len(rows),
         _count(lambda row: row.refusal, rows),
-        *(_count(test, rows) for test in (is_useful, is_right, _is_near, _has_coulomb)),
+        *(_count(test, rows) for test in (is_useful, is_right)),
+        _count(lambda row: _near(row, SLIDING, _RIGHT), rows),
+        _count(lambda row: _near(row, "coulomb_friction", _USEFUL), rows),
         sum(one.wrong for one in numbers),
         *map(_inside, by_verdict),
         _median((row.seconds for row in rows), ".2f"),
@@ -209,7 +205,8 @@ def _line(name: str, rows: _Rows) -> tuple[object, ...]:
 
 
 def _light(row: Row) -> str:
-    return next(f"F_c to {high:.0%}" for high in (0.01, 0.03, 0.1, math.inf) if row.share < high)
+    limits = (0.01, 0.03, 0.1)
+    return next((f"F_c to {one:.0%}" for one in limits if row.share < one), "F_c above 10%")
 
 
 _CLASSES: dict[str, Callable[[Row], tuple[str, ...]]] = {
@@ -220,11 +217,20 @@ _CLASSES: dict[str, Callable[[Row], tuple[str, ...]]] = {
 }
 
 
+def _groups(
+    rows: _Rows, classes: Callable[[Row], tuple[str, ...]]
+) -> Iterator[tuple[str, list[Row]]]:
+    for name in dict.fromkeys(name for row in rows for name in classes(row)):
+        yield name, [row for row in rows if name in classes(row)]
+
+
+def _is_behind(rows: _Rows) -> bool:
+    return _count(is_useful, rows) < _count(is_right, rows)
+
+
 def _by_class(rows: _Rows) -> Iterator[str]:
     for title, classes in _CLASSES.items():
-        names = dict.fromkeys(name for row in rows for name in classes(row))
-        groups = {name: [row for row in rows if name in classes(row)] for name in names}
-        lines = [_line(name, some) for name, some in groups.items()]
+        lines = [_line(name, some) for name, some in _groups(rows, classes)]
         yield from _table((title, *_HEADS), [*lines, _line("all", rows)])
 
 
@@ -249,9 +255,8 @@ def _by_number(rows: _Rows) -> Iterator[str]:
 def _by_motion(
     rows: _Rows, heads: Sequence[str], line: Callable[[_Rows], Sequence[object]]
 ) -> Iterator[str]:
-    motions = (*dict.fromkeys(row.motion for row in rows), "all")
-    groups = {name: [row for row in rows if name in (row.motion, "all")] for name in motions}
-    yield from _table(heads, ((name, *line(some)) for name, some in groups.items()))
+    groups = [*_groups(rows, _CLASSES["motion"]), ("all", rows)]
+    yield from _table(heads, ([name, *line(some)] for name, some in groups))
 
 
 def _slips(rows: _Rows) -> Sequence[object]:
@@ -323,6 +328,8 @@ def bounds(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[Bound]:
         useful, right = _count(is_useful, plain), _count(is_right, plain)
         what = "useful at least as often as least squares are within 5 %"
         yield Bound(what, f"{useful}, and {right}", useful >= right)
+        behind = [name for name, some in _groups(plain, _CLASSES["motion"]) if _is_behind(some)]
+        yield Bound("the same with each motion; not in", ", ".join(behind) or "in all", not behind)
         easy = [row for row in plain if row.motion in ("levels", "multisine") and _is_fast(row)]
         yield _least("useful, levels and multisines of 100 Hz and better", is_useful, easy, 0.9)
     yield from _bounds_of_the_mode([row for row in rows if row.part != "alarms"])
@@ -351,9 +358,9 @@ def _missed(rows: _Rows) -> Iterator[str]:
             yield f"- failed: {row.part} {row.name}: {row.failure}"
         for words in row.alarms.values() if row.change == 1.0 else ():
             yield f"- alarm of an unchanged valve: {row.name}: {words[:200]}"
-    refusals = [row.refusal[:60] for row in rows if row.refusal]
-    for words in dict.fromkeys(refusals):
-        yield f"- refused {refusals.count(words)} times: {words} …"
+    refusals = Counter(re.sub(r"-?\d[\d.]*", "#", row.refusal)[:60] for row in rows if row.refusal)
+    for words, count in refusals.most_common():
+        yield f"- refused {count} times: {words} …"
 
 
 def report(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[str]:
@@ -368,16 +375,16 @@ def report(rows: _Rows, real: Sequence[RealRow] = ()) -> Iterator[str]:
         yield from _by_motion(slips, heads, _slips)
     if alarms := [row for row in rows if row.part == "alarms"]:
         declared = (f"×{change:g} declared" for change in CHANGES[1:])
-        heads = ("alarms", "baseline", "unchanged: alarms", *declared)
-        yield from _by_motion(alarms, heads, _alarms)
+        watched = ("alarms", "baseline", "unchanged: alarms", *declared)
+        yield from _by_motion(alarms, watched, _alarms)
     if real:
-        lines = (
+        machines = (
             (*one[:2], f"{one.known:.4g}", f"{one.value:.4g}", f"{one.half_width:.2g}", one.words)
             for one in real
         )
-        yield from _table(("machine", "number", "known", "found", "±", ""), lines)
+        yield from _table(("machine", "number", "known", "found", "±", ""), machines)
     yield ""
     yield from _missed(rows)
     marks = {True: "met", False: "**missed**"}
-    reached = ((*one[:2], marks[one.met]) for one in bounds(rows, real))
+    reached = [(one.what, one.reached, marks[one.met]) for one in bounds(rows, real)]
     yield from _table(("bound", "reached", ""), reached)

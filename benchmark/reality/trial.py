@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,37 +34,12 @@ _T = TypeVar("_T")
 class Row:
     """What became of one record.
 
-    Attributes
-    ----------
-    part : str
-        "plain", "stickslip" or "alarms".
-    name, motion, kind, slips, share, rate, duration, imperfections
-        The record: its case, motion, kind of valve, whether the packing slips, F_c over the force
-        of the spring, samples a second, length (s) and what is imperfect.
-    change : float
-        Friction over that of the baseline.
-    truth : mapping of str to TrueValue
-        What is true.
-    numbers : mapping of str to Number
-        What was answered.
-    refusal, failure : str
-        Why there is no result; why there is no answer at all, an error or too long.
-    warnings : tuple of str
-        What the package warns of.
-    least_squares : float
-        Sliding friction by plain least squares, N.
-    seconds : float
-        Processor time of the identification, s.
-    has_baseline : bool or None
-        Whether the healthy valve gave a baseline; None where none was tried.
-    alarms : mapping of str to str
-        Sentences of the alarms, by their side (`package.alarms`).
-    found, begun : float
-        Sums of squares where the search ended, and where the fit that was begun at the truth did.
-    coulomb : float
-        F_c where the search ended, N.
-    widths : mapping of str to float
-        Half widths of the fit that was begun at the truth.
+    `part` is "plain", "stickslip" or "alarms"; `name` to `change` are the record's (`Record`,
+    `Case`), its length in s. Truth and numbers are by the names of `truth.NAMES`; `refusal` says
+    why there is no result, `failure` why there is no answer at all. `least_squares` is the sliding
+    friction, N; `seconds` the processor time. `has_baseline` tells whether the healthy valve gave
+    one, `alarms` are sentences by their side (`package.alarms`). `found` to `widths` are those of
+    `package.Ends`.
     """
 
     part: str
@@ -109,20 +84,10 @@ def rows_of(path: Path) -> list[Row]:
     return rows
 
 
-@dataclass(frozen=True)
-class Task:
-    """All records of one valve.
+class Task(NamedTuple):
+    """All records of one valve: the `case` is the first.
 
-    Attributes
-    ----------
-    part : str
-        "plain", "stickslip" or "alarms".
-    case : Case
-        The first record of the valve.
-    limit : float
-        Processor time for one identification, s.
-    folder : Path or None
-        Where the records are kept.
+    An identification may take `limit` seconds of the processor; records are kept in `folder`.
     """
 
     part: str

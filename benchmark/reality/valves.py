@@ -31,12 +31,14 @@ _SLOWEST = 0.6
 """Viscous over Coulomb friction at the speed of a large step, and the largest F_v/k, over the
 filling time: a valve that is slower than its actuator is none."""
 
-_FILLING = (0.5, 1.27e-3, 0.4)
+_FILLING = (0.9, 1.27e-3, 0.3)
 _MASS = (3.0, 1.27e-3, 0.8)
 """Filling time (s) and mass (kg): of an actuator of this volume (m³), and the power of it by which
 they grow."""
 
 _ABSOLUTE = 101325.0
+_OVERDRIVEN = 1.15
+"""Atmosphere, Pa, and the largest command of a controller."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ def drawn_valve(random: np.random.Generator, slips: bool, reserve: float = 1.0) 
         zero = _ABSOLUTE if is_absolute else 0.0
         preload = area * low + reserve * beside * force
         body = Body(mass, spring, preload, area, zero, travel)
-        top = next(one for one in _SENSORS if one >= high)
+        top = next(one for one in _SENSORS if one >= low + _OVERDRIVEN * (high - low))
         kind = "piston" if piston else "diaphragm"
         sensor = (zero, zero + top)
         return DrawnValve(Plant(body, friction), zero + low, zero + high, filling, sensor, kind)
@@ -157,7 +159,7 @@ def drawn_cylinder(random: np.random.Generator, slips: bool) -> DrawnValve:
     area, travel = _size(random, 0.03)
     highest = float(random.choice([1e5, 3e5, 6e5]))
     volume = area * travel
-    filling = 0.1 * _by_volume(_FILLING, volume, random.uniform(-0.7, 0.7))
+    filling = 0.05 * _by_volume(_FILLING, volume, random.uniform(-0.7, 0.7))
     mass = _by_volume(_MASS, volume, random.uniform(-0.6, 0.6))
     speed = travel * log_uniform(random, 0.05, 0.3)
     force = 0.5 * area * highest
