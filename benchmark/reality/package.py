@@ -30,22 +30,14 @@ from valve_friction_ros.identification.robust.search import _Search, search
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
 
-__all__ = [
-    "Answer",
-    "Ends",
-    "Number",
-    "alarms",
-    "ends",
-    "identify",
-    "identify_file",
-    "is_baseline",
-]
+__all__ = ["Answer", "Ends", "Number", "alarms", "ends", "identify", "identify_file", "is_baseline"]
 
 _WINDOW = 1e4
 """Longer than any record, s."""
 
+_PLAIN = ("mass", "coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
 _STEPS = 25
-"""Of a fit that begins at the truth; few are taken."""
+"""Coordinates and most steps of a fit that begins at the truth; few steps are taken."""
 
 
 @dataclass(frozen=True)
@@ -205,16 +197,7 @@ def ends(record: Record, answer: Answer) -> Ends | None:
     if not answer.fits:
         return None
     found, truth = answer.fits[0], record.truth
-    at = {
-        name: truth[name].value
-        for name in (
-            "coulomb_friction",
-            "viscous_friction",
-            "spring_constant",
-            "spring_preload",
-            "mass",
-        )
-    }
+    at = {name: truth[name].value for name in _PLAIN}
     at |= {**record.late, "start_position": record.start}
     at["slip_force"] = truth["static_friction"].value - truth["coulomb_friction"].value
     engine_at = _Search(found.model.record, engine.prior_of(_settings(True)))

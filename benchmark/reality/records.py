@@ -204,19 +204,13 @@ def make_record(case: Case) -> Record:
     seed = int(np.random.default_rng(_seed(case, attempt)).integers(2**31))
     pressure, position = measured(motion, instruments, drive.duration, seed)
     low, high = valve.sensor
-    margin = 0.1 * (high - low)
+    margin, sizes = 0.1 * (high - low), (body.area, body.pressure_reference, body.travel)
+    nominal = Nominal(*sizes, low - margin, high + margin, body.spring > 0.0)
     truth = truth_of(valve.plant, motion, instruments, drive.duration)
     begin = round(drive.before / GRID)
     clocks = instruments.pressure_stamping.offset, instruments.position_stamping.offset
     return Record(
-        nominal=Nominal(
-            body.area,
-            body.pressure_reference,
-            body.travel,
-            low - margin,
-            high + margin,
-            has_spring=body.spring > 0.0,
-        ),
+        nominal=nominal,
         pressure=pressure,
         position=position,
         truth=truth,
