@@ -129,7 +129,7 @@ accuracy: venv  ## what the estimate reaches, in half an hour; ACCURACY_ARGS="--
 	@"$(VENV)/bin/python" -m benchmark.accuracy $(ACCURACY_ARGS)
 
 .PHONY: reality
-reality: venv  ## the estimate on valves and sensors with imperfections; REALITY_ARGS="--brief --seeds 1" for less
+reality: venv  ## the estimate on drawn valves and sensors with imperfections, in half an hour; REALITY_ARGS=--brief for less
 	@OPENBLAS_NUM_THREADS=1 "$(VENV)/bin/python" -m benchmark.reality $(REALITY_ARGS)
 
 .PHONY: service

@@ -8,19 +8,18 @@ record. Beside it the same valve plays the default square wave of equal band and
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmark.reality.package import identification
+from benchmark.reality.package import identify
 from benchmark.reality.plants import Body, Friction, Law, Plant, Trend, move
 from benchmark.reality.plants.kernel import GRID, Loop
-from benchmark.reality.records import Case, Nominal, Record
+from benchmark.reality.records import Nominal, Record
 from benchmark.reality.sensors import Instruments, measured
 from benchmark.reality.stamps import Stamping
-from benchmark.reality.suite import cases
 from benchmark.reality.truth import truth_of
-from valve_friction_ros.identification import DEFAULT_METHOD, IdentificationSettings, RefusalError
+from valve_friction_ros.identification import IdentificationSettings, RefusalError
 from valve_friction_ros.model import Excitation, SquareWave, Valve
 from valve_friction_ros.planning import Conditions, Limits, StrokePlan, known_friction, plan_test
 
@@ -97,22 +96,19 @@ def _record(
     body = plant.body
     nominal = Nominal(body.area, body.pressure_reference, body.travel)
     truth = truth_of(plant, motion, instruments, duration)
-    case: Case = replace(next(iter(cases(1, classes=("ideal",), grown=False))), plant=plant)
     reach = motion.position / body.travel
-    return Record(case, nominal, pressure, position, truth), (
-        float(reach.min()),
-        float(reach.max()),
-    )
+    record = Record(nominal, pressure, position, truth)
+    return record, (float(reach.min()), float(reach.max()))
 
 
 def _told(record: Record) -> tuple[dict[str, float], dict[str, float], str]:
     """Identify; return half widths and errors over the true values, and a refusal."""
-    answer = identification(DEFAULT_METHOD).identify(record)
-    if answer.refused:
-        return {}, {}, answer.sentences[0]
+    answer = identify(record)
+    if answer.refusal:
+        return {}, {}, answer.refusal
     widths, errors = {}, {}
     for name in NUMBERS:
-        one, truth = answer.numbers.get(name), getattr(record.truth, name)
+        one, truth = answer.numbers.get(name), record.truth[name]
         if one is not None and one.half_width >= 0 and truth.value:
             widths[name] = one.half_width / abs(truth.value)
             errors[name] = truth.error(one.value) / abs(truth.value)

@@ -1,7 +1,7 @@
 """Valves and sensors as they are, to measure an identification with: `make reality`.
 
 Nothing here is shared with the package that is measured: the plants are written anew, with finer
-steps than the package's simulator. Only `package` calls it, and the command its names.
+steps than the package's simulator. Only the module `package` calls it.
 """
 
 import os

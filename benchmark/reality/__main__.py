@@ -1,114 +1,93 @@
 """Run the benchmark: python -m benchmark.reality, or `make reality`."""
 
 import argparse
+import multiprocessing
 import os
+import secrets
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import track
 
-from benchmark.reality.answers import Outcome, read_outcomes
-from benchmark.reality.bounds import bounds
-from benchmark.reality.counts import by_class, ideals_of, judged, tally
-from benchmark.reality.excitations import Kind
-from benchmark.reality.report import bounds_table, counts_table, numbers_table, violations
-from benchmark.reality.runner import run
-from benchmark.reality.suite import cases
-from valve_friction_ros.identification import DEFAULT_METHOD, METHODS
+from benchmark.reality.motions import Kind
+from benchmark.reality.real import real_rows
+from benchmark.reality.records import Case
+from benchmark.reality.report import bounds, report
+from benchmark.reality.trial import Row, Task, rows_of, tried
 
 __all__ = ["main"]
 
-_WIDTH_OF_A_FILE = 160
 _PROCESSES = 2
-_SLOWEST = 2.0
-_ADAPTER = f"{__package__}.package"
+_PARTS = ("plain", "stickslip", "alarms")
+_RECORDS, _BRIEF = (50, 24, 12), (4, 2, 1)
+"""Of each motion, by default and in brief: in each of the parts."""
+
+_SLIPPING = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.HUNTING)
+_WATCHED = (Kind.SQUARE, Kind.RAMP, Kind.LEVELS, Kind.MULTISINE, Kind.LOOP, Kind.FROM_MIDDLE)
+_RESERVE = 2.2
+"""Factor by which the friction of a valve that is watched may grow: it is doubled."""
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="reality", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=5, help="records of each combination")
-    parser.add_argument("--classes", nargs="+", default=(), help="of imperfections; default: all")
+    kinds = [kind.value for kind in Kind]
+    parser.add_argument("--records", type=int, metavar="N", help="of each motion, in each part")
+    parser.add_argument("--motions", nargs="+", default=kinds, choices=kinds, help="default: all")
+    parser.add_argument("--only", nargs="+", default=_PARTS, choices=_PARTS, help="default: all")
+    parser.add_argument("--brief", action="store_true", help="few records of each motion")
+    parser.add_argument("--entropy", type=int, metavar="N", help="repeat a run; else it is drawn")
+    parser.add_argument("--jobs", type=int, default=min(_PROCESSES, os.cpu_count() or 1))
     parser.add_argument(
-        "--drives",
-        nargs="+",
-        default=(),
-        choices=[kind.value for kind in Kind],
-        help="default: all",
+        "--limit", type=float, default=60.0, metavar="S", help="processor time for one record"
     )
+    parser.add_argument("--save", type=Path, metavar="FOLDER", help="keep the records as .npz")
     parser.add_argument(
-        "--held-out", action="store_true", help="magnitudes and seeds not developed with"
+        "--real", type=Path, metavar="FOLDER", help="holds the folders cylinders and emps"
     )
-    parser.add_argument(
-        "--no-growth", action="store_true", help="leave out friction that has grown"
-    )
-    parser.add_argument("--brief", action="store_true", help="one imperfection of each class")
-    parser.add_argument(
-        "--limit", type=float, default=60.0, help="processor time for one record, s"
-    )
-    parser.add_argument(
-        "--jobs", type=int, default=min(_PROCESSES, os.cpu_count() or 1), help="processes"
-    )
-    parser.add_argument(
-        "--method",
-        choices=[*METHODS],
-        default=DEFAULT_METHOD,
-        help="method of the package (%(default)s)",
-    )
-    parser.add_argument(
-        "--identification", help="another module that identifies, in place of the package"
-    )
-    parser.add_argument("--out", type=Path, default=Path("reality.jsonl"), help="the outcomes")
-    parser.add_argument(
-        "--read", action="store_true", help="show the outcomes of --out, and run nothing"
-    )
+    parser.add_argument("--out", type=Path, default=Path("reality.jsonl"), help="the rows")
+    parser.add_argument("--read", action="store_true", help="show the rows of --out; run nothing")
     return parser
 
 
-def _run(options: argparse.Namespace, console: Console) -> list[Outcome]:
-    """Run the suite and write each outcome as it comes."""
-    suite = cases(
-        options.seeds,
-        options.held_out,
-        options.classes,
-        [Kind(drive) for drive in options.drives],
-        grown=not options.no_growth,
-        brief=options.brief,
-    )
-    identification = options.identification or f"{_ADAPTER}:{options.method}"
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    outcomes = []
+def _tasks(options: argparse.Namespace, entropy: int) -> Iterator[Task]:
+    counts = dict(zip(_PARTS, _BRIEF if options.brief else _RECORDS, strict=True))
+    motions = [Kind(motion) for motion in options.motions]
+    for place, part in enumerate(_PARTS):
+        some = {"plain": motions, "stickslip": _SLIPPING, "alarms": _WATCHED}[part]
+        for number in range(options.records or counts[part]):
+            for motion in motions:
+                if part not in options.only or motion not in some:
+                    continue
+                case = Case(entropy + place, motion, number)
+                if part == "stickslip":
+                    case = case._replace(slips=True)
+                if part == "alarms":
+                    case = case._replace(reserve=_RESERVE)
+                yield Task(part, case, options.limit, options.save)
+
+
+def _run(options: argparse.Namespace, console: Console) -> list[Row]:
+    """Run all tasks, and write each row as it comes."""
+    entropy = secrets.randbits(32) if options.entropy is None else options.entropy
+    console.print(f"--entropy {entropy}")
+    if options.save is not None:
+        options.save.mkdir(parents=True, exist_ok=True)
+    rows: list[Row] = []
+    context = multiprocessing.get_context("spawn")
     with (
         options.out.open("w", encoding="utf-8") as file,
-        Progress(*columns, console=console) as progress,
+        ProcessPoolExecutor(options.jobs, context) as pool,
     ):
-        answers = run(suite, identification, options.jobs, options.limit)
-        for outcome in progress.track(answers, total=len(suite), description="reality"):
-            outcomes.append(outcome)
-            file.write(outcome.as_line() + "\n")
+        answers = [pool.submit(tried, task) for task in _tasks(options, entropy)]
+        console = Console(stderr=True)
+        for one in track(as_completed(answers), "reality", len(answers), console=console):
+            rows += one.result()
+            file.writelines(row.as_line() + "\n" for row in one.result())
             file.flush()
-    places = {case.name: place for place, case in enumerate(suite)}
-    return sorted(outcomes, key=lambda one: places[one.name])
-
-
-def _show(outcomes: Sequence[Outcome], console: Console) -> bool:
-    """Print the tables; return whether all bounds are met."""
-    every = bounds(outcomes)
-    whole = tally(outcomes, ideals_of(outcomes))
-    for line in violations(outcomes, whole, _SLOWEST):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(counts_table("by imperfection", by_class(outcomes) | {"all": whole}))
-    groups = by_class(outcomes, lambda one: f"{one.packing}, {one.drive}")
-    console.print(counts_table("by packing and drive", groups))
-    console.print(numbers_table([one for outcome in outcomes for one in judged(outcome)]))
-    console.print(bounds_table(every))
-    return all(bound.met for bound in every)
+    return rows
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -117,12 +96,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if not options.out.parent.is_dir():
         parser.error(f"{options.out}: there is no folder {options.out.parent}")
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
-    try:
-        outcomes = read_outcomes(options.out) if options.read else _run(options, console)
-    except ValueError as error:
-        parser.error(str(error))
-    return 0 if _show(outcomes, console) else 1
+    console = Console(soft_wrap=True, highlight=False, markup=False)
+    rows = rows_of(options.out) if options.read else _run(options, console)
+    motions = [kind.value for kind in Kind]
+    rows.sort(key=lambda row: (_PARTS.index(row.part), motions.index(row.motion)))
+    real = [] if options.real is None else list(real_rows(options.real))
+    for line in report(rows, real):
+        console.print(line)
+    if not real:
+        console.print("\nReal machines: not measured; --real FOLDER names where they are.")
+    return 0 if all(one.met for one in bounds(rows, real)) else 1
 
 
 if __name__ == "__main__":

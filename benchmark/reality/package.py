@@ -1,40 +1,81 @@
-"""A method of the package behind the two functions that the benchmark calls.
+"""The package behind the few functions that the benchmark calls.
 
 The only file here that knows the package.
 """
 
-from dataclasses import dataclass
-from functools import cache
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
-from benchmark.reality.answers import Answer, Number
 from benchmark.reality.records import Nominal, Record
-from valve_friction_ros.health import Baseline, StatusSignal, diagnose
+from valve_friction_ros import read_recording
+from valve_friction_ros.health import Baseline, Level, StatusSignal, diagnose_valve
 from valve_friction_ros.identification import (
+    DEFAULT_METHOD,
     IdentificationSettings,
     RefusalError,
+    Result,
     method_named,
 )
-from valve_friction_ros.model import Valve
+from valve_friction_ros.identification.robust import method as engine
+from valve_friction_ros.identification.robust.intervals import estimated
+from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.robust.search import _Search, search
+from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
 
-__all__ = ["PackageMethod", "identification"]
-
-_SETTINGS = IdentificationSettings(assumed_mass=1.6)
-"""Those of the bench valves' configuration."""
+__all__ = ["Answer", "Ends", "Number", "alarms", "ends", "identify", "identify_file", "is_baseline"]
 
 _WINDOW = 1e4
 """Longer than any record, s."""
 
-_SIDES = {
-    StatusSignal.FAILURE: "high",
-    StatusSignal.MAINTENANCE_REQUIRED: "high",
-    StatusSignal.OUT_OF_SPECIFICATION: "low",
-}
+_PLAIN = ("mass", "coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+_STEPS = 25
+"""Coordinates and most steps of a fit that begins at the truth; few steps are taken."""
 
 
-@cache
+@dataclass(frozen=True)
+class Number:
+    """A number of an answer: value and half width (SI unit, nan where there is none), verdict."""
+
+    value: float
+    half_width: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the package says of a record: numbers, or why there are none.
+
+    `native` is its own result, and `fits` are the fits behind it.
+    """
+
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+    refusal: str = ""
+    warnings: tuple[str, ...] = ()
+    native: Result | None = None
+    fits: Sequence[PosteriorFit] = ()
+
+
+class Ends(NamedTuple):
+    """Where the search ended, beside a fit that was begun at the truth.
+
+    `found` and `begun` are the sums of squares of both, in variances of the residual of the second;
+    `coulomb` is F_c of the first, N, `half_widths` are those of the second.
+    """
+
+    found: float
+    begun: float
+    coulomb: float
+    half_widths: Mapping[str, float]
+
+
 def _valve(nominal: Nominal) -> Valve:
     return Valve(
         nominal.diaphragm_area,
@@ -45,8 +86,13 @@ def _valve(nominal: Nominal) -> Valve:
     )
 
 
-def _arrivals(record: Record) -> Arrivals:
-    """Return both signals in the order of their stamps; of a repeated stamp only the first."""
+def _settings(has_spring: bool) -> IdentificationSettings:
+    """Return the defaults; that there is no spring is said, as a user has to."""
+    return IdentificationSettings(fixed={} if has_spring else {"spring_constant": 0.0})
+
+
+def _recording(record: Record) -> Recording:
+    """Let both signals arrive in the order of their stamps; of a repeated one only the first."""
     kinds, stamps, values = [], [], []
     for kind, signal in ((Kind.PRESSURE, record.pressure), (Kind.POSITION, record.position)):
         new = np.diff(signal.stamps, prepend=signal.stamps[:1] - 1) > 0
@@ -54,53 +100,113 @@ def _arrivals(record: Record) -> Arrivals:
         stamps.append(signal.stamps[new])
         values.append(signal.values[new])
     order = np.argsort(np.concatenate(stamps), kind="stable")
-    return Arrivals(
+    buffer = RecordBuffer(_valve(record.nominal), _WINDOW)
+    arrivals = Arrivals(
         np.concatenate(kinds)[order], np.concatenate(stamps)[order], np.concatenate(values)[order]
     )
+    buffer.add_arrivals(arrivals)
+    return buffer.snapshot().recording()
 
 
-@dataclass(frozen=True)
-class PackageMethod:
-    """A method of the package, called as a node calls it.
+@contextmanager
+def _seen_fits() -> Iterator[list[PosteriorFit]]:
+    """Collect the fits that an identification ends with; a second search would double the time."""
+    seen: list[PosteriorFit] = []
 
-    Attributes
-    ----------
-    name : str
-        Name of the method, as in `METHODS`.
-    """
+    def collecting(*arguments: Any) -> list[PosteriorFit]:
+        seen[:] = search(*arguments)
+        return seen
 
-    name: str
+    with patch.object(engine, "search", collecting):
+        yield seen
 
-    def identify(self, record: Record) -> Answer:
-        """Identify a record through the buffer, with the stamps as they are."""
-        valve = _valve(record.nominal)
-        buffer = RecordBuffer(valve, _WINDOW)
-        buffer.add_arrivals(_arrivals(record))
+
+def _answer(recording: Recording, valve: Valve, has_spring: bool, method: str) -> Answer:
+    with _seen_fits() as fits:
         try:
-            result = method_named(self.name)(buffer.snapshot().recording(), valve, _SETTINGS)
+            result = method_named(method)(recording, valve, _settings(has_spring))
         except RefusalError as refusal:
-            return Answer({}, (str(refusal),), refused=True)
-        parameters = result.parameters
-        numbers = {
-            name: Number(one.value, one.half_width, one.verdict.value)
-            for name, one in parameters.items()
-        }
-        reasons = (f"{name}: {one.reason}" for name, one in parameters.items() if one.reason)
-        return Answer(numbers, (*reasons, *result.warnings), native=result)
-
-    def alarm(self, record: Record, answer: Answer, baseline: Answer) -> str:
-        """Compare with the result of the healthy valve, as the monitor does."""
-        if answer.native is None or baseline.native is None:
-            return ""
-        try:
-            healthy = Baseline.of(baseline.native)
-        except RefusalError:
-            return ""
-        diagnosis = diagnose(answer.native, _valve(record.nominal), healthy)
-        return _SIDES.get(diagnosis.status_signal, "")
+            return Answer(refusal=str(refusal), fits=tuple(fits))
+    numbers = {
+        name: Number(one.value, one.half_width, one.verdict.value)
+        for name, one in result.parameters.items()
+    }
+    return Answer(numbers, "", tuple(result.warnings), result, tuple(fits))
 
 
-def identification(method: str) -> PackageMethod:
-    """Return the identification by a method of the package."""
-    method_named(method)
-    return PackageMethod(method)
+def identify(record: Record, method: str = DEFAULT_METHOD) -> Answer:
+    """Identify a record as a node does, through the buffer, with the stamps as they are."""
+    try:
+        recording = _recording(record)
+    except RefusalError as refusal:
+        return Answer(refusal=str(refusal))
+    nominal = record.nominal
+    return _answer(recording, _valve(nominal), nominal.has_spring, method)
+
+
+def identify_file(path: Path, method: str = DEFAULT_METHOD) -> Answer:
+    """Identify a file of a machine without a spring that a force drives."""
+    valve = Valve()
+    try:
+        recording = read_recording(path, valve)
+    except RefusalError as refusal:
+        return Answer(refusal=str(refusal))
+    return _answer(recording, valve, False, method)
+
+
+def is_baseline(answer: Answer) -> bool:
+    """Return whether a result can be the baseline."""
+    if answer.native is None:
+        return False
+    try:
+        Baseline.of(answer.native)
+    except RefusalError:
+        return False
+    return True
+
+
+def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
+    """Compare with the result of the healthy valve, as the monitor does.
+
+    The keys are "high" and "low" for its friction, and "other" for all else that is more than OK
+    or another status signal than good; the values are the sentences.
+    """
+    if answer.native is None:
+        return {}
+    baseline = Baseline.of(healthy.native) if healthy.native and is_baseline(healthy) else None
+    friction, findings = diagnose_valve(answer.native, baseline)
+    found = {}
+    if friction.status_signal is not StatusSignal.GOOD or friction.level is not Level.OK:
+        side = "other"
+        if friction.status_signal is not StatusSignal.CHECK_FUNCTION:
+            is_low = friction.status_signal is StatusSignal.OUT_OF_SPECIFICATION
+            side = "low" if is_low else "high"
+        found[side] = _words(friction)
+    for finding in findings:
+        if finding.status_signal is not StatusSignal.GOOD or finding.level is not Level.OK:
+            found["other"] = _words(finding)
+    return found
+
+
+def _words(one: Any) -> str:
+    return f"{one.level.name} {one.status_signal.value}: {one.message}"
+
+
+def ends(record: Record, answer: Answer) -> Ends | None:
+    """Compare the search with a fit begun at the truth; None where nothing was simulated."""
+    if not answer.fits:
+        return None
+    found, truth = answer.fits[0], record.truth
+    at = {name: truth[name].value for name in _PLAIN}
+    at |= {**record.late, "start_position": record.start}
+    at["slip_force"] = truth["static_friction"].value - truth["coulomb_friction"].value
+    engine_at = _Search(found.model.record, engine.prior_of(_settings(True)))
+    names = engine_at.all
+    if math.isfinite(truth["stribeck_velocity"].value):
+        at["stribeck_velocity"] = truth["stribeck_velocity"].value
+        names = (*(name for name in names if name != "at_low_speed"), "stribeck_velocity")
+    begun = engine_at.fit({**engine_at.base, **at}, names, _STEPS, engine_at.exact)
+    widths = {name: one.half_width for name, one in estimated([begun]).items()}
+    coulomb = estimated(answer.fits)["coulomb_friction"].value
+    scale = begun.inflation
+    return Ends(found.objective / scale, begun.objective / scale, coulomb, widths)

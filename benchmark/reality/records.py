@@ -1,77 +1,58 @@
-"""A case made into a record: what the sensors wrote, and what is true."""
+"""Records: a drawn valve under a drawn drive, what the sensors wrote, and what is true."""
 
-from dataclasses import dataclass, replace
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from benchmark.reality.excitations import Excitation, drive
-from benchmark.reality.plants import Motion, Plant, move
-from benchmark.reality.sensors import Instruments, Signal, measured
-from benchmark.reality.truth import Truth, truth_of
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["Case", "Nominal", "Record", "make_record"]
+from benchmark.reality.imperfections import Draft, drawn_imperfections
+from benchmark.reality.motions import Drive, Kind, drawn_drive
+from benchmark.reality.plants import Motion, move
+from benchmark.reality.plants.kernel import GRID
+from benchmark.reality.sensors import Signal, measured
+from benchmark.reality.truth import TrueValue, truth_of
+from benchmark.reality.valves import drawn_cylinder, drawn_valve
+
+__all__ = ["Case", "Nominal", "Record", "load", "make_record", "save"]
+
+_TRIES = 100
+_LEAST_MOVE = 0.008
+"""A record must hold moves both ways of so much of the travel; hunting, so many reversals of
+`_LEAST_SWING`. Else valve and drive are drawn again: no method finds friction where nothing
+slides."""
+
+_REVERSALS = 6
+_LEAST_SWING = 0.004
 
 
-@dataclass(frozen=True)
-class Case:
-    """One record to be made.
+class Case(NamedTuple):
+    """A record to be made: of valve `number` with this `motion` in the run of an `entropy`.
 
-    Attributes
-    ----------
-    imperfection, label : str
-        Class of the imperfection, and which of that class.
-    packing : str
-        Name of the packing.
-    plant : Plant
-        The valve as it is.
-    instruments : Instruments
-        Sensors and clocks.
-    excitation : Excitation
-        The drive.
-    seed : int
-        Of drive and sensors.
-    words : tuple of str
-        Beginnings of words, in lower case, of which one at least names the imperfection.
-    reference : Plant
-        The valve when its baseline was taken.
-    growth : float
-        Friction over that of the baseline.
+    `again` chooses another record of that valve, with another signal and other noise, and `change`
+    is its friction over that of the drawn valve. The packing `slips` or not; without a word that
+    is drawn too. By `reserve` the friction may grow before the actuator cannot stroke the valve.
     """
 
-    imperfection: str
-    label: str
-    packing: str
-    plant: Plant
-    instruments: Instruments
-    excitation: Excitation
-    seed: int
-    words: tuple[str, ...]
-    reference: Plant
-    growth: float = 1.0
+    entropy: int
+    motion: Kind
+    number: int
+    again: int = 0
+    change: float = 1.0
+    slips: bool | None = None
+    reserve: float = 1.0
 
     @property
     def name(self) -> str:
-        """The case in one line, the same in each run."""
-        grown = f" ×{self.growth:g}" if self.growth != 1.0 else ""
-        what = f"{self.imperfection}: {self.label}" if self.label else self.imperfection
-        return f"{what} | {self.packing}{grown} | {self.excitation.kind.value} | {self.seed}"
-
-    @property
-    def is_ideal(self) -> bool:
-        """Whether nothing is imperfect."""
-        return self.imperfection == "ideal"
-
-    def ideal(self, seed: int) -> "Case":
-        """Return the same plant under the same drive with nothing imperfect, for a baseline."""
-        return replace(
-            self,
-            imperfection="ideal",
-            label="",
-            plant=self.reference,
-            instruments=Instruments(),
-            seed=seed,
-            words=(),
-            growth=1.0,
-        )
+        """The case in a few words."""
+        again = f"-{self.again}" if self.again else ""
+        grown = f" x{self.change:g}" if self.change != 1.0 else ""
+        return f"{self.motion.value} {self.number}{again}{grown}"
 
 
 @dataclass(frozen=True)
@@ -84,6 +65,8 @@ class Nominal:
         S_a (m²), P_ref (Pa) and the travel (m).
     pressure_minimum, pressure_maximum : float
         Range of the pressure sensor, Pa.
+    has_spring : bool
+        Whether there is a spring.
     """
 
     diaphragm_area: float
@@ -91,6 +74,7 @@ class Nominal:
     travel: float
     pressure_minimum: float = -20e3
     pressure_maximum: float = 270e3
+    has_spring: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,42 +83,179 @@ class Record:
 
     Attributes
     ----------
-    case : Case
-        What it is of.
     nominal : Nominal
         The valve as its user describes it.
     pressure, position : Signal
         Stamps (ns) and values (Pa, m) of each.
-    truth : Truth
+    truth : mapping of str to TrueValue
         What is true.
+    name : str
+        Of the case.
+    kind : str
+        Of the valve.
+    slips : bool
+        Whether its packing slips.
+    share : float
+        F_c over the force of the spring.
+    rate : float
+        Samples a second.
+    imperfections : tuple of str
+        What is imperfect.
+    start : float
+        True position at the begin of the record, m.
+    late : mapping of str to float
+        Clock offset of the stem ("delay"), lag of its sensor ("stem_lag"), and volume less lag of
+        the pressure sensor ("force_lag"), s.
     """
 
-    case: Case
     nominal: Nominal
     pressure: Signal
     position: Signal
-    truth: Truth
+    truth: dict[str, TrueValue]
+    name: str = ""
+    kind: str = ""
+    slips: bool = False
+    share: float = math.nan
+    rate: float = math.nan
+    imperfections: tuple[str, ...] = ()
+    start: float = math.nan
+    late: Mapping[str, float] = field(default_factory=dict)
 
 
-@lru_cache(maxsize=2)
-def _motion(plant: Plant, excitation: Excitation, seed: int) -> Motion:
-    return move(plant, *drive(excitation, seed))
+def _draft(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...]]:
+    """Draw valve, instruments and imperfections; the same for all records of a valve."""
+    place = list(Kind).index(case.motion)
+    random = np.random.default_rng([case.entropy, place, case.number, attempt])
+    slips = bool(random.random() < 0.5) if case.slips is None else case.slips
+    if case.motion is Kind.HUNTING:
+        slips = True
+    if case.motion is Kind.CYLINDER:
+        valve = drawn_cylinder(random, slips)
+    else:
+        valve = drawn_valve(random, slips, case.reserve)
+    return drawn_imperfections(valve, random)
+
+
+def _seed(case: Case, attempt: int) -> list[int]:
+    place = list(Kind).index(case.motion)
+    # A changed friction is another day: signal and noise are drawn anew.
+    return [case.entropy, place, case.number, attempt, 1, case.again]
+
+
+@lru_cache(maxsize=1)
+def _moved(case: Case, attempt: int) -> tuple[Draft, tuple[str, ...], Drive, Motion]:
+    """Draw and move a valve; kept, as the attempt that succeeds becomes the record."""
+    draft, names = _draft(case, attempt)
+    drive = drawn_drive(case.motion, draft.valve, np.random.default_rng(_seed(case, attempt)))
+    plant = draft.valve.plant
+    plant = replace(plant, friction=plant.friction.scaled(case.change))
+    motion = move(plant, drive.loop, drive.signal, drive.disturbance, drive.before)
+    return replace(draft, valve=replace(draft.valve, plant=plant)), names, drive, motion
+
+
+def _swings(position: NDArray[np.float64], least: float) -> int:
+    """Count the moves of at least so much, m, between reversals."""
+    count, way, low, high = 0, 0, position[0], position[0]
+    for now in position[:: round(0.02 / GRID)].tolist():
+        low, high = min(low, now), max(high, now)
+        if way != 1 and now - low >= least:
+            count, way, high = count + 1, 1, now
+        elif way != -1 and high - now >= least:
+            count, way, low = count + 1, -1, now
+        if way == 1 and now >= high:
+            low = now
+        if way == -1 and now <= low:
+            high = now
+    return count
+
+
+def _is_excited(case: Case, draft: Draft, motion: Motion) -> bool:
+    travel = draft.valve.plant.body.travel
+    position = motion.position[motion.time >= 0.0]
+    if case.motion is Kind.HUNTING:
+        return _swings(position, _LEAST_SWING * travel) >= _REVERSALS
+    return _swings(position, _LEAST_MOVE * travel) >= 2
+
+
+def _jump(draft: Draft) -> float:
+    """Return by how much of its travel a stem that breaks away moves at least."""
+    body, friction = draft.valve.plant.body, draft.valve.plant.friction
+    return (friction.static - friction.coulomb) / (body.spring * body.travel)
+
+
+@lru_cache(maxsize=4)
+def _attempt(case: Case) -> int:
+    """Return the first attempt in which the healthy valve moves enough."""
+    for attempt in range(_TRIES):
+        if case.motion is Kind.HUNTING and _jump(_draft(case, attempt)[0]) < _LEAST_SWING:
+            continue
+        draft, _, _, motion = _moved(case, attempt)
+        if _is_excited(case, draft, motion):
+            return attempt
+    raise ValueError(f"{case.name}: no valve moves in {_TRIES} draws")
 
 
 def make_record(case: Case) -> Record:
-    """Make a record; the same each time, to the last bit.
-
-    The motion of a valve is kept for the next record of it, so cases that differ in their
-    instruments only are best made in a row.
-    """
-    motion = _motion(case.plant, case.excitation, case.seed)
-    duration = case.excitation.duration
-    pressure, position = measured(motion, case.instruments, duration, case.seed)
-    body = case.plant.body
+    """Make a record; the same each time, to the last bit."""
+    attempt = _attempt(case._replace(again=0, change=1.0))
+    draft, names, drive, motion = _moved(case, attempt)
+    valve, instruments = draft.valve, draft.instruments
+    body = valve.plant.body
+    seed = int(np.random.default_rng(_seed(case, attempt)).integers(2**31))
+    pressure, position = measured(motion, instruments, drive.duration, seed)
+    low, high = valve.sensor
+    margin, sizes = 0.1 * (high - low), (body.area, body.pressure_reference, body.travel)
+    nominal = Nominal(*sizes, low - margin, high + margin, body.spring > 0.0)
+    truth = truth_of(valve.plant, motion, instruments, drive.duration)
+    begin = round(drive.before / GRID)
+    clocks = instruments.pressure_stamping.offset, instruments.position_stamping.offset
     return Record(
-        case,
-        Nominal(body.area, body.pressure_reference, body.travel),
-        pressure,
-        position,
-        truth_of(case.plant, motion, case.instruments, duration),
+        nominal=nominal,
+        pressure=pressure,
+        position=position,
+        truth=truth,
+        name=case.name,
+        kind=valve.kind,
+        slips=valve.slips,
+        share=valve.friction_share,
+        rate=instruments.position_stamping.rate,
+        imperfections=names,
+        start=float(motion.position[begin]),
+        late={
+            "delay": clocks[1] - clocks[0],
+            "stem_lag": instruments.position.lag,
+            "force_lag": body.volume_lag - instruments.pressure.lag,
+        },
     )
+
+
+_SIGNALS = ("pressure", "position")
+
+
+def save(record: Record, path: Path) -> None:
+    """Write a record: ``<signal>_stamps`` (ns), ``<signal>`` (SI), and the rest as JSON."""
+    parts = {
+        name: value
+        for name, value in vars(record).items()
+        if name not in (*_SIGNALS, "nominal", "truth")
+    }
+    parts |= {"nominal": asdict(record.nominal)}
+    parts |= {"truth": {name: asdict(one) for name, one in record.truth.items()}}
+    arrays: dict[str, NDArray[Any]] = {}
+    for name in _SIGNALS:
+        signal = getattr(record, name)
+        arrays |= {f"{name}_stamps": signal.stamps, name: signal.values}
+    arrays["about"] = np.array(json.dumps(parts))
+    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]
+
+
+def load(folder: Path) -> Iterator[Record]:
+    """Read what `save` wrote, in the order of the names."""
+    for path in sorted(folder.glob("*.npz")):
+        with np.load(path) as file:
+            parts: dict[str, Any] = json.loads(str(file["about"]))
+            parts |= {name: Signal(file[f"{name}_stamps"], file[name]) for name in _SIGNALS}
+        parts["nominal"] = Nominal(**parts["nominal"])
+        parts["truth"] = {name: TrueValue(**one) for name, one in parts["truth"].items()}
+        parts["imperfections"] = tuple(parts["imperfections"])
+        yield Record(**parts)

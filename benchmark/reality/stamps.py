@@ -29,10 +29,6 @@ class Stamping:
         Number and length (s) of the pauses in which all messages are lost.
     resolution : float
         Step to which stamps are cut, s; 0: a nanosecond.
-    epoch : float
-        Time of the record's begin, s.
-    as_float : bool
-        Whether the time is written as seconds in double precision.
     """
 
     rate: float = 1000.0
@@ -43,8 +39,6 @@ class Stamping:
     bursts: int = 0
     burst: float = 0.0
     resolution: float = 0.0
-    epoch: float = 0.0
-    as_float: bool = False
 
 
 class Times(NamedTuple):
@@ -88,14 +82,7 @@ def sampling_times(stamping: Stamping, duration: float, random: np.random.Genera
 
 def stamped(stamping: Stamping, written: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the stamps, ns, with which a clock writes its times (s)."""
-    since_begin = written + stamping.offset
-    if stamping.as_float:
-        seconds = stamping.epoch + since_begin
-        whole = np.floor(seconds)
-        parts = np.rint((seconds - whole) * 1e9)
-        stamps: NDArray[np.int64] = whole.astype(np.int64) * 1_000_000_000 + parts.astype(np.int64)
-    else:
-        stamps = np.rint(since_begin * 1e9).astype(np.int64) + round(stamping.epoch * 1e9)
+    stamps: NDArray[np.int64] = np.rint((written + stamping.offset) * 1e9).astype(np.int64)
     if stamping.resolution > 0.0:
         unit = round(stamping.resolution * 1e9)
         stamps -= stamps % unit

@@ -1,21 +1,99 @@
-"""One case tried: made, identified within a time limit, and compared with its baseline."""
+"""One valve tried: its records made, identified within a time limit, and compared."""
 
-import importlib
+import json
+import math
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import cast
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple, TypeVar
 
-from benchmark.reality.answers import Answer, Identification, Outcome
-from benchmark.reality.records import Case, Record, make_record
-from benchmark.reality.truth import NAMES
+import numpy as np
 
-__all__ = ["Trials", "failed"]
+from benchmark.reality import package
+from benchmark.reality.least_squares import sliding_friction
+from benchmark.reality.motions import Kind
+from benchmark.reality.package import Answer, Number
+from benchmark.reality.records import Case, Record, make_record, save
+from benchmark.reality.truth import TrueValue
 
-_BASELINE_SEEDS = 1000
-"""Distance of the seed of a baseline from that of its case."""
+__all__ = ["CHANGES", "SLIDING", "Row", "Task", "rows_of", "tried"]
+
+SLIDING = "sliding_friction"
+
+CHANGES = (1.0, 1.5, 2.0, 0.45)
+"""Friction over that of the baseline."""
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of one record.
+
+    `part` is "plain", "stickslip" or "alarms"; `name` to `change` are the record's (`Record`,
+    `Case`), its length in s. Truth and numbers are by the names of `truth.NAMES`; `refusal` says
+    why there is no result, `failure` why there is no answer at all. `least_squares` is the sliding
+    friction, N; `seconds` the processor time. `has_baseline` tells whether the healthy valve gave
+    one, `alarms` are sentences by their side (`package.alarms`). `found` to `widths` are those of
+    `package.Ends`.
+    """
+
+    part: str
+    name: str
+    motion: str
+    kind: str = ""
+    slips: bool = False
+    share: float = math.nan
+    rate: float = math.nan
+    duration: float = math.nan
+    imperfections: tuple[str, ...] = ()
+    change: float = 1.0
+    truth: Mapping[str, TrueValue] = field(default_factory=dict)
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+    refusal: str = ""
+    failure: str = ""
+    warnings: tuple[str, ...] = ()
+    least_squares: float = math.nan
+    seconds: float = math.nan
+    has_baseline: bool | None = None
+    alarms: Mapping[str, str] = field(default_factory=dict)
+    found: float = math.nan
+    begun: float = math.nan
+    coulomb: float = math.nan
+    widths: Mapping[str, float] = field(default_factory=dict)
+
+    def as_line(self) -> str:
+        """Write it as one line of JSON."""
+        return json.dumps(asdict(self), ensure_ascii=False, default=np.generic.item)
+
+
+def rows_of(path: Path) -> list[Row]:
+    """Read a file of rows."""
+    rows = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        parts = json.loads(line)
+        parts["truth"] = {name: TrueValue(**one) for name, one in parts["truth"].items()}
+        parts["numbers"] = {name: Number(**one) for name, one in parts["numbers"].items()}
+        for name in ("imperfections", "warnings"):
+            parts[name] = tuple(parts[name])
+        rows.append(Row(**parts))
+    return rows
+
+
+class Task(NamedTuple):
+    """All records of one valve: the `case` is the first.
+
+    An identification may take `limit` seconds of the processor; records are kept in `folder`.
+    """
+
+    part: str
+    case: Case
+    limit: float
+    folder: Path | None = None
 
 
 @contextmanager
@@ -34,103 +112,94 @@ def _limited(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGPROF, before)
 
 
-def failed(case: Case, failure: str) -> Outcome:
-    """Return the outcome of a case without an answer."""
-    return Outcome(
+def _within(limit: float, job: Callable[[], _T]) -> tuple[_T | None, str, float]:
+    """Do a job; return its result or why there is none, and its processor time, s."""
+    begin = time.process_time()
+    try:
+        with _limited(limit):
+            return job(), "", time.process_time() - begin
+    except Exception as error:  # noqa: BLE001  whatever it is, the suite goes on
+        return None, f"{type(error).__name__}: {error}", time.process_time() - begin
+
+
+def _row(task: Task, case: Case, record: Record) -> tuple[Row, Answer]:
+    """Identify a record."""
+    answer, failure, seconds = _within(task.limit, lambda: package.identify(record))
+    answer = answer or Answer()
+    stamps = record.position.stamps
+    row = Row(
+        part=task.part,
         name=case.name,
-        imperfection=case.imperfection,
-        label=case.label,
-        packing=case.packing,
-        drive=case.excitation.kind.value,
-        seed=case.seed,
-        growth=case.growth,
-        duration=case.excitation.duration,
-        words=case.words,
+        motion=case.motion.value,
+        kind=record.kind,
+        slips=record.slips,
+        share=record.share,
+        rate=record.rate,
+        duration=float(stamps[-1] - stamps[0]) / 1e9,
+        imperfections=record.imperfections,
+        change=case.change,
+        truth=record.truth,
+        numbers={name: one for name, one in answer.numbers.items() if name in record.truth},
+        refusal=answer.refusal,
         failure=failure,
+        warnings=answer.warnings,
+        least_squares=sliding_friction(record),
+        seconds=seconds,
     )
+    return row, answer
 
 
-@dataclass
-class _Clock:
-    """Time that something took."""
+def _with_ends(task: Task, row: Row, record: Record, answer: Answer) -> Row:
+    """Add how the search compares with a fit begun at the truth."""
+    ends, failure, _ = _within(task.limit, lambda: package.ends(record, answer))
+    if ends is None:
+        return replace(row, failure=row.failure or failure)
+    found, begun, coulomb, widths = ends
+    return replace(row, found=found, begun=begun, coulomb=coulomb, widths=widths)
 
-    seconds: float = 0.0
-    processor_seconds: float = 0.0
+
+def _made(task: Task, case: Case) -> Record:
+    record = make_record(case)
+    if task.folder is not None:
+        save(record, task.folder / f"{task.part} {case.name}.npz".replace(" ", "_"))
+    return record
 
 
-@dataclass
-class Trials:
-    """Tries cases with one identification, and keeps the baselines.
+_warm = False
 
-    Attributes
-    ----------
-    module : str
-        Name of a module with `identify` and `alarm`; or ``module:method``, whose `identification`
-        returns an object with both.
-    limit : float
-        Processor time for one identification, s.
-    """
 
-    module: str
-    limit: float
-    _baselines: dict[Case, Answer] = field(default_factory=dict)
+def _warm_up() -> None:
+    """Let the first record pay for what is compiled or read once."""
+    global _warm  # noqa: PLW0603  once a process
+    if not _warm:
+        record = make_record(Case(0, Kind.LEVELS, 0, slips=True))
+        _within(120.0, lambda: package.identify(record))
+        _warm = True
 
-    def __post_init__(self) -> None:
-        """Load the identification."""
-        name, _, method = self.module.partition(":")
-        module = importlib.import_module(name)
-        made = module.identification(method) if method else module
-        self._identification = cast("Identification", made)
 
-    def baseline(self, case: Case) -> Answer:
-        """Identify the plant of a case while nothing is wrong, under the same drive; once."""
-        healthy = case.ideal(case.seed + _BASELINE_SEEDS)
-        if healthy not in self._baselines:
-            self._baselines[healthy] = self._identified(make_record(healthy), _Clock())
-        return self._baselines[healthy]
-
-    def _identified(self, record: Record, clock: _Clock) -> Answer:
-        begin, processor = time.perf_counter(), time.process_time()
-        try:
-            with _limited(self.limit):
-                return self._identification.identify(record)
-        except Exception as error:  # noqa: BLE001  whatever it is, the suite goes on
-            return Answer({}, (f"{type(error).__name__}: {error}",), refused=True, native=error)
-        finally:
-            clock.seconds = time.perf_counter() - begin
-            clock.processor_seconds = time.process_time() - processor
-
-    def tried(self, case: Case) -> Outcome:
-        """Try a case."""
-        baseline = self.baseline(case)
-        record, clock = make_record(case), _Clock()
-        answer = self._identified(record, clock)
-        if isinstance(answer.native, Exception):
-            return failed(case, answer.sentences[0])
-        alarm = ""
-        if not isinstance(baseline.native, Exception):
-            alarm = self._identification.alarm(record, answer, baseline)
-        blank = failed(case, "")
-        return Outcome(
-            **{name: getattr(blank, name) for name in _CASE},
-            truth={name: getattr(record.truth, name) for name in NAMES},
-            numbers=answer.numbers,
-            sentences=answer.sentences,
-            refused=answer.refused,
-            alarm=alarm,
-            seconds=clock.seconds,
-            processor_seconds=clock.processor_seconds,
+def tried(task: Task) -> list[Row]:
+    """Try all records of one valve."""
+    _warm_up()
+    case = task.case
+    try:
+        record = _made(task, case)
+    except ValueError as error:
+        return [Row(task.part, case.name, case.motion.value, failure=str(error))]
+    row, answer = _row(task, case, record)
+    if task.part != "alarms":
+        return [_with_ends(task, row, record, answer)]
+    has_baseline = answer.native is not None and package.is_baseline(answer)
+    rows = []
+    for again, change in enumerate(CHANGES, start=1):
+        other = case._replace(again=again, change=change)
+        row, later = _row(task, other, _made(task, other))
+        alarms, failure, _ = _within(task.limit, partial(package.alarms, later, answer))
+        rows.append(
+            replace(
+                row,
+                has_baseline=has_baseline,
+                alarms=alarms or {},
+                failure=row.failure or failure,
+            )
         )
-
-
-_CASE = (
-    "name",
-    "imperfection",
-    "label",
-    "packing",
-    "drive",
-    "seed",
-    "growth",
-    "duration",
-    "words",
-)
+    return rows

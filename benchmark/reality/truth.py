@@ -1,5 +1,6 @@
 """What is true of a record: numbers that an identification is compared with."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from benchmark.reality.plants.motion import Motion
 from benchmark.reality.plants.parameters import Body, Friction, Law, Plant, Trend
 from benchmark.reality.sensors import Instruments
 
-__all__ = ["NAMES", "TrueValue", "Truth", "truth_of"]
+__all__ = ["NAMES", "TrueValue", "truth_of"]
 
 NAMES = (
     "mass",
@@ -26,7 +27,14 @@ NAMES = (
     "viscous_asymmetry",
     "clock_offset",
 )
-"""Numbers of a truth."""
+"""Numbers of a truth, SI units.
+
+``limit_velocity`` is DV of a Karnopp plant, 0 for the others; ``sliding_friction`` is ∫|F·dx|/∫|dx|
+of the record; ``stribeck_velocity`` is nan where F_s is F_c, and so is ``spring_constant`` where
+there is no spring; ``coulomb_asymmetry`` is the share by which the friction is larger upward;
+``clock_offset`` is the time by which the stem is seen late, s, slow sensors and a volume before it
+included. Spring and preload are slope and intercept of all that acts along the travel, as the
+nominal area sees it."""
 
 
 @dataclass(frozen=True)
@@ -48,45 +56,6 @@ class TrueValue:
     def error(self, estimate: float) -> float:
         """Return how far an estimate is from all definitions, SI unit, ≥ 0."""
         return max(abs(estimate - self.value) - self.spread, 0.0)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """The truth about a record, SI units; see `NAMES`.
-
-    Attributes
-    ----------
-    mass, viscous_friction, coulomb_friction, static_friction : TrueValue
-        Of the plant.
-    spring_constant, spring_preload : TrueValue
-        Slope and intercept of all that acts along the travel, as the nominal area sees it.
-    limit_velocity : TrueValue
-        DV of a Karnopp plant; 0 for the others.
-    sliding_friction : TrueValue
-        ∫|F·dx| / ∫|dx| of the record.
-    stribeck_velocity : TrueValue
-        Speed over which F_s falls to F_c, by exp(−(v/v_s)²); nan where they are equal.
-    coulomb_asymmetry, viscous_asymmetry : TrueValue
-        Share by which the friction is larger upward, and smaller downward.
-    clock_offset : TrueValue
-        Time by which the stem is seen late, s, slow sensors and a volume before it included.
-    distance : float
-        ∫|dx|, m.
-    """
-
-    mass: TrueValue
-    viscous_friction: TrueValue
-    coulomb_friction: TrueValue
-    static_friction: TrueValue
-    spring_constant: TrueValue
-    spring_preload: TrueValue
-    limit_velocity: TrueValue
-    sliding_friction: TrueValue
-    stribeck_velocity: TrueValue
-    coulomb_asymmetry: TrueValue
-    viscous_asymmetry: TrueValue
-    clock_offset: TrueValue
-    distance: float
 
 
 def _among(value: float, others: Iterable[float]) -> TrueValue:
@@ -146,7 +115,7 @@ def _sliding(motion: Motion, recorded: NDArray[np.bool_]) -> TrueValue:
     position, force = motion.position[recorded], motion.friction[recorded]
     lost = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(position)))
     if motion.distance == 0.0:
-        return TrueValue(float("nan"))
+        return TrueValue(math.nan)
     return _among(motion.work / motion.distance, (abs(lost) / motion.distance,))
 
 
@@ -164,8 +133,10 @@ def _limit_velocity(friction: Friction) -> float:
     return friction.limit_velocity if karnopp else 0.0
 
 
-def truth_of(plant: Plant, motion: Motion, instruments: Instruments, duration: float) -> Truth:
-    """Return the truth about a record of `duration` seconds.
+def truth_of(
+    plant: Plant, motion: Motion, instruments: Instruments, duration: float
+) -> dict[str, TrueValue]:
+    """Return the truth about a record of `duration` seconds; see `NAMES`.
 
     Where a number changes in the record, or has no single definition there, its value is the
     mean over the distance, and `spread` holds what other definitions make of it.
@@ -178,19 +149,24 @@ def truth_of(plant: Plant, motion: Motion, instruments: Instruments, duration: f
     end = body.area * instruments.pressure.drift * duration
     spring, preload = _springs(body, position, (0.5 * end, 0.0, end))
     coulomb, static = _frictions(plant, motion, middle)
-    area = 1.0 + body.area_change * (middle / body.travel - 0.5)
-    return Truth(
-        mass=TrueValue(body.mass),
-        viscous_friction=_among(friction.viscous, (friction.viscous / area,)),
-        coulomb_friction=coulomb,
-        static_friction=static,
-        spring_constant=spring,
-        spring_preload=preload,
-        limit_velocity=TrueValue(_limit_velocity(friction)),
-        sliding_friction=_sliding(motion, recorded),
-        stribeck_velocity=TrueValue(friction.stribeck_velocity if falls else float("nan")),
-        coulomb_asymmetry=TrueValue(friction.asymmetry),
-        viscous_asymmetry=TrueValue(0.0),
-        clock_offset=_offset(plant, instruments),
-        distance=motion.distance,
-    )
+    # Friction that is larger upward is the same as a larger preload.
+    one_sided = abs(friction.asymmetry) * coulomb.value
+    # A diaphragm whose area differs here from the nominal one: all forces are seen by that factor.
+    seen = 1.0 / (1.0 + body.area_change * (middle / body.travel - 0.5))
+    sliding = _sliding(motion, recorded)
+    return {
+        "mass": TrueValue(body.mass),
+        "viscous_friction": _among(friction.viscous, (friction.viscous * seen,)),
+        "coulomb_friction": coulomb,
+        "static_friction": static,
+        "spring_constant": spring if body.spring else TrueValue(math.nan),
+        "spring_preload": TrueValue(preload.value, preload.spread + one_sided),
+        "limit_velocity": TrueValue(_limit_velocity(friction)),
+        "sliding_friction": TrueValue(
+            sliding.value, sliding.spread + abs(seen - 1.0) * sliding.value
+        ),
+        "stribeck_velocity": TrueValue(friction.stribeck_velocity if falls else math.nan),
+        "coulomb_asymmetry": TrueValue(friction.asymmetry),
+        "viscous_asymmetry": TrueValue(0.0),
+        "clock_offset": _offset(plant, instruments),
+    }

@@ -199,7 +199,7 @@ class TestStampsThatWereOvertaken:
         whole = Arrivals(kinds, stamps, np.arange(7.0))
         left = buffer.in_order(whole)
         np.testing.assert_array_equal(left.values, [0, 1, 3, 4, 6])
-        assert buffer.add_arrivals(left) == (None, None)
+        assert buffer.add_arrivals(left) == Intake()
         assert buffer.counts == (205, 200)
         assert sum(buffer.rejected.values()) == 2
 
