@@ -7,7 +7,7 @@ import pytest
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
-from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer, rows_arrived
+from valve_friction_ros.streams import Arrivals, Intake, Kind, RecordBuffer, rows_arrived
 
 MILLISECOND = 1_000_000
 START = 1_700_000_000_000_000_000
