@@ -93,9 +93,11 @@ _LEAST_MISFIT = 3e-4
 balance is trusted further."""
 
 _LEAST_SHARED = 0.01
-_LEAST_HALF_WIDTH = 0.015
-"""Least share of the information that both halves must have in common, and least half width over
-the value of any number: no force balance of a plant is the whole truth to more than that."""
+_LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.03, 0.05
+"""Least share of the information that both halves must have in common; least half width over the
+value of any number, as no force balance of a plant is the whole truth to more than that; the same
+without a spring, where the reversals that are left out hold more of the friction; and where no
+second averaging time confirms it."""
 
 _NEARLY = 5.0
 _SCATTERS = 2.0
@@ -604,8 +606,10 @@ class _Posterior:
         )
         self.lags: _Array = np.zeros(1)
         self.probability: _Array = np.ones(1)
+        self.exchanged, self.less_viscous = 0.0, 0.0
         if not regression.lag.is_known:
             self._integrate()
+            self._exchange()
 
     def _integrate(self) -> None:
         solved, index = self.solved, len(self.regression.names)
@@ -628,6 +632,21 @@ class _Posterior:
         probability = np.exp(log - log.max())
         self.lags, self.probability = _LAGS, probability / np.sum(probability)
 
+    def _exchange(self) -> None:
+        """Weigh the other order of two lags.
+
+        A stem with the delay F_v/k behind a sensor or a volume with the lag τ looks, while it
+        slides, as one with the delay τ behind a lag F_v/k. Only their priors tell them apart.
+        """
+        values = self.regression.values(self.solved)
+        spring, viscous = values.get("spring_constant", 0.0), values.get("viscous_friction", 0.0)
+        lag = float(self.probability @ self.lags)
+        if not (spring > 0 and viscous > spring * max(lag, 0.0)):
+            return
+        both = self.regression.lag.log_density(np.array([max(lag, 0.0), viscous / spring]))
+        self.exchanged = 1.0 / (1.0 + math.exp(min(float(both[0] - both[1]), 700.0)))
+        self.less_viscous = viscous - spring * max(lag, 0.0)
+
     def _given_lag(self, gradient: _Array) -> tuple[float, float, float]:
         """Return a number, its slope over the lag's coefficient, and its deviation at that lag."""
         solved, index = self.solved, len(self.regression.names)
@@ -645,19 +664,24 @@ class _Posterior:
     def number(self, gradient: _Array, spread: float) -> Estimated:
         """Return a number with its interval; `spread` is that of other Stribeck speeds."""
         centre, slope, width = self._given_lag(gradient)
-        values = np.full(1, centre)
+        values, weights = np.full(1, centre), self.probability
         if self.lags.size > 1:
             index = len(self.regression.names)
             values = centre + slope * (self.changes - self.solved.estimate[index])
-        mean = float(self.probability @ values)
-        timing = math.sqrt(float(self.probability @ (values - mean) ** 2))
+        if self.exchanged > 0:
+            viscous = self.regression.names.index("viscous_friction")
+            less = gradient[viscous] * self.solved.scale[viscous] * self.less_viscous
+            values = np.concatenate([values, values - less])
+            weights = np.concatenate([(1.0 - self.exchanged) * weights, self.exchanged * weights])
+        mean = float(weights @ values)
+        timing = math.sqrt(float(weights @ (values - mean) ** 2))
         record = math.hypot(width, spread)
         low, high = 0.0, 20.0 * math.hypot(record, timing)
         for _ in range(50):
             middle = 0.5 * (low + high)
             inside = scipy.special.ndtr((mean + middle - values) / record)
             inside = inside - scipy.special.ndtr((mean - middle - values) / record)
-            low, high = (middle, high) if self.probability @ inside < CONFIDENCE else (low, middle)
+            low, high = (middle, high) if weights @ inside < CONFIDENCE else (low, middle)
         return Estimated(mean, high, Budget(record, timing, {}))
 
 
@@ -714,6 +738,10 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
     least `_LEAST_HALF_WIDTH`.
     """
     result: dict[str, Estimated] = {}
+    has_spring = any("spring_constant" in curve.numbers for curve in curves)
+    least = _LEAST_HALF_WIDTH if has_spring else _LEAST_OF_MACHINE
+    if len(curves) < 2:
+        least = _LEAST_ALONE
     for name in {name for curve in curves for name in curve.numbers}:
         known = [curve.numbers[name] for curve in curves if name in curve.numbers]
         best = min(known, key=lambda one: one.half_width / max(abs(one.value), 1e-300))
@@ -721,7 +749,7 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
         half_width = math.hypot(
             best.half_width,
             _SCATTERS * float(np.std(near)),
-            _LEAST_HALF_WIDTH * best.value,
+            least * best.value,
         )
         result[name] = replace(best, half_width=half_width)
     return result
@@ -732,22 +760,23 @@ def checked_by_curve(
 ) -> dict[str, Estimated]:
     """Return the numbers of a simulation, checked and sharpened by those of the force balance.
 
-    Spring, preload and sliding friction come from the one that knows them better. Where both
-    exclude each other, the interval reaches from the one to the other. Where the simulated stem
-    follows the record by more than noise, they come from the force balance.
+    Where the simulated stem follows the record to within noise, spring, preload and sliding
+    friction come from the one that knows them better, and from the simulation where both exclude
+    each other: reversals and rests tell it a lag from a viscous friction. Where the stem does not,
+    they come from the force balance, with an interval that reaches the simulation.
     """
     result = dict(simulated)
     for name in (SLIDING, "spring_constant", "spring_preload"):
         ours, theirs = simulated.get(name), balanced.get(name)
         if ours is None or theirs is None or not (theirs.value > 0 or name == "spring_preload"):
             continue
-        better = min(ours, theirs, key=lambda one: one.half_width / max(abs(one.value), 1e-300))
-        if inflation > NOISE_LIKE:
-            better = theirs
         apart = abs(ours.value - theirs.value)
-        if apart > math.hypot(ours.half_width, theirs.half_width):
-            better = replace(better, half_width=max(better.half_width, apart))
-        result[name] = better
+        agree = apart <= math.hypot(ours.half_width, theirs.half_width)
+        if inflation > NOISE_LIKE:
+            wider = theirs.half_width if agree else max(theirs.half_width, apart)
+            result[name] = replace(theirs, half_width=wider)
+        elif agree and theirs.half_width / abs(theirs.value) < ours.half_width / abs(ours.value):
+            result[name] = theirs
     return result
 
 
