@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS
 from valve_friction_ros.identification.robust.intervals import NOISE_LIKE, Budget, Estimated
+from valve_friction_ros.identification.robust.numbers import RECTANGLE
 from valve_friction_ros.identification.robust.weights import inflation
 from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE
@@ -313,6 +314,7 @@ class _Regression:
         force = 0.5 * (averages.force[0] + averages.force[1])
         side = np.sign(velocity)
         low, range_ = float(position.min()), float(np.ptp(position))
+        self.range, self.middle = range_, low + 0.5 * range_
         age: _Array = np.linspace(-1.0, 1.0, position.size, dtype=np.float64)
         plain = np.column_stack([side, velocity, position, np.ones_like(velocity)])[taken]
         size = np.abs(plain).max(axis=0)
@@ -525,6 +527,23 @@ class _Regression:
             1.0 - solved.misfit / float(np.std(self.averages.force[0][self.averages.taken])),
             solved.misfit,
         )
+
+    def definition(self, name: str, solved: _Solved) -> float:
+        """Deviation of a number by what it means where it is not one, as in `reported_numbers`.
+
+        A friction that changes by ±a along the travel or during the record lies anywhere within
+        ±a, and so does the slope of a curved spring, or a zero that drifts.
+        """
+        values = self.values(solved)
+        if name in ("coulomb_friction", "static_friction"):
+            return RECTANGLE * math.hypot(values["along_travel"], values["in_record"])
+        if name not in ("spring_constant", "spring_preload"):
+            return 0.0
+        bow = abs(values.get("curvature", 0.0)) + abs(values.get("cubic", 0.0))
+        stiffness = 4.0 * bow / self.range
+        if name == "spring_constant":
+            return RECTANGLE * stiffness
+        return RECTANGLE * math.hypot(bow, stiffness * abs(self.middle), values["drift"])
 
     def gradients(self, stribeck: float, size: int) -> dict[str, _Array]:
         """Return how each number depends on the coefficients."""
