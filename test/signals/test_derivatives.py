@@ -10,7 +10,6 @@ from numpy.polynomial import Polynomial
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from valve_friction_ros.signals import differentiate
-from valve_friction_ros.signals.derivatives import averaging
 from valve_friction_ros.signals.noise import position_noise, velocity_noise
 
 EPS = np.finfo(float).eps
@@ -109,38 +108,3 @@ class TestNoise:
         found = differentiate(noise, 1e-3, window, order).velocity.std()
         # The velocities are correlated over a window: n/d of them count, five standard errors.
         assert found == pytest.approx(expected, rel=5 / math.sqrt(2 * self.SIZE / window))
-
-
-class TestAveraging:
-    """The acceleration over a window is a mean of the true one, whose weights are known."""
-
-    TIME = 1e-3 * np.arange(800)
-
-    @pytest.mark.parametrize("window", [5, 31, 101])
-    @pytest.mark.parametrize("order", [2, 3, 4])
-    def test_the_mean_of_the_true_motion(self, window, order):
-        if window < order + 2:
-            pytest.skip("no polynomial")
-        rate = 2 * np.pi * 9.0
-        found = averaging(np.sin(rate * self.TIME), 1e-3, window, order)
-        velocity = found.mean(rate * np.cos(rate * self.TIME))
-        acceleration = found.mean(-(rate**2) * np.sin(rate * self.TIME))
-        np.testing.assert_allclose(found.acceleration, acceleration, atol=1e-5 * rate**2)
-        np.testing.assert_allclose(found.velocity, velocity, atol=2e-3 * rate)
-
-    def test_the_acceleration_of_the_appendix(self):
-        position = np.random.default_rng(3).standard_normal(300)
-        found, known = averaging(position, 1e-2, 21, 3), differentiate(position, 1e-2, 21, 3)
-        np.testing.assert_allclose(found.acceleration, known.acceleration, rtol=1e-9, atol=1e-9)
-        assert found.weights.size == 21
-        assert found.weights.sum() == pytest.approx(1.0)
-        assert found.mean(position).size == known.velocity.size
-
-    def test_gains(self):
-        """Deviation of the motion of white noise."""
-        noise = np.random.default_rng(4).standard_normal(200_000)
-        found = averaging(noise, 1e-3, 11, 3)
-        assert np.std(found.velocity) == pytest.approx(found.velocity_gain, rel=0.02)
-        assert np.std(found.acceleration) == pytest.approx(found.acceleration_gain, rel=0.02)
-        slope = np.gradient(found.mean(noise), 1e-3)
-        assert np.std(slope) == pytest.approx(found.slope_gain(1e-3), rel=0.05)

@@ -42,8 +42,8 @@ def identify_best(
 ) -> Result:
     """Identify with ``robust``; with ``refined`` where the settings ask for what only that has.
 
-    These are a machine without a spring, a known position bias and a known static friction. The
-    result names the method that was used. It raises RefusalError as that method does.
+    These are a known position bias and a known static friction. The result names the method that
+    was used. It raises RefusalError as that method does.
     """
     settings = settings or IdentificationSettings()
     return METHODS[method_used(BEST, settings)](recording, valve, settings)

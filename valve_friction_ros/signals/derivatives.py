@@ -6,38 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-__all__ = ["Averaging", "Derivatives", "averaging", "differentiate"]
-
-
-class Averaging(NamedTuple):
-    """Motion of the stem as means over a window, with the weights of that mean.
-
-    Attributes
-    ----------
-    velocity : ndarray of float, shape (n − d + 1,)
-        Mean velocity, m/s.
-    acceleration : ndarray of float, shape (n − d + 1,)
-        Mean acceleration, m/s²: the same as `differentiate` returns.
-    weights : ndarray of float, shape (d,)
-        Weights of the mean; their sum is 1.
-    velocity_gain, acceleration_gain : float
-        Standard deviation of either mean over that of white noise of the position, 1/s and 1/s².
-    """
-
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    velocity_gain: float
-    acceleration_gain: float
-
-    def mean(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the same mean of another signal, shape (n,), as shape (n − d + 1,)."""
-        return np.asarray(np.convolve(signal, self.weights, "valid"), dtype=np.float64)
-
-    def slope_gain(self, sample_period: float) -> float:
-        """Deviation of the slope of a mean over that of white noise of the signal, 1/s."""
-        slopes = np.convolve(self.weights, [0.5, 0.0, -0.5])
-        return float(np.linalg.norm(slopes)) / sample_period
+__all__ = ["Derivatives", "differentiate"]
 
 
 class Derivatives(NamedTuple):
@@ -110,47 +79,3 @@ def differentiate(
         for degree in (1, 2)
     )
     return Derivatives(velocity, acceleration, window // 2)
-
-
-_BETWEEN_SAMPLES = np.array([1.0, 10.0, 1.0]) / 12.0
-"""Weights of the mean of ẍ of which the second difference consists, to the fourth order in the
-sampling period (Numerov)."""
-
-
-def averaging(
-    position: NDArray[np.float64], sample_period: float, window: int, order: int
-) -> Averaging:
-    """Differentiate as means over a window, so that a force can be averaged in the same way.
-
-    The acceleration of Appendix A sums c_i·x_i over a window. Its weights sum to zero, also times
-    i, so they are the second difference of other weights g: c = g ∗ (1, −2, 1). The acceleration
-    is hence the mean of the true one with the weights g, exactly, however long the window is. It
-    is smaller than the true one where that changes within the window. In a force balance this is
-    no bias as long as every other term is averaged with the same weights.
-
-    Parameters
-    ----------
-    position : ndarray of float, shape (n,)
-        Stem position, m, n at least `window`.
-    sample_period : float
-        Time between two samples, s.
-    window : int
-        Window length d, samples, odd.
-    order : int
-        Polynomial order, at least 2 and below `window`.
-
-    Returns
-    -------
-    Averaging
-        Velocity, acceleration and the weights for the other terms.
-    """
-    second = scipy.signal.savgol_coeffs(window, order, deriv=2, delta=1.0)
-    inner = np.cumsum(np.cumsum(second))[:-2]
-    first = np.convolve(inner, [0.5, 0.0, -0.5])
-    return Averaging(
-        np.asarray(np.convolve(position, first, "valid") / sample_period, dtype=np.float64),
-        np.asarray(np.convolve(position, second, "valid") / sample_period**2, dtype=np.float64),
-        np.asarray(np.convolve(inner, _BETWEEN_SAMPLES), dtype=np.float64),
-        float(np.linalg.norm(first)) / sample_period,
-        float(np.linalg.norm(second)) / sample_period**2,
-    )

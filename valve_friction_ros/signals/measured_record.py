@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.signals.derivatives import Averaging, Derivatives, averaging, differentiate
+from valve_friction_ros.signals.derivatives import Derivatives, differentiate
 from valve_friction_ros.signals.drive_smoothing import DriveSmoothing, smoothing_of
 from valve_friction_ros.signals.noise import position_noise, quantisation_step
 from valve_friction_ros.signals.smoothing import longest_faithful_window
@@ -78,10 +78,6 @@ class MeasuredRecord(Recording):
         if (window, order) not in known:
             known[window, order] = differentiate(self.position, self.sample_period, window, order)
         return known[window, order]
-
-    def averaging(self, window: int, order: int) -> Averaging:
-        """Differentiate the position as means over `window` samples (`averaging`)."""
-        return averaging(self.position, self.sample_period, window, order)
 
 
 def measured(recording: Recording) -> MeasuredRecord:

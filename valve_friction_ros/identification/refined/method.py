@@ -1,6 +1,5 @@
 """Method "refined": the published sweep, then a refinement with intervals and verdicts."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,14 +14,10 @@ from valve_friction_ros.identification.published.evidence import (
     with_published,
 )
 from valve_friction_ros.identification.published.identify import published_fit
-from valve_friction_ros.identification.refined.averaged_balance import (
-    AveragedBalance,
-    averaged_balance,
-)
 from valve_friction_ros.identification.refined.model_selection import with_demanded
 from valve_friction_ros.identification.refined.model_test import misfit_of
 from valve_friction_ros.identification.refined.output_error import SLIP, START, OutputError
-from valve_friction_ros.identification.refined.verdicts import balance_verdicts, refinement_verdicts
+from valve_friction_ros.identification.refined.verdicts import refinement_verdicts
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -55,9 +50,6 @@ _START_TIME = 0.02
 """Time, s, over which the median position is the first guess of the start position.
 
 Chosen: 20 samples at 1 kHz. The start position is refined, so only convergence depends on this."""
-
-_LEAST_WINDOWS = 20
-"""Windows in a record whose window is chosen. Chosen, as for the other derivatives: a twentieth."""
 
 METHOD = "refined"
 """Name of this method."""
@@ -94,6 +86,11 @@ def identify_refined(
         If the record does not determine the friction; the message names cause and remedy.
     """
     settings = settings or IdentificationSettings()
+    if settings.fixed.get("spring_constant") == 0.0:
+        raise RefusalError(
+            "the method refined simulates the stem, which no force returns without a spring: use "
+            "the method best or robust"
+        )
     record = measured(recording)
     require_unbroken(record)
     require_plausible_units(record, valve, settings)
@@ -102,22 +99,16 @@ def identify_refined(
     require_two_directions(record, settings.published_window)
     require_travel(record, valve)
     require_stem_between_stops(record, valve)
-    has_spring = settings.fixed.get("spring_constant") != 0.0
-    if has_spring:
-        require_related_signals(record)
+    require_related_signals(record)
     published, warnings = published_beside(record, valve, settings)
     window = settings.derivative_window or record.fitting_window(settings.order)
-    start_settings = replace(settings, derivative_window=window)
-    if has_spring:
-        mass = settings.fixed.get("mass", settings.assumed_mass)
-        start_settings = replace(start_settings, fixed={**settings.fixed, "mass": mass})
+    mass = settings.fixed.get("mass", settings.assumed_mass)
+    start_settings = replace(
+        settings, derivative_window=window, fixed={**settings.fixed, "mass": mass}
+    )
     start = published_fit(record, valve, start_settings)
-    if has_spring:
-        outcome = _refined(record, valve, settings, start.estimate)
-    else:
-        balance = _balance(record, valve, settings, window)
-        outcome, window = _regressed(balance, settings), balance.window
-    estimate = published or start.estimate
+    outcome = _refined(record, valve, settings, start.estimate)
+    misfit, estimate = outcome.misfit, published or start.estimate
     beside = () if published is None else published.warnings
     notes = [f"published estimate: {warning}" for warning in beside]
     return Result(
@@ -126,14 +117,16 @@ def identify_refined(
         valve=valve,
         settings=settings,
         parameters=with_published(outcome.parameters, published),
-        fit=outcome.fit,
-        rms=math.nan if outcome.stem is None else outcome.misfit.rms,
-        misfit=outcome.misfit,
+        fit=misfit.fit,
+        rms=misfit.rms,
+        misfit=misfit,
         derivative_window=window,
         warnings=tuple(dict.fromkeys([*warnings, *outcome.warnings, *notes])),
         evidence=sweep_evidence(estimate),
         findings=(
-            _finding(outcome, valve),
+            f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
+            f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not "
+            "noise",
             f"{sweep_finding(estimate)}; refined from {window}",
         ),
         model=outcome.model,
@@ -144,14 +137,13 @@ def identify_refined(
 
 
 class _Outcome(NamedTuple):
-    """Outcome of a refinement or, without a spring, of the averaged force balance."""
+    """Outcome of a refinement."""
 
     parameters: Mapping[str, Parameter]
-    fit: float
     misfit: Misfit
     warnings: Sequence[str]
-    model: KarnoppParameters | None
-    stem: StemComparison | None
+    model: KarnoppParameters
+    stem: StemComparison
     sliding_speed: float
 
 
@@ -191,58 +183,11 @@ def _refined(
     conditioned = problem.record
     return _Outcome(
         refinement_verdicts(refinement, misfit, settings),
-        misfit.fit,
         misfit,
         [*time_remarks(record, valve), *warnings],
         problem.model(refinement.coordinates),
         StemComparison(conditioned.sample_period, conditioned.position, refinement.simulated),
         mean_speed(refinement.velocity),
-    )
-
-
-def _balance(
-    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings, window: int
-) -> AveragedBalance:
-    """Fit the balance with the given window, or with the best of those from `window` on.
-
-    A longer window averages more noise and leaves fewer samples without a reversal; the best gives
-    the narrowest interval of the first free parameter, the mass where it is free.
-    """
-    if settings.derivative_window is not None:
-        return averaged_balance(record, valve, settings, window)
-    longest = len(record) // _LEAST_WINDOWS
-    windows = [window, *(w for w in (2 * window + 1, 4 * window + 1) if w <= longest)]
-    return min(
-        (averaged_balance(record, valve, settings, each) for each in windows),
-        key=AveragedBalance.relative_width,
-    )
-
-
-def _regressed(balance: AveragedBalance, settings: IdentificationSettings) -> _Outcome:
-    """Return the outcome of the averaged balance: no simulated stem comes back without a spring."""
-    parameters = balance_verdicts(balance, settings)
-    try:
-        model = KarnoppParameters(
-            **balance.values, static_friction=balance.values["coulomb_friction"]
-        )
-    except ValueError:
-        model = None
-    doubts = [balance.doubt] if balance.doubt else []
-    return _Outcome(
-        parameters, balance.misfit.fit, balance.misfit, doubts, model, None, balance.sliding_speed
-    )
-
-
-def _finding(outcome: _Outcome, valve: Valve) -> str:
-    misfit = outcome.misfit
-    if outcome.stem is None:
-        return (
-            f"the force balance reproduces {100 * outcome.fit:.2f} % of the force; "
-            f"{misfit.words} of the rest are not noise"
-        )
-    return (
-        f"fit {100 * misfit.fit:.2f} %: the refined model's stem is "
-        f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not noise"
     )
 
 

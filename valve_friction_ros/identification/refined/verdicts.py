@@ -1,4 +1,4 @@
-"""Verdicts on the parameters of a refinement, or of an averaged force balance."""
+"""Verdicts on the parameters of a refinement."""
 
 import math
 from statistics import NormalDist
@@ -6,7 +6,6 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.refined.averaged_balance import AveragedBalance
 from valve_friction_ros.identification.refined.output_error import SLIP, START
 from valve_friction_ros.identification.refined.refinement import Refinement, estimating_equation
 from valve_friction_ros.identification.settings import IdentificationSettings
@@ -31,7 +30,7 @@ from valve_friction_ros.identification.trust.verdict import (
 )
 from valve_friction_ros.identification.units import CLOCK_OFFSET, UNITS
 
-__all__ = ["balance_verdicts", "refinement_verdicts"]
+__all__ = ["refinement_verdicts"]
 
 _SPRING = ("mass", "spring_constant", "spring_preload", CLOCK_OFFSET)
 """Parameters whose verdicts stand where the friction model is doubted: no friction enters them."""
@@ -93,37 +92,6 @@ def refinement_verdicts(
     error, width = covariance.standard_error(gradient), width_of(gradient)
     width, reason = max(width, FINEST_SLIDING * value), few or _model_doubt(misfit)
     parameters[SLIDING] = with_verdict(SLIDING, value, error, width, reason)
-    return parameters
-
-
-def balance_verdicts(
-    balance: AveragedBalance, settings: IdentificationSettings
-) -> dict[str, Parameter]:
-    """Give each parameter of an averaged force balance its verdict."""
-    few = too_few_strokes(balance.strokes)
-    parameters = {}
-    for name in UNITS:
-        if name in settings.fixed:
-            parameters[name] = fixed(name, settings.fixed[name])
-        elif name == "static_friction":
-            parameters[name] = not_identifiable(name, NO_SLIP)
-        elif name not in balance.names:
-            parameters[name] = not_identifiable(name, "the record does not determine it")
-        elif balance.values[name] < 0 and name != "spring_preload":
-            parameters[name] = not_identifiable(
-                name, f"its estimate is negative ({balance.values[name]:.4g})"
-            )
-        else:
-            value = balance.values[name]
-            width = max(
-                balance.half_width({name: 1.0}), finest_half_share(name, settings) * abs(value)
-            )
-            error = balance.standard_error({name: 1.0})
-            parameters[name] = with_verdict(name, value, error, width, few or balance.doubt)
-    value, parts = balance.sliding_friction
-    width = max(balance.half_width(parts), FINEST_SLIDING * abs(value))
-    error = balance.standard_error(parts)
-    parameters[SLIDING] = with_verdict(SLIDING, value, error, width, few or balance.doubt)
     return parameters
 
 

@@ -11,9 +11,9 @@ from valve_friction_ros.identification.robust.coordinates import Coordinates
 from valve_friction_ros.identification.robust.imperfections import TIMING
 from valve_friction_ros.identification.trust.sliding import mean_over_distance, mean_speed
 
-__all__ = ["ReportedNumber", "found_sizes", "loop_friction", "reported_numbers"]
+__all__ = ["RECTANGLE", "ReportedNumber", "found_sizes", "loop_friction", "reported_numbers"]
 
-_RECTANGLE = 1.0 / math.sqrt(3.0)
+RECTANGLE = 1.0 / math.sqrt(3.0)
 """Standard deviation of a rectangular distribution over its half width."""
 
 _MOVING = 0.02
@@ -80,13 +80,13 @@ def reported_numbers(model: BroadModel, at: Coordinates) -> dict[str, ReportedNu
     slow = model.record.slow
     dry, spring = at["coulomb_friction"], at["spring_constant"]
     static = dry + at["slip_force"]
-    friction = _RECTANGLE * math.hypot(at["along_travel"], at["in_record"], at["at_low_speed"])
+    friction = RECTANGLE * math.hypot(at["along_travel"], at["in_record"], at["at_low_speed"])
     curve = abs(at["curvature"]) + abs(at["cubic"])
-    stiffness = _RECTANGLE * 4.0 * curve * spring
+    stiffness = RECTANGLE * 4.0 * curve * spring
     middle = 0.5 * (slow.lowest + slow.highest)
     seat = -2.0 * middle / slow.range
-    bow = _RECTANGLE * curve * spring * slow.range * max(abs(seat**2 - 1 / 3), 2 / 3)
-    drift = _RECTANGLE * abs(at["drift"]) * float(np.ptp(model.record.force))
+    bow = RECTANGLE * curve * spring * slow.range * max(abs(seat**2 - 1 / 3), 2 / 3)
+    drift = RECTANGLE * abs(at["drift"]) * float(np.ptp(model.record.force))
     preload = math.hypot(bow, stiffness * abs(middle), drift, _ASYMMETRY * dry)
     static_gradient = {"coulomb_friction": 1.0, "slip_force": 1.0}
     numbers = {

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from valve_friction_ros.identification.robust.broad_model import ABSENT, BroadModel
+from valve_friction_ros.identification.robust.broad_model import ABSENT, SWINGING, BroadModel
 from valve_friction_ros.identification.robust.coordinates import MAIN, Coordinates
 from valve_friction_ros.identification.robust.fitted_record import (
     FittedRecord,
     set_anew_at_rests,
 )
+from valve_friction_ros.identification.robust.friction_curve import FrictionCurve
 from valve_friction_ros.identification.robust.imperfections import TIMING, deviations
 from valve_friction_ros.identification.robust.intervals import UNLIKELY
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit, fit
@@ -79,8 +80,11 @@ class Prior:
 class _Search:
     """The fits of one record."""
 
-    def __init__(self, record: FittedRecord, prior: Prior) -> None:
+    def __init__(
+        self, record: FittedRecord, prior: Prior, curves: Sequence[FrictionCurve] = ()
+    ) -> None:
         self.work = 0
+        self.curves = curves
         self.prior = prior
         self.sliding = sliding(record)
         self.exact = BroadModel(record, self.sliding.spring_constant)
@@ -213,6 +217,18 @@ class _Search:
         others = tuple(name for name in self.all if name != "at_low_speed")
         return self.full(first.at, (*others, "stribeck_velocity"))
 
+    def curved(self, full: PosteriorFit) -> PosteriorFit:
+        """Fit from the friction curves, each move for itself first."""
+        starts = self.from_curves()
+        if not starts:
+            return full
+        near = nearest(self.stepwise, starts)[0]
+        falls = near["stribeck_velocity"] > 0
+        own = ("slip_force", "stribeck_velocity") if falls else ()
+        first = self.fit(near, (*self.main, *own), _FEW_STEPS, self.stepwise)
+        others = tuple(name for name in self.all if not (falls and name == "at_low_speed"))
+        return self.full(first.at, (*others, "stribeck_velocity") if falls else others)
+
     def stopping(self, full: PosteriorFit) -> PosteriorFit:
         """Fit a dead zone of the speed."""
         dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
@@ -263,6 +279,28 @@ class _Search:
                 best, others = deeper, [*others, best]
         return [best, *others]
 
+    def from_curves(self) -> list[Coordinates]:
+        """Return what the friction curves say, as starts."""
+        starts: list[Coordinates] = []
+        for curve in self.curves:
+            values = {name: one.value for name, one in curve.numbers.items() if name in MAIN}
+            spring = values.get("spring_constant", 0.0)
+            if not (spring > 0 and values.get("coulomb_friction", 0.0) > 0):
+                continue
+            values["viscous_friction"] = max(values["viscous_friction"], SWINGING * spring)
+            static = curve.numbers.get("static_friction")
+            slip = 0.0 if static is None else max(static.value - values["coulomb_friction"], 0.0)
+            starts.append(
+                {
+                    **self.base,
+                    **values,
+                    "slip_force": slip,
+                    "stribeck_velocity": curve.stribeck_velocity if slip > 0 else 0.0,
+                    **({"delay": curve.lag} if self.timing else {}),
+                }
+            )
+        return starts
+
     def start(self) -> Coordinates:
         """Fit few coordinates, without and with a slip, each with its likeliest lag."""
         plain = self.lagged(splits(self.sliding, self.base), self.main)
@@ -284,9 +322,9 @@ class _Search:
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
         best = self.full(self.start())
-        branches = [self.stopping]
+        branches = [self.curved, self.stopping]
         if "slip_force" in self.all:
-            branches = [self.slipping, self.falling, self.stopping]
+            branches = [self.curved, self.slipping, self.falling, self.stopping]
         for branch in branches:
             is_likely = best.inflation < _SUSPICIOUS and best.stages[-1].penalty < UNLIKELY
             if is_likely or not self.may_go_on:
@@ -295,7 +333,9 @@ class _Search:
         return best
 
 
-def search(record: FittedRecord, prior: Prior) -> list[PosteriorFit]:
+def search(
+    record: FittedRecord, prior: Prior, curves: Sequence[FrictionCurve] = ()
+) -> list[PosteriorFit]:
     """Find the most probable model of a record, and the ones that compete with it.
 
     The sliding friction of a regression is split into F_c and F_v in several ways, without and
@@ -309,7 +349,7 @@ def search(record: FittedRecord, prior: Prior) -> list[PosteriorFit]:
     RefusalError
         If the stem does not follow the force.
     """
-    return _Search(record, prior).all_probable()
+    return _Search(record, prior, curves).all_probable()
 
 
 def posteriors_at(

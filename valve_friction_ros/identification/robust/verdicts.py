@@ -5,20 +5,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from valve_friction_ros.identification.robust.friction_curve import FrictionCurve
 from valve_friction_ros.identification.robust.intervals import NOISE_LIKE, Estimated
 from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.robust.sentences import main_doubt, slips
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.limits import FALL_SPEED, NO_SLIP
 from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.verdict import (
+    WEAK_SHARE,
     Parameter,
     fixed,
     not_identifiable,
     with_verdict,
 )
+from valve_friction_ros.identification.units import UNITS
 
-__all__ = ["USABLE", "fit_misfit", "fit_verdicts"]
+__all__ = ["USABLE", "curve_misfit", "curve_verdicts", "fit_misfit", "fit_verdicts"]
 
 USABLE = 0.1
 """Half width over value up to which a sliding friction is of use to maintenance.
@@ -31,6 +35,9 @@ _SPLIT_DOUBT = (
 )
 _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction")
 """What a friction that falls with speed has in other proportions at higher speeds."""
+
+_OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
+"""What the force balance of the sliding stem determines without a simulation."""
 
 _TWO = 2.0
 
@@ -75,7 +82,7 @@ def fit_verdicts(
     for name, one in numbers.items():
         width = one.half_width
         reason = doubt or (slow if name in _BY_SPEED else "")
-        if not reason and fit.inflation > NOISE_LIKE and name != "sliding_friction":
+        if not reason and fit.inflation > NOISE_LIKE and name not in _OF_THE_BALANCE:
             reason = _SPLIT_DOUBT.format(1e6 * misfit.systematic)
         if not reason and one.value and width > 0.05 * abs(one.value):
             reason = main_doubt(one.budget, width / abs(one.value))
@@ -92,6 +99,47 @@ def fit_verdicts(
         ):
             verdicts[name] = not_identifiable(name, NO_SLIP)
         else:
+            verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason)
+    return verdicts
+
+
+def curve_misfit(curve: FrictionCurve, sliding: Estimated) -> Misfit:
+    """Return how well the force balance of the sliding stem reproduces the force, N.
+
+    As for a simulation, the model is doubted only where the sliding friction stays uncertain.
+    """
+    systematic = curve.misfit * math.sqrt(max(1.0 - 1.0 / curve.inflation, 0.0))
+    describes = sliding.half_width <= _TWO * USABLE * abs(sliding.value)
+    tolerated = systematic if describes else 0.5 * systematic
+    return Misfit(curve.fit, curve.misfit, systematic, tolerated, "N")
+
+
+def curve_verdicts(
+    numbers: Mapping[str, Estimated],
+    settings: IdentificationSettings,
+    stribeck_velocity: float,
+    why: str,
+) -> dict[str, Parameter]:
+    """Return every reported number of a force balance with its verdict.
+
+    Spring, preload and sliding friction may be identified. What the sliding friction is made of is
+    at most weak where a spring returns the stem, as no simulated stem confirms it.
+    """
+    verdicts = {}
+    split = "" if settings.fixed.get("spring_constant") == 0.0 else f"no stem confirms it: {why}"
+    for name in (*UNITS, SLIDING):
+        one = numbers.get(name)
+        if name in settings.fixed and name != "limit_velocity":
+            verdicts[name] = fixed(name, settings.fixed[name])
+        elif name == "static_friction" and not stribeck_velocity:
+            verdicts[name] = not_identifiable(name, NO_SLIP)
+        elif one is None or (one.value < 0 and name != "spring_preload"):
+            verdicts[name] = not_identifiable(name, "the record does not determine it")
+        else:
+            width = one.half_width
+            reason = split if name in _BY_SPEED else ""
+            if not reason and width > WEAK_SHARE * abs(one.value):
+                reason = main_doubt(one.budget, width / max(abs(one.value), 1e-300))
             verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason)
     return verdicts
 
