@@ -19,7 +19,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.robust.imperfections import IMPERFECTIONS
@@ -153,6 +152,22 @@ def averaged_twice(signal: _Array, length: int) -> _Array:
     return signal
 
 
+def _all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Return where all samples up to `reach` before and after are set."""
+    sums = np.concatenate([[0], np.cumsum(np.pad(which, reach, mode="edge"))])
+    width = 2 * reach + 1
+    return np.asarray(sums[width:] - sums[:-width] == width)
+
+
+_DEVIATIONS: _Array = np.linspace(-9.0, 9.0, 3601, dtype=np.float64)
+_PROBABILITIES: _Array = np.array([0.5 * math.erfc(-one / math.sqrt(2.0)) for one in _DEVIATIONS])
+
+
+def _normal(deviations: _Array) -> _Array:
+    """Return the normal distribution function, to 1e-6."""
+    return np.interp(deviations, _DEVIATIONS, _PROBABILITIES)
+
+
 class _Signal(NamedTuple):
     """A signal of a sensor, N or m, with the deviation of its noise."""
 
@@ -222,14 +237,12 @@ def _averages(
         "velocity": stem.noise * math.sqrt(2.0 / per_average[1]) / averaging_time,
     }
     side = np.sign(mean) * (size > max(_SLIDES * speed, _SURELY * noise["velocity"]))
-    width = int(2 * margin * length) + 1
-    slides = (scipy.ndimage.minimum_filter1d(side, width) > 0) | (
-        scipy.ndimage.maximum_filter1d(side, width) < 0
-    )
+    reach = int(margin * length)
+    slides = _all_around(side > 0, reach) | _all_around(side < 0, reach)
     if math.isfinite(valve.travel):
         place = 0.5 * (position[0] + position[1])
-        reach = _OF_STOPS * valve.travel
-        slides &= (place > reach) & (place < valve.travel - reach)
+        near = _OF_STOPS * valve.travel
+        slides &= (place > near) & (place < valve.travel - near)
     slides[:lost] = slides[-lost:] = False
     taken = np.flatnonzero(slides)
     taken = taken[taken % max(length // 2, 1) == 0]
@@ -647,7 +660,7 @@ class _Posterior:
                 gradient = np.eye(solved.scale.size)[self.regression.names.index(name)]
                 centre, slope, width = self._given_lag(gradient)
                 value = centre + slope * (self.changes - solved.estimate[index])
-                log = log + np.log(np.maximum(scipy.special.ndtr(value / width), 1e-10))
+                log = log + np.log(np.maximum(_normal(value / width), 1e-10))
         probability = np.exp(log - log.max())
         self.lags, self.probability = _LAGS, probability / np.sum(probability)
 
@@ -696,10 +709,10 @@ class _Posterior:
         timing = math.sqrt(float(weights @ (values - mean) ** 2))
         record = math.hypot(width, spread)
         low, high = 0.0, 20.0 * math.hypot(record, timing)
-        for _ in range(50):
+        for _ in range(30):
             middle = 0.5 * (low + high)
-            inside = scipy.special.ndtr((mean + middle - values) / record)
-            inside = inside - scipy.special.ndtr((mean - middle - values) / record)
+            inside = _normal((mean + middle - values) / record)
+            inside = inside - _normal((mean - middle - values) / record)
             low, high = (middle, high) if weights @ inside < CONFIDENCE else (low, middle)
         return Estimated(mean, high, Budget(record, timing, {}))
 
