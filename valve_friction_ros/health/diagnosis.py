@@ -96,6 +96,8 @@ class FrictionState(Enum):
     """It is not compared."""
     IMPOSSIBLE = "friction below zero"
     NORMAL = "friction normal"
+    UNCLEAR = "friction cannot be told from its baseline"
+    """It is beyond a limit, and may be unchanged all the same."""
     PERHAPS_GROWN = "friction perhaps grown"
     GROWN = "friction has grown"
     EXCESS = "excess friction"
@@ -137,6 +139,7 @@ _SEVERITY = {
     FrictionState.UNKNOWN: (Level.OK, StatusSignal.GOOD),
     FrictionState.IMPOSSIBLE: (Level.WARN, StatusSignal.CHECK_FUNCTION),
     FrictionState.NORMAL: (Level.OK, StatusSignal.GOOD),
+    FrictionState.UNCLEAR: (Level.OK, StatusSignal.GOOD),
     FrictionState.PERHAPS_GROWN: (Level.WARN, StatusSignal.CHECK_FUNCTION),
     FrictionState.GROWN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
     FrictionState.EXCESS: (Level.ERROR, StatusSignal.FAILURE),
@@ -144,7 +147,7 @@ _SEVERITY = {
     FrictionState.FALLEN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
     FrictionState.COLLAPSED: (Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
 }
-_PERHAPS = (FrictionState.PERHAPS_GROWN, FrictionState.PERHAPS_FALLEN)
+_PERHAPS = (FrictionState.UNCLEAR, FrictionState.PERHAPS_GROWN, FrictionState.PERHAPS_FALLEN)
 
 
 @dataclass(frozen=True)
@@ -395,10 +398,11 @@ def diagnose(
     Diagnosis
         A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
         uncertain result raises no alarm: on an unchanged valve it would have to be wrong by the
-        whole distance to the bound. Where only the ratio itself lies beyond one, the valve is to be
-        identified again (WARN, check function). A friction that is not identifiable has collapsed
-        where even its largest possible value lies below the low bound. A valve that the model does
-        not describe is WARN at least.
+        whole distance to the bound. Where only the ratio itself lies beyond one, and the interval
+        excludes an unchanged friction, the valve is to be identified again (WARN, check function).
+        A friction that is not identifiable has collapsed where even its largest possible value
+        lies below the low bound. A model that does not describe the valve is said, and raises no
+        alarm: one record is no sign of a fault.
     """
     limits = limits or FrictionLimits()
     for friction in _frictions(result):
@@ -507,11 +511,7 @@ def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
 
 
 def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:
-    message = f"{doubt}; {diagnosis.message}"
-    if diagnosis.level >= Level.WARN:
-        return replace(diagnosis, message=message, doubt=doubt)
-    check = StatusSignal.CHECK_FUNCTION
-    return replace(diagnosis, level=Level.WARN, status_signal=check, message=message, doubt=doubt)
+    return replace(diagnosis, message=f"{doubt}; {diagnosis.message}", doubt=doubt)
 
 
 def against(
@@ -526,13 +526,19 @@ def against(
 
 
 def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
-    """Return what a ratio says: a limit is passed where the whole interval lies beyond it."""
+    """Return what a ratio says: a limit is passed where the whole interval lies beyond it.
+
+    Where the ratio itself lies beyond a limit and the interval does not, friction has perhaps
+    changed so far, provided that it surely has changed at all.
+    """
+    is_high, is_low = ratio.value >= limits.warn_ratio, ratio.value <= limits.low_warn_ratio
     passed = (
         (ratio.low >= limits.error_ratio, FrictionState.EXCESS),
         (ratio.high <= limits.low_ratio, FrictionState.COLLAPSED),
         (ratio.low >= limits.warn_ratio, FrictionState.GROWN),
         (ratio.high <= limits.low_warn_ratio, FrictionState.FALLEN),
-        (ratio.value >= limits.warn_ratio, FrictionState.PERHAPS_GROWN),
-        (ratio.value <= limits.low_warn_ratio, FrictionState.PERHAPS_FALLEN),
+        (is_high and ratio.low > 1.0, FrictionState.PERHAPS_GROWN),
+        (is_low and ratio.high < 1.0, FrictionState.PERHAPS_FALLEN),
+        (is_high or is_low, FrictionState.UNCLEAR),
     )
     return next((state for is_passed, state in passed if is_passed), FrictionState.NORMAL)

@@ -30,6 +30,7 @@ COMPARED = (
 
 _COULOMB = "coulomb_friction"
 _DOUBTED = "slip_force"
+_OF_THE_BALANCE = ("spring_constant", "spring_preload")
 _SLIP_SHARE = 0.5
 """Share of a slip force by which it may be too large, whatever the law of the friction.
 
@@ -47,8 +48,9 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
 
     Parameters are there where they are identified or weak, the preload with any interval, without
     the uncertainties of area and sensor scales, which two records of the same sensors share; not
-    where the model does not describe the valve, but for the slip jump, which may be why, or where
-    the spring constant is known to no better than 10 %. The others are:
+    where the model does not describe the valve, but for the slip jump, which may be why, and for
+    spring and preload where the force balance has identified them, or where the spring constant is
+    known to no better than 10 %. The others are:
 
     - ``slip_force``, F_s − F_c, N; ``viscous_asymmetry``; ``lag`` of the stem, s;
     - ``lowest_position``, ``highest_position``, and the stops that were met (`stem_reach`);
@@ -59,7 +61,9 @@ def valve_numbers(result: Result) -> dict[str, Measured]:
     if fit:
         fit |= _imperfections(result.evidence, known)
     if result.misfit is not None and not result.misfit.describes:
-        fit = {name: one for name, one in fit.items() if name == _DOUBTED}
+        identified = (name for name in _OF_THE_BALANCE if name in result.parameters)
+        sure = [n for n in identified if result.parameters[n].verdict is Verdict.IDENTIFIED]
+        fit = {name: one for name, one in fit.items() if name in (_DOUBTED, *sure)}
     slip = fit.get("slip_force")
     largest = math.nan if slip is None else max(slip.value, 0.0) + slip.half_width
     numbers = sensor_noises(result.recording)

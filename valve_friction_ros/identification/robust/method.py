@@ -245,7 +245,7 @@ def _of_force_balance(
     best = min(curves, key=lambda curve: curve.numbers[SLIDING].half_width)
     misfit = curve_misfit(best, numbers[SLIDING])
     return _Outcome(
-        parameters=curve_verdicts(numbers, settings, best.stribeck_velocity, why),
+        parameters=curve_verdicts(numbers, settings, best.stribeck_velocity),
         numbers=numbers,
         misfit=misfit,
         sliding_speed=best.sliding_speed,
@@ -253,6 +253,7 @@ def _of_force_balance(
             f"the force balance of the sliding stem reproduces {100 * misfit.fit:.2f} % of the "
             f"force; {misfit.words} of the rest are not noise"
         ),
+        warnings=() if settings.fixed.get("spring_constant") == 0.0 else (f"simulation: {why}",),
         model=_balanced_model(numbers, settings),
     )
 

@@ -36,6 +36,7 @@ _SPLIT_DOUBT = (
 _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction")
 """What a friction that falls with speed has in other proportions at higher speeds."""
 
+_UNCONFIRMED = "it follows from the forces alone: no simulated stem confirms it"
 _OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
 """What the force balance of the sliding stem determines without a simulation."""
 
@@ -82,6 +83,8 @@ def fit_verdicts(
     for name, one in numbers.items():
         width = one.half_width
         reason = doubt or (slow if name in _BY_SPEED else "")
+        if name in _OF_THE_BALANCE and fit.inflation > NOISE_LIKE:
+            reason = ""
         if not reason and fit.inflation > NOISE_LIKE and name not in _OF_THE_BALANCE:
             reason = _SPLIT_DOUBT.format(1e6 * misfit.systematic)
         if not reason and one.value and width > 0.05 * abs(one.value):
@@ -118,7 +121,6 @@ def curve_verdicts(
     numbers: Mapping[str, Estimated],
     settings: IdentificationSettings,
     stribeck_velocity: float,
-    why: str,
 ) -> dict[str, Parameter]:
     """Return every reported number of a force balance with its verdict.
 
@@ -126,7 +128,7 @@ def curve_verdicts(
     at most weak where a spring returns the stem, as no simulated stem confirms it.
     """
     verdicts = {}
-    split = "" if settings.fixed.get("spring_constant") == 0.0 else f"no stem confirms it: {why}"
+    split = "" if settings.fixed.get("spring_constant") == 0.0 else _UNCONFIRMED
     for name in (*UNITS, SLIDING):
         one = numbers.get(name)
         if name in settings.fixed and name != "limit_velocity":
