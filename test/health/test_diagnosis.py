@@ -376,13 +376,13 @@ class TestModelDoubt:
     @pytest.mark.parametrize(
         ("ratio", "level", "signal"),
         [
-            (1.0, Level.WARN, StatusSignal.CHECK_FUNCTION),
+            (1.0, Level.OK, StatusSignal.GOOD),
             (1.5, Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
             (3.0, Level.ERROR, StatusSignal.FAILURE),
             (0.25, Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
         ],
     )
-    def test_raises_to_a_warning_and_never_lowers(self, with_values, doubted, ratio, level, signal):
+    def test_is_said_and_changes_no_level(self, with_values, doubted, ratio, level, signal):
         found = diagnose(doubted(ratio * 128.0), BENCH_VALVE, BASELINE)
         assert (found.level, found.status_signal) == (level, signal)
         sure = diagnose(with_values(coulomb_friction=ratio * 128.0), BENCH_VALVE, BASELINE)
@@ -391,12 +391,12 @@ class TestModelDoubt:
 
     def test_without_a_baseline(self, doubted):
         found = diagnose(doubted(152.7), BENCH_VALVE)
-        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
+        assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
         assert found.message.startswith(self.DOUBT + "no baseline yet; ")
 
     def test_without_a_friction(self, doubted, unknown):
         found = diagnose(doubted(unknown()), BENCH_VALVE, BASELINE)
-        assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
+        assert (found.level, found.status_signal) == (Level.OK, StatusSignal.GOOD)
         assert found.message.startswith(self.DOUBT + "no comparison with the baseline (coulomb ")
 
     def test_a_tolerated_misfit_is_no_doubt(self, doubted):

@@ -116,6 +116,6 @@ class TestAgain:
         doubted = replace(ALARM, message=f"{DOUBT}; {ALARM.message}", doubt=DOUBT)
         monitor = monitor_with(kept(diagnosis=doubted), Baseline(400.0, 1.0))
         diagnosis = monitor.diagnosis()
-        assert diagnosis.level == Level.WARN
-        assert diagnosis.status_signal is StatusSignal.CHECK_FUNCTION
+        assert diagnosis.level == Level.OK
+        assert diagnosis.doubt == DOUBT
         assert diagnosis.message.startswith(f"{DOUBT}; friction normal: coulomb friction is 1.00")

@@ -17,7 +17,11 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.health.refused_record import numbers_of_refused
 from valve_friction_ros.health.stem_reach import stem_reach
-from valve_friction_ros.identification import IdentificationSettings, RefusalError, identify
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    Verdict,
+    identify,
+)
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,
@@ -44,9 +48,13 @@ def healthy():
 
 @pytest.mark.parametrize("share", [0.09, 0.12, 0.16])
 def test_lost_travel(healthy, share):
+    """No simulated stem follows a stop within the travel; the forces between the stops say enough."""
     record = stroked_record(share * TRAVEL)
-    with pytest.raises(RefusalError, match="no friction model reproduces"):
-        identify(record, BENCH_VALVE)
+    result = identify(record, BENCH_VALVE)
+    spring = result.parameters["spring_constant"]
+    assert spring.verdict is Verdict.IDENTIFIED
+    assert abs(spring.value - HIGH_FRICTION.spring_constant) <= spring.half_width
+    assert valve_numbers(result).items() >= numbers(record).items()
     known = KnownNumbers().followed_by(healthy.numbers, 0).followed_by(numbers(record), 1)
     (finding,) = known.findings(healthy, BENCH_VALVE)
     assert "travel is lost at its lower end" in finding.message

@@ -537,8 +537,8 @@ def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
         (ratio.high <= limits.low_ratio, FrictionState.COLLAPSED),
         (ratio.low >= limits.warn_ratio, FrictionState.GROWN),
         (ratio.high <= limits.low_warn_ratio, FrictionState.FALLEN),
-        (is_high and ratio.low > 1.0, FrictionState.PERHAPS_GROWN),
-        (is_low and ratio.high < 1.0, FrictionState.PERHAPS_FALLEN),
+        (is_high and not ratio.low <= 1.0, FrictionState.PERHAPS_GROWN),
+        (is_low and not ratio.high >= 1.0, FrictionState.PERHAPS_FALLEN),
         (is_high or is_low, FrictionState.UNCLEAR),
     )
     return next((state for is_passed, state in passed if is_passed), FrictionState.NORMAL)
