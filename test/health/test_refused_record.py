@@ -48,7 +48,7 @@ def healthy():
 
 @pytest.mark.parametrize("share", [0.09, 0.12, 0.16])
 def test_lost_travel(healthy, share):
-    """No simulated stem follows a stop within the travel; the forces between the stops say enough."""
+    """No simulated stem follows a stop within the travel; the forces beside it say enough."""
     record = stroked_record(share * TRAVEL)
     result = identify(record, BENCH_VALVE)
     spring = result.parameters["spring_constant"]
