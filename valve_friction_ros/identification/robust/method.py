@@ -18,7 +18,11 @@ from valve_friction_ros.identification.robust.remarks import sampling_remarks
 from valve_friction_ros.identification.robust.search import Prior, search
 from valve_friction_ros.identification.robust.sentences import found_imperfections
 from valve_friction_ros.identification.robust.verdicts import fit_misfit, fit_verdicts
-from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.identification.settings import (
+    REGRESSED,
+    TIMING_UNCERTAINTY,
+    IdentificationSettings,
+)
 from valve_friction_ros.identification.trust.calibration import BUDGET
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
@@ -45,7 +49,6 @@ from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
 __all__ = [
     "IMPERFECTIONS_FOUND",
     "METHOD",
-    "TIMING_UNCERTAINTY",
     "has_no_place_for",
     "identify_robust",
     "prior_of",
@@ -59,12 +62,6 @@ METHOD = "robust"
 IMPERFECTIONS_FOUND = "imperfections"
 """Name of the evidence that holds lag, slip force and asymmetry, with half widths
 (`found_sizes`)."""
-
-TIMING_UNCERTAINTY = 0.04
-"""Timing uncertainty without a setting, s.
-
-Chosen: stamps, transmitters and tubing of a plant without special care add up to some tens of
-milliseconds; 95 % are below 0.08 s."""
 
 
 def identify_robust(
