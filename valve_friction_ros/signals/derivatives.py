@@ -1,12 +1,12 @@
 """Velocity and acceleration of the stem by local polynomials, Appendix A."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-__all__ = ["Averaging", "Derivatives", "averaging", "differentiate"]
+__all__ = ["Averaging", "Derivatives", "averaging", "differentiate", "savgol_weights"]
 
 
 class Averaging(NamedTuple):
@@ -62,6 +62,36 @@ class Derivatives(NamedTuple):
         return samples[self.margin : samples.size - self.margin]
 
 
+def savgol_weights(
+    window: int, order: int, degree: int = 0, sample_period: float = 1.0
+) -> NDArray[np.float64]:
+    """Return the weights of a Savitzky–Golay filter, to convolve a signal with.
+
+    They are those of `scipy.signal.savgol_coeffs`, whose import takes half a second.
+
+    Parameters
+    ----------
+    window : int
+        Length of the window, samples, above `order`.
+    order : int
+        Order of the polynomials.
+    degree : int
+        Degree of the derivative in the middle of the window; 0 smoothes.
+    sample_period : float
+        Time between two samples, s.
+
+    Returns
+    -------
+    ndarray of float, shape (window,)
+        The weights, the last sample's first.
+    """
+    # Over places from −1 to 1 the powers stay apart, however long the window is.
+    powers = np.vander(np.linspace(-1.0, 1.0, window), order + 1, increasing=True)
+    size = 0.5 * (window - 1) * sample_period
+    weights = np.linalg.pinv(powers)[degree] * (math.factorial(degree) / size**degree)
+    return np.asarray(weights[::-1], dtype=np.float64)
+
+
 def differentiate(
     position: NDArray[np.float64], sample_period: float, window: int = 31, order: int = 3
 ) -> Derivatives:
@@ -102,14 +132,14 @@ def differentiate(
             "use a longer record or a shorter window"
         )
     velocity, acceleration = (
-        np.convolve(
-            position,
-            scipy.signal.savgol_coeffs(window, order, deriv=degree, delta=sample_period),
-            "valid",
-        )
+        np.convolve(position, savgol_weights(window, order, degree, sample_period), "valid")
         for degree in (1, 2)
     )
-    return Derivatives(velocity, acceleration, window // 2)
+    return Derivatives(
+        np.asarray(velocity, dtype=np.float64),
+        np.asarray(acceleration, dtype=np.float64),
+        window // 2,
+    )
 
 
 _BETWEEN_SAMPLES = np.array([1.0, 10.0, 1.0]) / 12.0
@@ -144,7 +174,7 @@ def averaging(
     Averaging
         Velocity, acceleration and the weights for the other terms.
     """
-    second = scipy.signal.savgol_coeffs(window, order, deriv=2, delta=1.0)
+    second = savgol_weights(window, order, 2)
     inner = np.cumsum(np.cumsum(second))[:-2]
     first = np.convolve(inner, [0.5, 0.0, -0.5])
     return Averaging(
