@@ -9,6 +9,7 @@ from records import simulated
 
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
+    METHOD_NAMES,
     METHODS,
     TIMING_UNCERTAINTY,
     IdentificationSettings,
@@ -77,6 +78,10 @@ def broken(whole):
 @pytest.fixture(scope="module")
 def default(whole):
     return identify(whole, BENCH_VALVE)
+
+
+def test_the_names_that_are_offered_are_those_of_the_methods():
+    assert (*METHODS,) == METHOD_NAMES
 
 
 class TestBest:

@@ -9,7 +9,7 @@ from valve_friction_ros.identification import (
     CALIBRATION,
     DEFAULT_METHOD,
     FIXABLE,
-    METHODS,
+    METHOD_NAMES,
     TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
@@ -23,7 +23,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
     defaults = IdentificationSettings()
     parser.add_argument(
         "--method",
-        choices=[*METHODS],
+        choices=METHOD_NAMES,
         help="best: robust wherever it applies; robust: imperfections of a plant in the fit; "
         "refined: the Karnopp model alone; published: the paper's model 1; signature: model 2, two "
         f"periods or more of a slow triangle ({DEFAULT_METHOD})",

@@ -36,7 +36,11 @@ from valve_friction_ros.identification.robust.verdicts import (
     fit_misfit,
     fit_verdicts,
 )
-from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.identification.settings import (
+    REGRESSED,
+    TIMING_UNCERTAINTY,
+    IdentificationSettings,
+)
 from valve_friction_ros.identification.trust.calibration import BUDGET
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
@@ -65,7 +69,6 @@ __all__ = [
     "FRICTION_CURVE",
     "IMPERFECTIONS_FOUND",
     "METHOD",
-    "TIMING_UNCERTAINTY",
     "has_no_place_for",
     "identify_robust",
     "prior_of",
@@ -88,12 +91,6 @@ _END = 20
 _MOVED_NOISE, _MOVED_SHARE = 8.0, 5e-3
 """Time, s, kept before and after the motion; samples whose median is where the stem stands; and
 the distance at which it has left there, in deviations of its noise and as a share of its range."""
-
-TIMING_UNCERTAINTY = 0.04
-"""Timing uncertainty without a setting, s.
-
-Chosen: stamps, transmitters and tubing of a plant without special care add up to some tens of
-milliseconds; 95 % are below 0.08 s."""
 
 
 def identify_robust(
