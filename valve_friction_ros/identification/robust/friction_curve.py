@@ -65,6 +65,11 @@ noise, which may be at most this share of twice the mean speed."""
 _OF_STOPS = 3e-3
 """Share of the travel next to a stop where nothing is taken: the stop carries force there."""
 
+_SURE_MARGIN, _CLOSE = 2.0, 0.5
+"""Distance of an average from a rest or a reversal, in its own lengths: that at which it surely is
+of a sliding stem, and that at which it is taken where there is no other, for the sliding friction
+alone."""
+
 _LARGEST_LAG = 0.15
 _LAGS: _Array = np.linspace(-_LARGEST_LAG, _LARGEST_LAG, 301, dtype=np.float64)
 """Lags over which the posterior is integrated, s; beyond, the signals are not one record."""
@@ -93,11 +98,14 @@ _LEAST_MISFIT = 3e-4
 balance is trusted further."""
 
 _LEAST_SHARED = 0.01
-_LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.03, 0.05
+_LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.04, 0.06
 """Least share of the information that both halves must have in common; least half width over the
 value of any number, as no force balance of a plant is the whole truth to more than that; the same
 without a spring, where the reversals that are left out hold more of the friction; and where no
 second averaging time confirms it."""
+
+_CONFIRMED = 2
+"""Averaging times that confirm each other."""
 
 _NEARLY = 5.0
 _SCATTERS = 2.0
@@ -205,6 +213,7 @@ class _Averages(NamedTuple):
     taken: NDArray[np.intp]
     speed: float
     noise: Mapping[str, float]
+    is_sure: bool
 
     @property
     def mean_velocity(self) -> _Array:
@@ -255,7 +264,9 @@ def _averages(
     ):
         return None
     averaged = [averaged_twice(half, length) for half in force.halves(time)]
-    return _Averages(time, averaged, position, velocity, length, taken, speed, noise)
+    return _Averages(
+        time, averaged, position, velocity, length, taken, speed, noise, margin >= _SURE_MARGIN
+    )
 
 
 class _Solved(NamedTuple):
@@ -298,6 +309,8 @@ class FrictionCurve:
         Most probable time by which the stem is seen late, s.
     inflation : float
         Of the residual over what noise explains.
+    is_sure : bool
+        Whether each average is of a stem that surely slides all the time.
     fit, misfit : float
         Share of the force that the balance reproduces, and deviation of what it leaves, N.
     """
@@ -311,6 +324,7 @@ class FrictionCurve:
     stribeck_velocity: float
     lag: float
     inflation: float
+    is_sure: bool
     fit: float
     misfit: float
 
@@ -537,6 +551,7 @@ class _Regression:
             stribeck,
             self.later(solved),
             inflated,
+            self.averages.is_sure,
             1.0 - solved.misfit / float(np.std(self.averages.force[0][self.averages.taken])),
             solved.misfit,
         )
@@ -750,8 +765,8 @@ def friction_curves(
     longer = [time for time in _AVERAGING_TIMES if time >= least] or [least, 2.0 * least]
     shorter = [time for time in _SHORT_AVERAGING_TIMES if time >= least]
     curves: list[FrictionCurve] = []
-    attempts = [(2.0, longer, _MOST_CURVES), (2.0, shorter, 1)]
-    attempts.append((0.5, [*reversed(shorter), *longer], 2))
+    attempts = [(_SURE_MARGIN, longer, _MOST_CURVES), (_SURE_MARGIN, shorter, 1)]
+    attempts.append((_CLOSE, [*reversed(shorter), *longer], 2))
     for margin, times, most in attempts:
         for time in times:
             if len(curves) < most:
@@ -772,10 +787,13 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
     result: dict[str, Estimated] = {}
     has_spring = any("spring_constant" in curve.numbers for curve in curves)
     least = _LEAST_HALF_WIDTH if has_spring else _LEAST_OF_MACHINE
-    if len(curves) < 2:
+    if len(curves) < _CONFIRMED or not curves[0].is_sure:
         least = _LEAST_ALONE
-    for name in {name for curve in curves for name in curve.numbers}:
-        known = [curve.numbers[name] for curve in curves if name in curve.numbers]
+    sure = [curve for curve in curves if curve.is_sure]
+    for name in {SLIDING, *(name for curve in sure for name in curve.numbers)}:
+        known = [curve.numbers[name] for curve in sure or curves if name in curve.numbers]
+        if not known:
+            continue
         best = min(known, key=lambda one: one.half_width / max(abs(one.value), 1e-300))
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
         half_width = math.hypot(

@@ -132,12 +132,12 @@ def identify_robust(
     record = around_motion(stamped_record(recording))
     curves = friction_curves(record, valve, lag_prior_of(settings), known_of(settings))
     numbers = curve_numbers(curves)
-    if not (SLIDING in numbers and numbers[SLIDING].value > 0):
-        require_related_signals(uniform)
+    dissipates = SLIDING in numbers and numbers[SLIDING].value > 0
     try:
+        require_related_signals(uniform)
         outcome = _of_simulation(record, valve, settings, curves)
     except RefusalError as refusal:
-        if not curves:
+        if not dissipates:
             raise
         outcome = _of_force_balance(curves, settings, str(refusal))
     published, beside = published_beside(uniform, valve, settings)
