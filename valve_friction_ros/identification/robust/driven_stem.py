@@ -200,7 +200,7 @@ def _tangent(
     tangent = no_tangent(coordinates.size, room[0], room[1])
     constants, shares = _constants(at, course.travel), _shares(course, at)
     square, lagged = course.place * course.place, np.empty_like(course.force)
-    if at.force_lag > _LEAST_LAG:
+    if at.force_lag >= 0.0:
         _lag_slope(course.force, at.force_lag, course.period, lagged)
     else:
         _lead_slope(course.force, course.period, lagged)
