@@ -351,7 +351,7 @@ def _balanced_model(
             spring_constant=values["spring_constant"],
             spring_preload=values["spring_preload"],
         )
-    except ValueError:
+    except (KeyError, ValueError):
         return None
 
 
