@@ -97,12 +97,17 @@ _LEAST_MISFIT = 3e-4
 """Deviations beyond which an average is left out, and the share of the friction to which no force
 balance is trusted further."""
 
-_LEAST_SHARED = 0.01
+_CHANCE, _OVERLAP, _LEAST_SHARED = 3.0, 3.0, 1e-9
+"""Deviations of chance that the share of the information must exceed which both halves have in
+common; averages that tell as much as one that does not overlap with others; a share of nothing."""
+
+_BINS = 12
+"""Bins of the friction curve in each direction."""
+
 _LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.04, 0.06
-"""Least share of the information that both halves must have in common; least half width over the
-value of any number, as no force balance of a plant is the whole truth to more than that; the same
-without a spring, where the reversals that are left out hold more of the friction; and where no
-second averaging time confirms it."""
+"""Least half width over the value of any number, as no force balance of a plant is the whole truth
+to more than that; the same without a spring, where the reversals that are left out hold more of the
+friction; and where no second averaging time confirms it."""
 
 _CONFIRMED = 2
 """Averaging times that confirm each other."""
@@ -412,6 +417,7 @@ class _Regression:
         } | {"viscous_friction": max(float(np.sum(common) / np.sum(weight)), 0.0)}
         turns = np.count_nonzero(np.diff(side[weight > 0]))
         self.strokes = int(turns) + 1
+        self.independent = max(taken.size / _OVERLAP, 1.0)
         self.slopes = [np.gradient(half, averages.time) for half in averages.force]
 
     def falling(self, stribeck: float) -> _Array:
@@ -451,7 +457,8 @@ class _Regression:
         cross = even.T @ (odd * weight[:, None])
         own = 0.5 * (even.T @ (even * weight[:, None]) + odd.T @ (odd * weight[:, None]))
         right = 0.5 * (even.T @ (weight * forces[1]) + odd.T @ (weight * forces[0]))
-        information = _shared(own, 0.5 * (cross + cross.T)) / variance + np.diag(precision)
+        shared, right = _shared(own, 0.5 * (cross + cross.T), right, self.independent)
+        information = shared / variance + np.diag(precision)
         unit = 1.0 / np.sqrt(np.diag(information))
         covariance = np.linalg.pinv(
             information * np.outer(unit, unit), rcond=1e-13, hermitian=True
@@ -540,9 +547,10 @@ class _Regression:
                 for speed, one in near
                 if name in self.gradients(speed, one.scale.size)
             ]
-            numbers[name] = posterior.number(
-                gradient / solved.scale, float(np.std(others or [0.0]))
-            )
+            spread = math.hypot(float(np.std(others or [0.0])), self.definition(name, solved))
+            numbers[name] = posterior.number(gradient / solved.scale, spread)
+        known = sum(self.fixed.get(name, 0.0) * share for name, share in self.over_distance.items())
+        numbers[SLIDING] = replace(numbers[SLIDING], value=numbers[SLIDING].value + known)
         return FrictionCurve(
             self.averages.length * float(self.averages.time[1] - self.averages.time[0]),
             *self.bins(solved),
@@ -603,8 +611,9 @@ class _Regression:
         ]
         velocity, friction = averages.mean_velocity[taken], 0.5 * (rest[0] + rest[1])
         order = np.argsort(velocity)
-        parts = np.array_split(order[solved.weight[order] > 0], 24)
-        parts = [part for part in parts if part.size >= 2]
+        order = order[solved.weight[order] > 0]
+        ways = (order[velocity[order] < 0], order[velocity[order] > 0])
+        parts = [part for way in ways for part in np.array_split(way, _BINS) if part.size >= 2]
         return (
             np.array([float(np.mean(velocity[part])) for part in parts]),
             np.array([float(np.mean(friction[part])) for part in parts]),
@@ -616,13 +625,22 @@ def _at(signal: "_Array | float", taken: NDArray[np.intp]) -> "_Array | float":
     return signal[taken] if isinstance(signal, np.ndarray) else signal
 
 
-def _shared(own: _Array, cross: _Array) -> _Array:
-    """Return the information that both halves share, as much as is left of each direction."""
+def _shared(own: _Array, cross: _Array, right: _Array, independent: float) -> tuple[_Array, _Array]:
+    """Return the information that both halves share, and the right-hand side that goes with it.
+
+    Along each direction the halves agree in a share s of what each of them holds, which n averages
+    know to (1 − s)/√n. What chance may have made of noise says nothing: the prior is left alone.
+    """
     values, vectors = np.linalg.eigh(own)
     root = np.sqrt(np.maximum(values, 1e-13 * values[-1]))
     shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
     back = (vectors * root) @ turned
-    return np.asarray((back * np.clip(shares, _LEAST_SHARED, 1.0)) @ back.T)
+    shares = np.clip(shares, _LEAST_SHARED, 1.0)
+    chance = _CHANCE * (1.0 - shares) / math.sqrt(independent)
+    sure = np.maximum(1.0 - (chance / shares) ** 2, 0.0)
+    information = (back * np.maximum(sure * shares, _LEAST_SHARED)) @ back.T
+    said = sure * (turned.T @ ((vectors / root).T @ right))
+    return np.asarray(information), np.asarray(back @ said)
 
 
 class _Posterior:
