@@ -35,6 +35,7 @@ from valve_friction_ros.identification.settings import (
     CALIBRATION,
     FIXABLE,
     MOST_UNCERTAIN,
+    STATED,
     IdentificationSettings,
 )
 from valve_friction_ros.identification.signature.force_balance import identify_signature
@@ -69,6 +70,7 @@ __all__ = [
     "MOST_UNCERTAIN",
     "PARAMETER_UNITS",
     "SLIDING",
+    "STATED",
     "TIMING_UNCERTAINTY",
     "UNITS",
     "Bracket",
