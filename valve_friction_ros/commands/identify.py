@@ -114,7 +114,7 @@ def run(options: argparse.Namespace) -> int:
     """Identify the valves of the file, print what was found, and write the files asked for."""
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
-    settings = identification_settings(options, description.known, description.settings)
+    settings = identification_settings(options, description)
     method = METHODS[method_name(options, description.settings)]
     baseline, files = baseline_from(options), identification_files(options)
     if options.baseline_recording is not None:

@@ -37,8 +37,10 @@ from valve_friction_ros.fleet import (
 )
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.model import Valve
+from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.records.stores import place
-from valve_friction_ros.records.valve_file import read_valve_file
+from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 
 __all__ = ["REFUSALS", "run"]
 
@@ -59,7 +61,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         if output.resolve().parent != options.output[0].resolve().parent:
             raise ValueError(f"{output}: all outputs must lie in the folder of the first")
     reading_options(options)
-    identification_settings(options, dict.fromkeys(FIXABLE, 1.0))
+    identification_settings(options, ValveFile(Valve(), frozen(dict.fromkeys(FIXABLE, 1.0))))
     if options.valve is not None:
         read_valve_file(options.valve)
 

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         FIXABLE,
         METHOD_NAMES,
         MOST_UNCERTAIN,
+        STATED,
         TIMING_UNCERTAINTY,
         IdentificationSettings,
     )
@@ -86,6 +87,7 @@ __all__ = [
     "MOST_UNCERTAIN",
     "PARAMETER_UNITS",
     "SLIDING",
+    "STATED",
     "TIMING_UNCERTAINTY",
     "UNITS",
     "Bracket",

@@ -19,6 +19,7 @@ __all__ = [
     "MOST_UNCERTAIN",
     "PUBLISHED_WINDOW",
     "REGRESSED",
+    "STATED",
     "TIMING_UNCERTAINTY",
     "IdentificationSettings",
 ]
@@ -37,6 +38,9 @@ REGRESSED = (
 
 FIXABLE = (*REGRESSED, "static_friction", "limit_velocity")
 """Parameters that can be fixed at a known value instead of being identified."""
+
+STATED = ("spring_constant", "spring_preload", "mass")
+"""Parameters of a data sheet, with which what is found can be compared."""
 
 CALIBRATION: Mapping[str, str] = MappingProxyType(
     {
@@ -83,6 +87,9 @@ class IdentificationSettings:
     fixed : mapping of str to float
         Known parameters by name (see `FIXABLE`); the regression leaves them out. Fixing
         ``limit_velocity`` sets the threshold δv instead of choosing it from the sweep.
+    stated : mapping of str to float
+        Values of a data sheet by name (see `STATED`). They take no part in the identification: a
+        found value that contradicts one gives a warning with the likely cause.
     position_bias : float, optional
         Bias x̄ of (10), m. Given, the regression takes the paper's form of four columns, and the
         preload is F_0 = k·x̄; by default the preload is a regressor of its own.
@@ -126,6 +133,7 @@ class IdentificationSettings:
     area_uncertainty: float = 0.0
     drive_scale_uncertainty: float = 0.0
     position_scale_uncertainty: float = 0.0
+    stated: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -150,7 +158,8 @@ class IdentificationSettings:
                     f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got "
                     f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
                 )
-        object.__setattr__(self, "fixed", frozen(self._checked_fixed()))
+        object.__setattr__(self, "fixed", frozen(_checked(self.fixed, FIXABLE, "fixed")))
+        object.__setattr__(self, "stated", frozen(_checked(self.stated, STATED, "stated")))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)
             if "spring_preload" in self.fixed:
@@ -161,18 +170,19 @@ class IdentificationSettings:
         """Derivative window of the published method, samples."""
         return PUBLISHED_WINDOW if self.derivative_window is None else self.derivative_window
 
-    def _checked_fixed(self) -> dict[str, float]:
-        checked = {}
-        for name, value in self.fixed.items():
-            if name not in FIXABLE:
-                raise ValueError(
-                    f"{name!r} is not a parameter that can be fixed; "
-                    f"choose from {', '.join(FIXABLE)}"
-                )
-            if name in _MAY_BE_NEGATIVE:
-                checked[name] = require_finite(name, value)
-            elif name in _POSITIVE:
-                checked[name] = require_positive(name, value)
-            else:
-                checked[name] = require_non_negative(name, value)
-        return checked
+
+def _checked(values: Mapping[str, float], names: tuple[str, ...], what: str) -> dict[str, float]:
+    """Return the values of parameters as finite numbers with their signs."""
+    checked = {}
+    for name, value in values.items():
+        if name not in names:
+            raise ValueError(
+                f"{name!r} is not a parameter that can be {what}; choose from {', '.join(names)}"
+            )
+        if name in _MAY_BE_NEGATIVE:
+            checked[name] = require_finite(name, value)
+        elif name in _POSITIVE:
+            checked[name] = require_positive(name, value)
+        else:
+            checked[name] = require_non_negative(name, value)
+    return checked

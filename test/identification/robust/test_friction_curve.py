@@ -248,7 +248,9 @@ def number(value, half_width):
 
 def curve(**numbers):
     nothing = np.empty(0)
-    return FrictionCurve(0.1, nothing, nothing, nothing, numbers, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0)
+    return FrictionCurve(
+        0.1, nothing, nothing, nothing, numbers, 0.0, 0.0, 0.0, 1.0, True, 1.0, 0.0
+    )
 
 
 class TestNumbersOfSeveralAveragingTimes:
@@ -271,9 +273,9 @@ class TestNumbersOfSeveralAveragingTimes:
     def test_none_is_narrower_than_a_force_balance_can_be(self):
         """Least of all where no second averaging time confirms it, or no spring returns it."""
         assert self.of((100.0, 1e-9), (100.0, 1e-9)).half_width == pytest.approx(1.5)
-        assert self.of((100.0, 1e-9)).half_width == pytest.approx(5.0)
+        assert self.of((100.0, 1e-9)).half_width == pytest.approx(6.0)
         machine = curve_numbers([curve(friction=number(100.0, 1e-9))] * 2)["friction"]
-        assert machine.half_width == pytest.approx(3.0)
+        assert machine.half_width == pytest.approx(4.0)
 
 
 class TestCheckOfASimulation:
