@@ -828,10 +828,10 @@ def checked_by_curve(
 ) -> dict[str, Estimated]:
     """Return the numbers of a simulation, checked and sharpened by those of the force balance.
 
-    Where the simulated stem follows the record to within noise, the sliding friction comes from the
-    one that knows it better, and from the simulation where both exclude each other: reversals and
-    rests tell it a lag from a viscous friction. Where the stem does not, spring, preload and
-    sliding friction come from the force balance, with an interval that reaches the simulation.
+    Where the simulated stem follows the record to within noise, spring, preload and sliding
+    friction come from the one that knows them better, and from the simulation where both exclude
+    each other: reversals and rests tell it a lag from a viscous friction. Where the stem does not,
+    they come from the force balance, with an interval that reaches the simulation.
     """
     result = dict(simulated)
     for name in (SLIDING, "spring_constant", "spring_preload"):
@@ -843,7 +843,7 @@ def checked_by_curve(
         if inflation > NOISE_LIKE:
             wider = theirs.half_width if agree else max(theirs.half_width, apart)
             result[name] = replace(theirs, half_width=wider)
-        elif name == SLIDING and agree and theirs.half_width < ours.half_width:
+        elif agree and theirs.half_width < ours.half_width:
             result[name] = theirs
     return result
 
