@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmark.bounds import Bound
-from valve_friction_ros.identification import IdentificationSettings, Verdict, identify_refined
+from valve_friction_ros.identification import IdentificationSettings, Verdict, identify
 from valve_friction_ros.model import Drive, Recording, Valve
 
 __all__ = ["PUBLISHED", "RECORD", "emps_bounds"]
@@ -30,7 +30,7 @@ def emps_bounds() -> list[Bound] | None:
     time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
     record = Recording(float(np.median(np.diff(time))), force, position, driven_by=Drive.FORCE)
     settings = IdentificationSettings(fixed={"spring_constant": 0.0})
-    result = identify_refined(record, Valve(), settings)
+    result = identify(record, Valve(), settings)
     bounds = []
     for name, published in PUBLISHED.items():
         one = result.parameters[name]

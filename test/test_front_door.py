@@ -42,7 +42,8 @@ def test_nothing_is_loaded_before_it_is_used():
     )
     loaded = run.stdout.split()
     assert [name for name in loaded if name.startswith("valve_friction_ros")] == [
-        "valve_friction_ros"
+        "valve_friction_ros.on_demand",
+        "valve_friction_ros",
     ]
     assert "numpy" not in loaded
 

@@ -224,3 +224,16 @@ def test_public_names_exist_and_are_described(name):
 @pytest.mark.parametrize("room", CORE)
 def test_rooms_name_what_is_public(room):
     assert importlib.import_module(f"{PACKAGE}.{room}").__all__
+
+
+@pytest.mark.parametrize("path", sorted(SOURCES.rglob("__init__.py")), ids=name_of)
+def test_no_name_on_demand_is_called_like_a_module(path):
+    """Whoever imported the module first would get it in place of the name."""
+    if "names_on_demand(__name__)" in path.read_text(encoding="utf-8"):
+        inside = {each.stem for each in path.parent.iterdir()}
+        assert not inside & set(importlib.import_module(name_of(path)).__all__)
+
+
+def test_an_unknown_name_on_demand():
+    with pytest.raises(AttributeError, match=r"module '\w+\.model' has no attribute 'nothing'"):
+        importlib.import_module(f"{PACKAGE}.model").nothing  # noqa: B018

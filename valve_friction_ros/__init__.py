@@ -25,8 +25,9 @@ A valve is simulated, identified, and compared with its healthy state.
 'WARN'
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
     from valve_friction_ros.front_door import compare, read_recording
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
     from valve_friction_ros.model.simulation import simulate
     from valve_friction_ros.model.valve import Valve
     from valve_friction_ros.records.valve_file import read_valve_file
+else:
+    __getattr__ = names_on_demand(__name__)
 
 __version__ = "0.1.0"
 
@@ -63,34 +66,6 @@ __all__ = [
     "step_test",
     "validate",
 ]
-
-_HOMES = {
-    "Baseline": "health.baseline",
-    "IdentificationSettings": "identification.settings",
-    "KarnoppParameters": "model.karnopp_parameters",
-    "Recording": "model.recording",
-    "RefusalError": "identification.refusal",
-    "Result": "identification.result",
-    "SensorNoise": "model.instruments",
-    "Valve": "model.valve",
-    "compare": "front_door",
-    "identify": "identification.methods",
-    "read_recording": "front_door",
-    "read_valve_file": "records.valve_file",
-    "simulate": "model.simulation",
-    "step_test": "identification.steps.step_response",
-    "validate": "identification.steps.validation",
-}
-"""Module of each public name: a node that needs none of them loads none."""
-
-
-def __getattr__(name: str) -> Any:
-    """Load a public name on its first use."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    globals()[name] = found
-    return found
 
 
 def __dir__() -> list[str]:

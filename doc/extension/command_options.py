@@ -1,7 +1,6 @@
 """The sub-commands of `valve_friction`, as their parsers declare them."""
 
 import argparse
-import re
 from collections.abc import Iterator
 from importlib import import_module
 
@@ -17,9 +16,9 @@ def command_names() -> dict[str, str]:
 
 def parser_of(command: str) -> argparse.ArgumentParser:
     """Return the parser of a sub-command."""
-    module = import_module(f"valve_friction_ros.commands.{re.sub('[- ]', '_', command)}")
+    declared = import_module("valve_friction_ros.commands.arguments.declared")
     parser = argparse.ArgumentParser(prog=f"valve_friction {command}")
-    module.declare(parser)
+    declared.DECLARATIONS[command](parser)
     return parser
 
 

@@ -1,6 +1,6 @@
 """The command with one sub-command more, ``extra``: what a further one takes, and how all end.
 
-The sub-command is this module and one line of `SUB_COMMANDS`.
+The sub-command is this module, one line of `SUB_COMMANDS` and a declaration of its arguments.
 """
 
 import os
@@ -9,6 +9,7 @@ import sys
 import time
 
 from valve_friction_ros.commands import main
+from valve_friction_ros.commands.arguments import declared
 
 
 class RefusedError(Exception):
@@ -57,5 +58,6 @@ def run(options):
 
 if __name__ == "__main__":
     main.SUB_COMMANDS["extra"] = "one sub-command more"
+    declared.DECLARATIONS = {**declared.DECLARATIONS, "extra": declare}
     sys.modules["valve_friction_ros.commands.extra"] = sys.modules["__main__"]
     sys.exit(main.main())

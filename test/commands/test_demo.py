@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from valve_friction_ros.commands.arguments.declared import DECLARATIONS
 from valve_friction_ros.commands.demo import command as demo
 from valve_friction_ros.commands.demo import plant
 from valve_friction_ros.commands.demo.bench_client import BenchError
@@ -250,7 +251,7 @@ class TestIdentify:
 class TestOptions:
     def test_default_picture(self):
         parser = argparse.ArgumentParser()
-        demo.declare(parser)
+        DECLARATIONS["demo"](parser)
         assert parser.parse_args([]).output == Path("valve_friction_demo.png")
 
     @pytest.mark.parametrize(

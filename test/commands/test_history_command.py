@@ -11,7 +11,7 @@ import matplotlib.image
 import pytest
 from histories import DAY, OTHER, START, VALVE, refused, success
 
-from valve_friction_ros.commands import history as subcommand
+from valve_friction_ros.commands.arguments.declared import DECLARATIONS
 from valve_friction_ros.health import Baseline, FrictionLimits, Level
 from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline
 from valve_friction_ros.identification import Verdict
@@ -313,7 +313,7 @@ class TestErrors:
 def test_the_default_file():
     """That of the nodes."""
     parser = argparse.ArgumentParser()
-    subcommand.declare(parser)
+    DECLARATIONS["history"](parser)
     assert parser.parse_args([]).file.parts[-2:] == ("valve_friction_ros", "history.sqlite")
 
 

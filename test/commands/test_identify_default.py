@@ -60,9 +60,8 @@ def test_the_published_estimate_beside_it(printed, call, path, noisy, bench_opti
     [
         ["--position-bias", "1.13e-3"],
         ["--fix", f"static_friction={LOW_FRICTION.static_friction}"],
-        ["--fix", "spring_constant=0"],
     ],
-    ids=["bias", "F_s", "no spring"],
+    ids=["bias", "F_s"],
 )
 def test_what_only_refined_has(printed, path, bench_options, options):
     answer = printed(path, *bench_options, *options)
@@ -75,7 +74,6 @@ def test_what_only_refined_has(printed, path, bench_options, options):
     [
         (["--position-bias", "1.13e-3"], "a known position bias"),
         (["--fix", "static_friction=150"], "a known static friction"),
-        (["--fix", "spring_constant=0"], "a machine without a spring"),
     ],
 )
 def test_robust_by_name_refuses_it(refusal, path, bench_options, options, cause):

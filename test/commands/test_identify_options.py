@@ -75,6 +75,23 @@ class TestOptions:
             {name: 2 * value for name, value in known(once).items()}, rel=1e-6
         )
 
+    def test_what_the_valve_file_states_is_compared(self, call, printed, quick_csv, tmp_path):
+        """Twice the area of the bench valve, with the spring of its data sheet."""
+        path = tmp_path / "valve.yaml"
+        text = "diaphragm_area: 0.089\npressure_reference: 41740.0\nspring_constant: 2.05e5\n"
+        path.write_text(text)
+        answer = printed(quick_csv, "--valve", path)
+        found = answer["evidence"]["contradicted_data"]["spring_constant"]
+        assert (found["cause"], found["stated"]) == ("area scale", 2.05e5)
+        assert found["factor"] == pytest.approx(2.0, rel=1e-2)
+        assert "check diaphragm_area (doubled)" in answer["warnings"][0]
+        assert "identified" not in column(answer, "verdict").values()
+        _, out, _ = call(quick_csv, "--valve", path)
+        assert f"note: {answer['warnings'][0]}" in " ".join(out.split())
+        fixed = printed(quick_csv, "--valve", path, "--fix", "spring_constant")
+        assert fixed["settings"]["stated"] == {}
+        assert "contradicted_data" not in fixed["evidence"]
+
     @pytest.mark.parametrize("header", ["force_n", "F [N]"])
     def test_force(
         self, printed, write_csv, columns_of, quick_record, quick_csv, bench_options, header

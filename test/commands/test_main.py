@@ -15,6 +15,10 @@ from valve_friction_ros import __version__
 from valve_friction_ros.commands.main import SUB_COMMANDS, run
 
 EXTRA = Path(__file__).with_name("extra_sub_command.py")
+SLOW = {
+    *("asyncio", "jinja2", "matplotlib", "multiprocessing", "numba", "numpy", "pandas", "rclpy"),
+    *("rich", "scipy", "sqlite3", "yaml"),
+}
 PROGRAM = ["-m", "valve_friction_ros"]
 
 
@@ -54,9 +58,22 @@ class TestChoice:
         )
         loaded = ended(start("-c", code, program=[]))[2].split()
         assert "valve_friction_ros.commands.main" in loaded
-        slow = {"numpy", "numba", "scipy", "matplotlib", "rich", "rclpy", "sqlite3"}
-        assert not slow & set(loaded)
+        assert not SLOW & set(loaded)
         assert not [name for name in loaded if name.startswith("valve_friction_ros.commands.i")]
+
+    def test_help_of_a_sub_command_imports_nothing_slow(self):
+        """It is there at once, too: the declarations of all take only what is light."""
+        code = (
+            "import sys\n"
+            "from valve_friction_ros.commands.main import SUB_COMMANDS, run\n"
+            "for name in SUB_COMMANDS:\n"
+            "    try: run([*name.split(), '--help'])\n"
+            "    except SystemExit as end: assert end.code == 0\n"
+            "print('\\n'.join(sys.modules), file=sys.stderr)"
+        )
+        loaded = ended(start("-c", code, program=[]))[2].split()
+        assert "valve_friction_ros.commands.arguments.declared" in loaded
+        assert not SLOW & set(loaded)
 
     def test_version(self, command, capsys):
         with pytest.raises(SystemExit) as end:

@@ -69,7 +69,7 @@ def test_what_else_the_front_door_offers(results, copied, tmp_path):
         BENCH_VALVE,
         LOW_FRICTION,
         SensorNoise(1e-6, 10.0),
-        vf.IdentificationSettings(fixed={"mass": 1.6}),
+        vf.IdentificationSettings(fixed={"mass": 1.6}, stated={"spring_constant": 2e5}),
         vf.Baseline(150.0),
         vf.Baseline.of(results["refined"]),
         vf.read_valve_file(place),

@@ -9,7 +9,10 @@ from records import simulated
 
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
+    IMPERFECTIONS_FOUND,
+    METHOD_NAMES,
     METHODS,
+    SLIDING,
     TIMING_UNCERTAINTY,
     IdentificationSettings,
     RefusalError,
@@ -25,6 +28,7 @@ from valve_friction_ros.model import (
     HIGH_FRICTION,
     Recording,
     SensorNoise,
+    SquareWave,
     TriangleWave,
     converter_response,
     simulate,
@@ -38,7 +42,6 @@ TRUTH = {
     for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
 }
 ONLY_REFINED = {
-    "a machine without a spring": IdentificationSettings(fixed={"spring_constant": 0.0}),
     "a known position bias": IdentificationSettings(
         position_bias=HIGH_FRICTION.spring_preload / HIGH_FRICTION.spring_constant
     ),
@@ -46,6 +49,7 @@ ONLY_REFINED = {
         fixed={"static_friction": HIGH_FRICTION.static_friction}
     ),
 }
+SPRINGLESS = IdentificationSettings(fixed={"spring_constant": 0.0})
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +59,21 @@ def whole():
     pressure = converter_response(np.repeat(levels, round(3 / PERIOD)), PERIOD)
     position = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, PERIOD).position
     return SensorNoise(10e-6, 100.0).applied_to(Recording(PERIOD, pressure, position))
+
+
+@pytest.fixture(scope="module")
+def square():
+    """A square wave, whose every stroke is an exponential."""
+    time = PERIOD * np.arange(round(DURATION / PERIOD))
+    pressure = converter_response(SquareWave(period=13.0).sample(time), PERIOD)
+    position = simulate(BENCH_VALVE, HIGH_FRICTION, pressure, PERIOD).position
+    return SensorNoise(10e-6, 100.0).applied_to(Recording(PERIOD, pressure, position))
+
+
+def true_value(name, result):
+    """Return a parameter of the packing; its sliding friction at the speed of the result."""
+    sliding = TRUTH["coulomb_friction"] + TRUTH["viscous_friction"] * result.sliding_speed
+    return {**TRUTH, SLIDING: sliding}[name]
 
 
 def without(recording, begin, end, signals=("drive", "position")):
@@ -77,6 +96,10 @@ def broken(whole):
 @pytest.fixture(scope="module")
 def default(whole):
     return identify(whole, BENCH_VALVE)
+
+
+def test_the_names_that_are_offered_are_those_of_the_methods():
+    assert (*METHODS,) == METHOD_NAMES
 
 
 class TestBest:
@@ -106,6 +129,13 @@ class TestBest:
         assert str(refusal.value) == (
             f"the method robust has no place for {cause}: use the method refined"
         )
+
+    def test_a_machine_without_a_spring_stays_with_robust(self):
+        assert method_used("best", SPRINGLESS) == "robust"
+
+    def test_refined_by_name_refuses_it(self, whole):
+        with pytest.raises(RefusalError, match=r"without a spring: use the method best or robust$"):
+            identify(whole, BENCH_VALVE, SPRINGLESS, "refined")
 
     @pytest.mark.parametrize("name", ["mass", "coulomb_friction", "spring_constant"])
     def test_other_known_parameters_stay_with_robust(self, whole, name):
@@ -156,18 +186,40 @@ class TestGap:
 
 
 class TestTimingUncertainty:
-    def test_without_one_it_is_that_of_a_plant(self, whole, default):
-        settings = IdentificationSettings(timing_uncertainty=TIMING_UNCERTAINTY)
-        named = identify(whole, BENCH_VALVE, settings)
-        assert named.values == pytest.approx(default.values, abs=0, nan_ok=True)
-
-    def test_a_known_timing_narrows_the_intervals(self, whole, default):
-        bench = identify(whole, BENCH_VALVE, IdentificationSettings(timing_uncertainty=0.0))
+    @pytest.mark.parametrize("late", [-60, 30])
+    def test_without_one_a_lag_of_a_plant_is_found(self, whole, late):
+        """In milliseconds; levels tell a lag from friction, so it costs the intervals nothing."""
+        drive, stem = whole.drive, whole.position
+        pair = (drive[late:], stem[:-late]) if late > 0 else (drive[:late], stem[-late:])
+        found = identify(Recording(PERIOD, *pair), BENCH_VALVE)
         for name, true in TRUTH.items():
-            one = bench.parameters[name]
-            assert one.half_width < default.parameters[name].half_width, name
-            assert abs(one.value - true) <= one.half_width, name
-        assert {share["timing"] for share in bench.evidence["uncertainty_budget"].values()} == {0.0}
+            one = found.parameters[name]
+            assert abs(one.value - true) <= one.half_width < 0.02 * true, name
+        lag = found.evidence[IMPERFECTIONS_FOUND]["lag"]
+        assert abs(lag["value"] - late * PERIOD) <= lag["half_width"] < 2e-3
+
+    def test_without_one_no_motion_that_hides_a_lag_is_trusted(self, square):
+        """A square wave hides it in F_c and F_v: neither is narrower than by 40 ms stated."""
+        settings = IdentificationSettings(timing_uncertainty=TIMING_UNCERTAINTY)
+        stated = identify(square, BENCH_VALVE, settings).parameters
+        for name, one in identify(square, BENCH_VALVE).parameters.items():
+            if name in ("coulomb_friction", "viscous_friction"):
+                assert one.half_width >= 0.99 * stated[name].half_width, name
+
+    def test_the_better_the_timing_is_known_the_narrower_the_intervals_are(self, square):
+        """On a square wave, whose friction and spring a lag changes most."""
+        results = [
+            identify(square, BENCH_VALVE, IdentificationSettings(timing_uncertainty=timing))
+            for timing in (None, 5e-3, 0.0)
+        ]
+        for name in ("coulomb_friction", "viscous_friction", "spring_constant", SLIDING):
+            unstated, stated, known = (one.parameters[name] for one in results)
+            assert known.half_width < stated.half_width < unstated.half_width, name
+            for result in results:
+                one = result.parameters[name]
+                assert abs(one.value - true_value(name, result)) <= one.half_width, name
+        budget = results[-1].evidence["uncertainty_budget"]
+        assert {share["timing"] for share in budget.values()} == {0.0}
 
     def test_refined_does_not_know_it(self, whole):
         values = [

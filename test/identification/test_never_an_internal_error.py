@@ -4,6 +4,7 @@ Whatever else is raised would reach a user as an internal error, and so would a 
 """
 
 import io
+import math
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
@@ -284,7 +285,7 @@ def test_by_the_monitor_of_a_valve(blocks, how, method, valve, window):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for block in blocks:
-            monitor.buffer.add_arrivals(block)
+            monitor.buffer.add_arrivals(monitor.buffer.in_order(block))
         try:
             monitor.accept(identify_snapshot(*monitor.input()), 1)
         except RefusedRecordError as refused:
@@ -295,12 +296,18 @@ def test_by_the_monitor_of_a_valve(blocks, how, method, valve, window):
 
 @settings(max_examples=100)
 @given(signals=broken_signals(), method=st.sampled_from(tuple(METHODS)), since_1970=st.booleans())
+@example(signals=(1e300, np.zeros(3), np.zeros(3)), method="best", since_1970=False)
+@example(signals=(math.inf, np.zeros(3), np.zeros(3)), method="best", since_1970=False)
 def test_by_the_command(tmp_path_factory, signals, method, since_1970):
     """A table is identified, or refused on one line; its exit code says which."""
     period, drive, position = signals
     folder = tmp_path_factory.mktemp("broken")
     table, valve = folder / "record.csv", folder / "valve.yaml"
-    columns = (1.7e9 * since_1970 + period * np.arange(drive.size), drive, position)
+    columns = (
+        1.7e9 * since_1970 + np.append(0.0, np.full(drive.size - 1, period).cumsum()),
+        drive,
+        position,
+    )
     rows = zip(*(column.tolist() for column in columns), strict=True)
     lines = ["time_s,pressure_pa,position_m", *(",".join(map(repr, row)) for row in rows)]
     table.write_text("\n".join(lines) + "\n")

@@ -18,6 +18,7 @@ from valve_friction_ros.model.linear_motion import (
     first_turn,
     impulse_response,
     motion_after,
+    self_convolution,
 )
 
 EPS = np.finfo(float).eps
@@ -258,3 +259,60 @@ def test_first_turn_from_no_acceleration(start, jerk):
     assert first_turn(start, jerk, 3.0, 1.0) == math.inf
     half_swing = math.pi / math.sqrt(100.0 - 0.25)
     assert first_turn(start, jerk, 1.0, 100.0) == pytest.approx(half_swing, rel=8 * EPS, abs=0)
+
+
+def convolution_series(c, s):
+    """h ∗ h at time 1 by its Taylor series, which that of h drives."""
+    reach = c + math.sqrt(s)
+    with localcontext() as context:
+        context.prec = int(60 + reach)
+        damping, stiffness = Decimal(c), Decimal(s)
+        response, found = [Decimal(0), Decimal(1)], [Decimal(0), Decimal(0)]
+        for order in range(2, int(60 + 4 * reach)):
+            products = order * (order - 1)
+            falls = (order - 1) * damping
+            found.append((response[-2] - falls * found[-1] - stiffness * found[-2]) / products)
+            response.append(-(falls * response[-1] + stiffness * response[-2]) / products)
+        return np.array(
+            [
+                float(sum(order * term for order, term in enumerate(found))),
+                float(sum(found)),
+                float(sum(term / (order + 1) for order, term in enumerate(found))),
+                float(sum(t / ((n + 1) * (n + 2)) for n, t in enumerate(found))),
+            ]
+        )
+
+
+@settings(deadline=None)
+@given(dimensionless(largest=2.0), st.floats(1e-3, 10.0))
+@example((25.6, 0.117), 1.0)
+@example((0.5, 0.0625), 1.0)
+@example((0.499999999, 0.2499999), 1.0)
+@example((40.0, 0.0), 1e-3)
+def test_self_convolution_against_power_series(pair, time):
+    c, s = pair
+    damping, stiffness = c / time, s / time**2
+    found = self_convolution(damping, stiffness, time, impulse_response(damping, stiffness, time))
+    scaled = np.array(found) / time ** np.array([2, 3, 4, 5])
+    expected = convolution_series(c, s)
+    # An oscillation is small beside what it has come from; its integrals settle at 1/s and 1/s².
+    settled = 1 / max(1.0, c, s) ** 2
+    assert scaled == pytest.approx(expected, rel=1e-9, abs=1e-12 * settled)
+
+
+@given(dimensionless(largest=1.5))
+def test_what_a_response_loses_by_damping_and_stiffness(pair):
+    """The derivatives that are promised, by differences of the response itself."""
+    c, s = 0.05 + pair[0], 0.05 + pair[1]
+    found = impulse_response(c, s, 1.0)
+    lost = self_convolution(c, s, 1.0, found)
+    bend = found.value - c * lost.slope - s * lost.value
+    by_stiffness = np.array([lost.slope, lost.value, lost.integral, lost.second_integral])
+    by_damping = np.array([bend, lost.slope, lost.value, lost.integral])
+    scale = np.abs(np.array(found)).max()
+    for slope, (dc, ds) in ((by_damping, (1e-5 * c, 0.0)), (by_stiffness, (0.0, 1e-5 * s))):
+        high = np.array(impulse_response(c + dc, s + ds, 1.0))
+        low = np.array(impulse_response(c - dc, s - ds, 1.0))
+        assert (low - high) / (2 * (dc + ds)) == pytest.approx(
+            slope, rel=1e-4, abs=1e-9 * scale / (dc + ds) * 1e-3
+        )

@@ -53,6 +53,14 @@ class TestGoodFiles:
         found = read_valve_file(write("diaphragm_area: 1.0\nstatic_friction: 5.0\n"))
         assert dict(found.known) == {"static_friction": 5.0}
 
+    def test_what_is_stated_is_neither_fixed_nor_assumed(self, write):
+        text = "diaphragm_area: 1.0\nspring_constant: 2e5\nspring_preload: -9.0\nmass: 2.0\n"
+        stated = {"spring_constant": 2e5, "spring_preload": -9.0, "mass": 2.0}
+        assert read_valve_file(write(text + "coulomb_friction: 5.0\n")).stated == stated
+        assert read_valve_file(write(text + "assumed_mass: 1.0\n")).stated == stated
+        text = "diaphragm_area: 1.0\nfixed.spring_constant: 2e5\nassumed_mass: 2.0\n"
+        assert read_valve_file(write(text)).stated == {}
+
     def test_the_known_values_are_read_only(self, bench_yaml):
         with pytest.raises(TypeError):
             read_valve_file(bench_yaml).known["mass"] = 2.0

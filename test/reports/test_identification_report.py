@@ -263,6 +263,25 @@ def test_notes_of_the_record_come_before_those_of_the_estimate(identified):
     assert notes[:2] == ["cut off.", "clocks differ."]
 
 
+def test_stated_values_that_the_record_contradicts(identified):
+    """The preload of the paper's form is k·x̄; the spring is another one than stated."""
+    found = identified.result.values["spring_constant"]
+    settings = dataclasses.replace(
+        identified.result.settings, stated={"spring_constant": round(found / 3)}
+    )
+    result = dataclasses.replace(identified.result, settings=settings)
+    record = dataclasses.replace(identified, result=result)
+    note, *_ = [block.text for block in section(identification_report(record), "Notes").blocks]
+    assert note.startswith(f"spring_constant is {found:.6g} N/m by the record and ")
+    told = rows(record, "Settings and versions")
+    assert told["stated values, compared with those found"] == (
+        f"spring_constant = {round(found / 3):g}",
+    )
+    assert "stated values, compared with those found" not in rows(
+        identified, "Settings and versions"
+    )
+
+
 def test_the_region_holds_the_choice_and_ends_where_sigma_leaves_its_tenth(identified):
     sweep = dataclasses.replace(
         identified.result.estimate.sweep,

@@ -1,15 +1,17 @@
 """Appendix A: derivatives by local polynomials."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
-from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.signal import savgol_coeffs
 
 from valve_friction_ros.signals import differentiate
+from valve_friction_ros.signals.derivatives import savgol_weights
 from valve_friction_ros.signals.noise import position_noise, velocity_noise
 
 EPS = np.finfo(float).eps
@@ -47,18 +49,39 @@ def test_not_exact_beyond_the_order():
     )
 
 
+def exact_weights(window, order, degree):
+    """The weights by the normal equations in fractions, rounded at the end alone."""
+    places = range(-(window // 2), window // 2 + 1)
+    rows = [
+        [Fraction(sum(place ** (row + column) for place in places)) for column in range(order + 1)]
+        + [Fraction(math.factorial(degree) * (row == degree))]
+        for row in range(order + 1)
+    ]
+    for column in range(order + 1):
+        pivot = next(row for row in range(column, order + 1) if rows[row][column])
+        rows[column], rows[pivot] = rows[pivot], rows[column]
+        rows[column] = [value / rows[column][column] for value in rows[column]]
+        for row in set(range(order + 1)) - {column}:
+            factor = rows[row][column]
+            rows[row] = [
+                one - factor * other for one, other in zip(rows[row], rows[column], strict=True)
+            ]
+    weights = [sum(row[-1] * place**power for power, row in enumerate(rows)) for place in places]
+    return np.array([float(weight) for weight in weights])[::-1]
+
+
 @pytest.mark.parametrize(("window", "order"), SETTINGS)
-def test_equals_scipy_where_the_window_is_full(window, order):
+def test_the_window_is_full_everywhere(window, order):
     position = np.cumsum(np.random.default_rng(0).standard_normal(400))
     period = 0.05
     found = differentiate(position, period, window, order)
-    margin = window // 2
-    assert found.margin == margin
+    assert found.margin == window // 2
     for degree, values in ((1, found.velocity), (2, found.acceleration)):
-        expected = savgol_filter(position, window, order, deriv=degree, delta=period)
+        weights = exact_weights(window, order, degree) / period**degree
+        expected = np.convolve(position, weights, "valid")
         assert values.shape == (400 - window + 1,)
         np.testing.assert_allclose(
-            values, expected[margin:-margin], rtol=0, atol=100 * EPS * np.abs(expected).max()
+            values, expected, rtol=0, atol=100 * EPS * np.abs(expected).max()
         )
 
 
@@ -108,3 +131,22 @@ class TestNoise:
         found = differentiate(noise, 1e-3, window, order).velocity.std()
         # The velocities are correlated over a window: n/d of them count, five standard errors.
         assert found == pytest.approx(expected, rel=5 / math.sqrt(2 * self.SIZE / window))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize(("window", "order"), [(5, 3), (31, 3), (51, 4), (401, 3)])
+def test_weights_are_exact(window, order, degree):
+    """Those of scipy differ from the exact ones by up to 1.5e-10, as its powers are not scaled."""
+    expected = exact_weights(window, order, degree) / 0.01**degree
+    found = savgol_weights(window, order, degree, 0.01)
+    assert found == pytest.approx(expected, abs=100 * EPS * np.abs(expected).max())
+    scipys = savgol_coeffs(window, order, deriv=degree, delta=0.01)
+    assert found == pytest.approx(scipys, abs=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_weights_differentiate_a_polynomial_exactly(degree):
+    curve = Polynomial([0.3, -1.2, 0.7, 2.0])
+    times = 0.01 * np.arange(-15, 16)
+    found = savgol_weights(31, 3, degree, 0.01)[::-1] @ curve(times)
+    assert found == pytest.approx(curve.deriv(degree)(0.0) if degree else 0.3, rel=1e-10)

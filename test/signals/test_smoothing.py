@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.signal import find_peaks, oaconvolve, savgol_coeffs, savgol_filter
 
+from valve_friction_ros.signals import smoothing
 from valve_friction_ros.signals.smoothing import (
     find_corners,
     independent_halves,
@@ -172,3 +173,26 @@ class TestWindow:
         bent = 2.0 * np.maximum(place - 2000, 0.0) + white(4000)
         with_corner = longest_faithful_window(bent, np.array([2000]), 1.0, 900)
         assert longest_faithful_window(bent, NO_CORNERS, 1.0, 900) < with_corner / 2
+
+
+class TestWithoutScipy:
+    """What takes the place of scipy.signal, beside it."""
+
+    @given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.floats(0.0, 8.0))
+    def test_peaks(self, seed, distance, least):
+        rng = np.random.default_rng(seed)
+        levels = rng.permutation(rng.integers(5, 60)) / 5.0  # no two alike: no ties in the order
+        signal = np.repeat(levels, rng.integers(1, 4, levels.size))
+        expected, _ = find_peaks(signal, height=least, distance=distance)
+        found = smoothing._peaks(signal, least, distance)
+        assert found.tolist() == expected.tolist()
+
+    @pytest.mark.parametrize("size", [100, 1024, 1025, 5000])
+    @pytest.mark.parametrize("window", [5, 99, 801, 1001])
+    def test_convolution(self, size, window):
+        if window > size:
+            pytest.skip("there is no full overlap")
+        rng = np.random.default_rng(size + window)
+        signal, weights = rng.normal(size=size), rng.normal(size=window) / window
+        expected = oaconvolve(signal, weights, mode="valid")
+        assert smoothing._convolved(signal, weights) == pytest.approx(expected, abs=1e-13)

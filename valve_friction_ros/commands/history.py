@@ -3,16 +3,10 @@
 import argparse
 import json
 import time
-from datetime import datetime, timedelta, timezone
-from pathlib import Path
 
-from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
-from valve_friction_ros.commands.arguments.history_place import (
-    PLACE,
-    history_place,
-    usual_history,
-)
-from valve_friction_ros.commands.arguments.kept_valves import add_valve_argument, chosen_valves
+from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
+from valve_friction_ros.commands.arguments.fail_on import has_failed
+from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
 from valve_friction_ros.commands.output.usage_output import (
@@ -21,7 +15,6 @@ from valve_friction_ros.commands.output.usage_output import (
     write_usage,
 )
 from valve_friction_ros.history import (
-    URL_VARIABLE,
     History,
     HistoryError,
     KeptValve,
@@ -29,77 +22,12 @@ from valve_friction_ros.history import (
     read_usage,
     valve_histories,
 )
-from valve_friction_ros.records.data_folder import history_file
 from valve_friction_ros.streams import DAY, nanoseconds
 from valve_friction_ros.usage import ValveUsage
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (HistoryError,)
-_FIRST = datetime(1970, 1, 1, tzinfo=timezone.utc)
-_LAST = datetime(2262, 1, 1, tzinfo=timezone.utc)
-"""Whose nanoseconds still are a signed 64-bit number."""
-
-
-def _time(text: str) -> datetime:
-    """Read a date, or a date and a time, in UTC unless it says otherwise."""
-    try:
-        time = datetime.fromisoformat(text.replace("Z", "+00:00"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no time: write it as 2026-11-21 or 2026-11-21T18:30"
-        ) from None
-    time = time if time.tzinfo else time.replace(tzinfo=timezone.utc)
-    if not _FIRST <= time <= _LAST:
-        raise argparse.ArgumentTypeError(f"{text!r} is not between 1970 and 2262")
-    return time
-
-
-def _until(text: str) -> datetime:
-    """Read the end of a stretch; a date stands for the whole day."""
-    is_date = "T" not in text and " " not in text
-    return min(_time(text) + timedelta(days=is_date), _LAST)
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "List what the identifiers have kept: identifications, refusals, baselines, trend, "
-        "usage, answers to its command and recorded alarms."
-    )
-    parser.epilog = (
-        "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
-        "picture could not be written; 3: the latest diagnosis of a valve reached --fail-on."
-    )
-    parser.add_argument(
-        "file",
-        type=history_place,
-        nargs="?",
-        default=usual_history(),
-        metavar=PLACE,
-        help="the identifiers' history_file, or the server of their history_url "
-        f"(that of {URL_VARIABLE}, else {history_file()})",
-    )
-    add_valve_argument(parser)
-    parser.add_argument(
-        "--since", type=_time, default=_FIRST, metavar="TIME", help="only from this time on"
-    )
-    parser.add_argument(
-        "--until",
-        type=_until,
-        default=_LAST,
-        metavar="TIME",
-        help="only before this time; a date stands for its whole day",
-    )
-    parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
-    parser.add_argument(
-        "--usage",
-        action="store_true",
-        help="in place of the identifications: distance, reversals, breakaways and times, by days",
-    )
-    add_fail_on(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def _require_files(options: argparse.Namespace) -> None:
@@ -138,7 +66,7 @@ def _print_usages(options: argparse.Namespace) -> int:
             ]
             print(json.dumps({"valves": valves}, ensure_ascii=False, allow_nan=False))
         else:
-            print_usage(usages, (options.since, options.until) != (_FIRST, _LAST))
+            print_usage(usages, (options.since, options.until) != (EARLIEST, LATEST))
     finally:
         if options.csv is not None:
             write_usage(options.csv, usages)
@@ -146,7 +74,7 @@ def _print_usages(options: argparse.Namespace) -> int:
 
 
 def _span(options: argparse.Namespace) -> tuple[int, int]:
-    since, until = options.since - _FIRST, options.until - _FIRST
+    since, until = options.since - EARLIEST, options.until - EARLIEST
     return nanoseconds(since.total_seconds()), nanoseconds(until.total_seconds())
 
 

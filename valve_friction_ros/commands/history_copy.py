@@ -3,36 +3,13 @@
 import argparse
 import json
 
-from valve_friction_ros.commands.arguments.history_place import PLACE, history_place
-from valve_friction_ros.commands.arguments.kept_valves import add_valve_argument, chosen_valves
+from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.history import CopiedPart, History, HistoryError, copied
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (HistoryError,)
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "Copy a history: from a file to a PostgreSQL server, back, or between two of a kind. Only "
-        "what the other one lacks, or has otherwise, is written, so a copy that was interrupted is "
-        "called again. Then all rows are compared, by count and checksum."
-    )
-    parser.epilog = (
-        "The address of a server is postgresql://user@host/database; its password belongs into "
-        "~/.pgpass or PGPASSWORD. Exit code 1: rows differ, as the other one has kept them "
-        "otherwise; 2: one of the two cannot be read or written."
-    )
-    parser.add_argument(
-        "source", type=history_place, metavar="FROM", help=f"the history that is copied, {PLACE}"
-    )
-    parser.add_argument(
-        "target", type=history_place, metavar="TO", help="where to; it is made if it is missing"
-    )
-    add_valve_argument(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def _print_table(parts: tuple[CopiedPart, ...]) -> None:

@@ -6,21 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
+from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
-    add_identification_arguments,
     identification_settings,
     method_name,
 )
 from valve_friction_ros.commands.arguments.recording import (
-    add_recording_arguments,
     described,
     read_one,
     require_one,
 )
 from valve_friction_ros.commands.output.errors import ExitCode, complain
 from valve_friction_ros.commands.output.identification_files import (
-    add_file_arguments,
     baseline_from,
     identification_files,
 )
@@ -39,7 +36,7 @@ from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.stretch import Stretch
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (RefusalError,)
 
@@ -57,22 +54,6 @@ class _Answer(NamedTuple):
         """Levels of all that is known of the valve's health."""
         own = () if self.diagnosis is None else (self.diagnosis.level,)
         return (*own, *(one.level for one in self.findings))
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
-    parser.epilog = (
-        "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
-        "were refused, or a file could not be written; 1: some valves were refused; 3: a diagnosis "
-        "reached --fail-on. Without a baseline no friction is compared: a line on stderr "
-        "says so, and the exit code stays 0 unless signals or model are in doubt."
-    )
-    add_recording_arguments(parser)
-    add_identification_arguments(parser)
-    add_file_arguments(parser)
-    add_fail_on(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def _identified(
@@ -133,7 +114,7 @@ def run(options: argparse.Namespace) -> int:
     """Identify the valves of the file, print what was found, and write the files asked for."""
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
-    settings = identification_settings(options, description.known, description.settings)
+    settings = identification_settings(options, description)
     method = METHODS[method_name(options, description.settings)]
     baseline, files = baseline_from(options), identification_files(options)
     if options.baseline_recording is not None:

@@ -3,20 +3,17 @@
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from valve_friction_ros.commands.arguments.fail_on import add_fail_on, has_failed
+from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
-    add_identification_arguments,
     identification_settings,
 )
-from valve_friction_ros.commands.arguments.recording import add_reading_arguments, reading_options
+from valve_friction_ros.commands.arguments.recording import reading_options
 from valve_friction_ros.commands.folder.plan import Plan, forget_stale, make_plan
 from valve_friction_ros.commands.folder.sharing import (
     ShareOut,
-    add_sharing_arguments,
     finished,
     workers,
 )
@@ -40,74 +37,15 @@ from valve_friction_ros.fleet import (
 )
 from valve_friction_ros.health import Level
 from valve_friction_ros.identification import FIXABLE
+from valve_friction_ros.model import Valve
+from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.records.stores import place
-from valve_friction_ros.records.valve_file import read_valve_file
+from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = ()
 _SHOWN_SKIPPED = 10
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "Identify all recordings in a folder and in the folders below it, on all cores or on the "
-        "workers of a Dask cluster. The "
-        "results are a table with a row for each valve, and a page that ranks the valves. After an "
-        "interruption the same command goes on."
-    )
-    parser.epilog = (
-        "Exit code 0: all were identified; 1: some were refused; 2: all recordings or an option "
-        "were refused; 3: a diagnosis reached --fail-on; 130, 143: interrupted."
-    )
-    parser.add_argument(
-        "folder",
-        metavar="DIR",
-        help="where the recordings are: a folder, or s3://bucket/folder and other stores by "
-        "fsspec's names (the extra `stores`)",
-    )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        action="append",
-        required=True,
-        metavar="FILE",
-        help="FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page for people, valves ranked), "
-        "written at the end and when interrupted; may be repeated; until then the rows, in the "
-        "order in which they finished, are in FILE.sqlite",
-    )
-    parser.add_argument(
-        "--no-reports",
-        action="store_true",
-        help="with FILE.html: no page for each valve in the folder FILE_reports, which takes a "
-        "second and half a megabyte each",
-    )
-    parser.add_argument(
-        "--baselines",
-        type=Path,
-        metavar="FILE.csv",
-        help="friction of the healthy valves: an earlier output of this command for a folder with "
-        "the same names, or a table with the columns recording (empty: any), valve and "
-        "coulomb_friction_n; the diagnosis compares with it",
-    )
-    add_fail_on(parser)
-    parser.add_argument(
-        "--valve",
-        type=Path,
-        metavar="FILE.yaml",
-        help="valve of the recordings that have neither NAME.valve.yaml beside them nor valve.yaml "
-        "in their bag or beside them",
-    )
-    add_sharing_arguments(parser)
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="identify again what was refused before"
-    )
-    parser.add_argument(
-        "--redo", action="store_true", help="replace rows that were made with other options"
-    )
-    add_identification_arguments(parser)
-    add_reading_arguments(parser)
 
 
 def _require_sense(options: argparse.Namespace) -> None:
@@ -123,7 +61,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         if output.resolve().parent != options.output[0].resolve().parent:
             raise ValueError(f"{output}: all outputs must lie in the folder of the first")
     reading_options(options)
-    identification_settings(options, dict.fromkeys(FIXABLE, 1.0))
+    identification_settings(options, ValveFile(Valve(), frozen(dict.fromkeys(FIXABLE, 1.0))))
     if options.valve is not None:
         read_valve_file(options.valve)
 

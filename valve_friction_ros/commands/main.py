@@ -42,13 +42,10 @@ SUB_COMMANDS = {
 
 
 class SubCommand(Protocol):
-    """The module of a sub-command; it is imported only when it was chosen."""
+    """The module of a sub-command; it is imported only when its arguments have been read."""
 
     REFUSALS: tuple[type[Exception], ...]
     """Errors of the user's request that `run` raises beside ValueError and OSError."""
-
-    def declare(self, parser: argparse.ArgumentParser) -> None:
-        """Declare the arguments, and what the help says around them."""
 
     def run(self, options: argparse.Namespace) -> int:
         """Run the sub-command that `arguments` name; return the exit code.
@@ -88,10 +85,12 @@ def _chosen(arguments: Sequence[str]) -> tuple[str, list[str]]:
 
 def _run(name: str, arguments: Sequence[str]) -> int:
     """Run a sub-command; errors of the user's request are reported."""
-    module = _imported(name)
+    from valve_friction_ros.commands.arguments.declared import DECLARATIONS  # noqa: PLC0415
+
     parser = OneLineParser(prog=f"{PROGRAM} {name}")
-    module.declare(parser)
+    DECLARATIONS[name](parser)
     options = parser.parse_args(arguments, argparse.Namespace(command=name))
+    module = _imported(name)
     refusals: tuple[type[Exception], ...] = (ValueError, *module.REFUSALS)
     try:
         with interrupt_raises():

@@ -8,7 +8,6 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from valve_friction_ros.commands.arguments.planning import (
-    add_planning_arguments,
     frictions_from,
     planned_conditions,
     planned_limits,
@@ -22,41 +21,9 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.planning import StrokePlan, plan_test
 from valve_friction_ros.records.valve_file import read_valve_file
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (RefusalError, HistoryError)
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "Plan the stroke test with the smallest predicted intervals, by the Fisher information of "
-        "simulated tests, and write it as a file that `pressure_source` plays. No valve is moved."
-    )
-    parser.epilog = (
-        "All values are in SI units unless an option says otherwise. Exit code 2: a file or an "
-        "option was refused, no test within the limits tells the friction, or a file could not be "
-        "written."
-    )
-    parser.add_argument(
-        "--valve", type=Path, required=True, metavar="VALVE.yaml", help="the valve file"
-    )
-    parser.add_argument(
-        "--valve-name", metavar="NAME", help="one of several valves, of the valve file or --history"
-    )
-    add_planning_arguments(parser)
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("stroke_test.csv"),
-        metavar="FILE.csv",
-        help="corners of the pressure: time_s and pressure_pa (%(default)s)",
-    )
-    parser.add_argument("--replace", action="store_true", help="replace a file that is there")
-    parser.add_argument(
-        "--figure", type=Path, metavar="FILE.png", help="draw pressure and expected stem"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def _require_files(options: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from valve_friction_ros.commands.arguments.declared import PAGE
 from valve_friction_ros.commands.output.errors import ExitCode
 from valve_friction_ros.commands.output.formatting import OutputConsole
 from valve_friction_ros.identification import RefusalError
@@ -21,53 +22,13 @@ from valve_friction_ros.reproduction.figures.figures import draw_figures
 from valve_friction_ros.reproduction.programme import progress_steps, run_programme
 from valve_friction_ros.reproduction.report import report_page
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (RefusalError,)
-_PAGE = "reproduction.html"
 _PLAN = Plan()
 _SEEDS = 5
 _DRAWINGS = 2
 """Steps after the programme: the figures, and the page."""
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "Run the paper's experiments, identification and validation on the simulated bench, and "
-        f"write {_PAGE} and every figure, beside the paper's numbers. The last line counts the "
-        "matches, and names what does not match."
-    )
-    parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("reproduction"),
-        metavar="FOLDER",
-        help="where the report goes (%(default)s)",
-    )
-    parser.add_argument(
-        "--config",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of bench_low.yaml, bench_high.yaml and bench_graphite.yaml; by default the "
-        "package's own",
-    )
-    parser.add_argument(
-        "--position-noise-um",
-        type=float,
-        metavar="UM",
-        help="standard deviation of the stem sensor, µm, instead of the configured one",
-    )
-    parser.add_argument(
-        "--pressure-noise-pa",
-        type=float,
-        metavar="PA",
-        help="standard deviation of the pressure sensor, Pa, instead of the configured one",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="seed of the noise (%(default)s)"
-    )
 
 
 def _noise(bench: Bench, options: argparse.Namespace) -> SensorNoise:
@@ -104,7 +65,7 @@ def _reproduce(benches: dict[str, Bench], output: Path, progress: Callable[[str]
     for name, picture in pictures.items():
         write_whole(output / f"{name}.png", picture.png)
     progress("report")
-    write_report(report_page(programme, checks, pictures), output / _PAGE)
+    write_report(report_page(programme, checks, pictures), output / PAGE)
     return summary(checks)
 
 
@@ -128,6 +89,6 @@ def run(options: argparse.Namespace) -> int:
             lambda what: bar.update(task, description=what, advance=1),
         )
         bar.update(task, description="done", advance=1)
-    print(f"{options.output / _PAGE} is written.")
+    print(f"{options.output / PAGE} is written.")
     print(matched)
     return ExitCode.DONE

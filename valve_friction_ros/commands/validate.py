@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from valve_friction_ros.commands.arguments.estimate_file import read_estimate
 from valve_friction_ros.commands.arguments.recording import (
-    add_recording_arguments,
     described,
     read_one,
 )
@@ -26,7 +25,7 @@ from valve_friction_ros.identification.trust.misfit import LEAST_FIT
 from valve_friction_ros.model import Valve
 from valve_friction_ros.outside_text import printable
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (RefusalError,)
 
@@ -38,46 +37,6 @@ class _Result(NamedTuple):
     model: IdentifiedModel
     valve: Valve
     notes: tuple[str, ...]
-
-
-def _percent(text: str) -> float:
-    """Read a percentage of at most 100; return the share."""
-    try:
-        share = float(text.rstrip(" %")) / 100
-    except ValueError:
-        share = math.nan
-    if not share <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no percentage, such as 90")
-    return share
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "Simulate a recording with an identified model, and compare the stems. Validate on another "
-        "recording than the one that was identified."
-    )
-    parser.epilog = (
-        "All values are in SI units. Exit code 2: a file or the record was refused, or the picture "
-        "could not be written; 3: the fit is below --fail-below."
-    )
-    add_recording_arguments(parser)
-    parser.add_argument(
-        "--estimate",
-        type=Path,
-        required=True,
-        metavar="ESTIMATE.json",
-        help="the model, as `valve_friction identify --json` prints it",
-    )
-    parser.add_argument(
-        "--fail-below",
-        type=_percent,
-        metavar="PERCENT",
-        help="exit code 3 if the fit is below this; below "
-        f"{100 * LEAST_FIT:g} it is called poor in any case",
-    )
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both stems")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def _validated(options: argparse.Namespace) -> _Result:

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.blocks import blocks_of
@@ -21,6 +20,7 @@ from valve_friction_ros.evidence.design import (
     with_onsets,
 )
 from valve_friction_ros.evidence.moves import Moves
+from valve_friction_ros.identification.trust.student import student_quantile
 
 __all__ = ["FEWEST_BLOCKS", "FEWEST_MOVES", "MOST_BLOCKS", "Balance", "balance_of"]
 
@@ -148,7 +148,7 @@ def balance_of(
     if spring_constant is None:
         spread = math.sqrt(float(np.average((moves.place - place) ** 2, weights=moves.distance)))
         systematic[SPRING, SPRING] += (_BENT * scale / max(spread, 1e-12)) ** 2
-    quantile = float(scipy.special.stdtrit(max(count - 2, 2), 0.975))
+    quantile = student_quantile(0.975, max(count - 2, 2))
     onsets = int(np.isfinite(moves.onset_force).sum())
     return Balance(values, scatter, systematic, quantile, speed, place, onsets, timing, lag)
 

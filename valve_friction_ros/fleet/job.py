@@ -39,7 +39,7 @@ class Options:
         settings = [
             (field.name, getattr(self.settings, field.name))
             for field in fields(self.settings)
-            if field.name != "fixed"
+            if field.name not in ("fixed", "stated")
         ]
         everything = (
             __version__,
@@ -48,6 +48,7 @@ class Options:
             self.method,
             settings,
             sorted(self.settings.fixed.items()),
+            sorted(self.settings.stated.items()),
             sorted(self.baselines.items(), key=lambda one: one[0]),
         )
         return hashlib.blake2b(repr(everything).encode(), digest_size=8).hexdigest()

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.history.student import student_quantile
+from valve_friction_ros.identification.trust.student import student_quantile
 
 __all__ = ["LEAST_ESTIMATES", "ScatteredLine", "fit_line"]
 

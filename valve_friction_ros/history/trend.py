@@ -14,7 +14,7 @@ from valve_friction_ros.health.comparison import friction_words
 from valve_friction_ros.health.diagnosis import FrictionLimits
 from valve_friction_ros.history.entry import FrictionPoint, trended
 from valve_friction_ros.history.scattered_line import LEAST_ESTIMATES, ScatteredLine, fit_line
-from valve_friction_ros.history.student import student_quantile
+from valve_friction_ros.identification.trust.student import student_quantile
 from valve_friction_ros.model.checks import require_non_negative
 
 __all__ = ["MONTH", "Crossing", "Limit", "Trend", "trend_of"]

@@ -1,62 +1,78 @@
 """Identification of the Karnopp model from recordings; no ROS."""
 
-from valve_friction_ros.identification.drawing import Curve, Drawing, Exhibit, Panel
-from valve_friction_ros.identification.identified_model import IdentifiedModel, identified_model
-from valve_friction_ros.identification.methods import (
-    DEFAULT_METHOD,
-    FORMER_METHODS,
-    METHODS,
-    Method,
-    identify,
-    method_named,
-    method_used,
-)
-from valve_friction_ros.identification.published.estimate import Estimate
-from valve_friction_ros.identification.published.identify import published_estimate
-from valve_friction_ros.identification.published.method import identify_published
-from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
-from valve_friction_ros.identification.published.sweep_drawing import sweep_panels
-from valve_friction_ros.identification.refined.method import identify_refined
-from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.identification.rendering import (
-    parameter_cells,
-    parameter_columns,
-    parameter_mapping,
-    plain,
-)
-from valve_friction_ros.identification.result import Result, StemComparison
-from valve_friction_ros.identification.robust.expectation import expected_half_widths
-from valve_friction_ros.identification.robust.method import (
-    IMPERFECTIONS_FOUND,
-    TIMING_UNCERTAINTY,
-    identify_robust,
-)
-from valve_friction_ros.identification.settings import (
-    CALIBRATION,
-    FIXABLE,
-    MOST_UNCERTAIN,
-    IdentificationSettings,
-)
-from valve_friction_ros.identification.signature.force_balance import identify_signature
-from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
-from valve_friction_ros.identification.signature.valve_signature import (
-    ValveSignature,
-    valve_signature,
-)
-from valve_friction_ros.identification.steps.step_detection import find_steps
-from valve_friction_ros.identification.steps.step_response import (
-    Bracket,
-    StepMetrics,
-    StepTest,
-    step_test,
-)
-from valve_friction_ros.identification.steps.validation import Validation, validate
-from valve_friction_ros.identification.trust.misfit import Misfit
-from valve_friction_ros.identification.trust.plausible_units import require_valve_units
-from valve_friction_ros.identification.trust.rounding import percentage, two_digits
-from valve_friction_ros.identification.trust.sliding import SLIDING
-from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
-from valve_friction_ros.identification.units import CLOCK_OFFSET, PARAMETER_UNITS, UNITS
+from typing import TYPE_CHECKING
+
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.identification.drawing import Curve, Drawing, Exhibit, Panel
+    from valve_friction_ros.identification.methods import (
+        FORMER_METHODS,
+        METHODS,
+        Method,
+        identify,
+        method_named,
+        method_used,
+    )
+    from valve_friction_ros.identification.model_to_simulate import (
+        IdentifiedModel,
+        identified_model,
+    )
+    from valve_friction_ros.identification.published.estimate import Estimate
+    from valve_friction_ros.identification.published.identify import published_estimate
+    from valve_friction_ros.identification.published.method import identify_published
+    from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
+    from valve_friction_ros.identification.published.sweep_drawing import sweep_panels
+    from valve_friction_ros.identification.refined.method import identify_refined
+    from valve_friction_ros.identification.refusal import RefusalError
+    from valve_friction_ros.identification.rendering import (
+        parameter_cells,
+        parameter_columns,
+        parameter_mapping,
+        plain,
+    )
+    from valve_friction_ros.identification.result import Result, StemComparison
+    from valve_friction_ros.identification.robust.expectation import expected_half_widths
+    from valve_friction_ros.identification.robust.method import (
+        IMPERFECTIONS_FOUND,
+        identify_robust,
+    )
+    from valve_friction_ros.identification.settings import (
+        CALIBRATION,
+        DEFAULT_METHOD,
+        FIXABLE,
+        METHOD_NAMES,
+        MOST_UNCERTAIN,
+        STATED,
+        TIMING_UNCERTAINTY,
+        IdentificationSettings,
+    )
+    from valve_friction_ros.identification.signature.force_balance import identify_signature
+    from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
+    from valve_friction_ros.identification.signature.valve_signature import (
+        ValveSignature,
+        valve_signature,
+    )
+    from valve_friction_ros.identification.steps.step_detection import find_steps
+    from valve_friction_ros.identification.steps.step_response import (
+        Bracket,
+        StepMetrics,
+        StepTest,
+        step_test,
+    )
+    from valve_friction_ros.identification.steps.validation import Validation, validate
+    from valve_friction_ros.identification.trust.misfit import LEAST_FIT, Misfit
+    from valve_friction_ros.identification.trust.plausible_units import require_valve_units
+    from valve_friction_ros.identification.trust.rounding import percentage, two_digits
+    from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
+    from valve_friction_ros.identification.units import (
+        CLOCK_OFFSET,
+        PARAMETER_UNITS,
+        SLIDING,
+        UNITS,
+    )
+else:
+    __getattr__ = names_on_demand(__name__)
 
 __all__ = [
     "CALIBRATION",
@@ -65,10 +81,13 @@ __all__ = [
     "FIXABLE",
     "FORMER_METHODS",
     "IMPERFECTIONS_FOUND",
+    "LEAST_FIT",
     "METHODS",
+    "METHOD_NAMES",
     "MOST_UNCERTAIN",
     "PARAMETER_UNITS",
     "SLIDING",
+    "STATED",
     "TIMING_UNCERTAINTY",
     "UNITS",
     "Bracket",

@@ -8,13 +8,12 @@ from valve_friction_ros.identification.published import method as published
 from valve_friction_ros.identification.refined import method as refined
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.robust import method as robust
-from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.settings import DEFAULT_METHOD, IdentificationSettings
 from valve_friction_ros.identification.signature import force_balance as signature
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
 __all__ = [
-    "DEFAULT_METHOD",
     "FORMER_METHODS",
     "METHODS",
     "Method",
@@ -61,8 +60,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 """``best``: ``robust`` wherever it applies; ``robust``: with the imperfections of a plant in the
 fit; ``refined``: the Karnopp model alone; ``published``: the paper's model 1; ``signature``: its
 model 2."""
-
-DEFAULT_METHOD = BEST
 
 FORMER_METHODS: Mapping[str, str] = MappingProxyType(
     {"sweep": refined.METHOD, "force_balance": signature.METHOD}

@@ -15,6 +15,7 @@ from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
 from valve_friction_ros.identification.trust.calibration import with_calibration
 from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
@@ -74,7 +75,8 @@ class Result:
         Settings of the identification.
     parameters : mapping of str to Parameter
         By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`. The
-        uncertainties of area and sensor scales in `settings` are in their intervals.
+        uncertainties of area and sensor scales in `settings` are in their intervals, and what its
+        stated values contradict is weak at most.
     fit : float
         Share of the stem's movement that the model reproduces, at most 1; of the force where no
         stem is simulated.
@@ -135,10 +137,17 @@ class Result:
     sliding_speed: float = math.nan
 
     def __post_init__(self) -> None:
-        """Widen the intervals by the calibration, for every method; freeze the mappings."""
+        """Apply calibration and stated values, for every method; freeze the mappings."""
         parameters, evidence = with_calibration(
             self.parameters, self.evidence, self.settings, self.recording.driven_by
         )
+        parameters, told, sentences = with_stated(
+            parameters, self.settings.stated, self.valve, self.recording
+        )
+        if told:
+            evidence[CONTRADICTED] = told
+        new = (each for each in sentences if each not in self.warnings)
+        object.__setattr__(self, "warnings", (*new, *self.warnings))
         object.__setattr__(self, "parameters", frozen(parameters))
         object.__setattr__(self, "evidence", frozen(evidence))
 

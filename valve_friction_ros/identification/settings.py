@@ -13,10 +13,14 @@ from valve_friction_ros.model.frozen import frozen
 
 __all__ = [
     "CALIBRATION",
+    "DEFAULT_METHOD",
     "FIXABLE",
+    "METHOD_NAMES",
     "MOST_UNCERTAIN",
     "PUBLISHED_WINDOW",
     "REGRESSED",
+    "STATED",
+    "TIMING_UNCERTAINTY",
     "IdentificationSettings",
 ]
 
@@ -35,6 +39,9 @@ REGRESSED = (
 FIXABLE = (*REGRESSED, "static_friction", "limit_velocity")
 """Parameters that can be fixed at a known value instead of being identified."""
 
+STATED = ("spring_constant", "spring_preload", "mass")
+"""Parameters of a data sheet, with which what is found can be compared."""
+
 CALIBRATION: Mapping[str, str] = MappingProxyType(
     {
         "area_uncertainty": "the diaphragm area",
@@ -43,6 +50,17 @@ CALIBRATION: Mapping[str, str] = MappingProxyType(
     }
 )
 """Settings that are relative standard uncertainties, and of what."""
+
+METHOD_NAMES = ("best", "robust", "refined", "published", "signature")
+"""What the methods are called, in the order in which they are offered."""
+
+DEFAULT_METHOD = "best"
+
+TIMING_UNCERTAINTY = 0.04
+"""Timing uncertainty without a setting, s.
+
+Chosen: stamps, transmitters and tubing of a plant without special care add up to some tens of
+milliseconds; 95 % are below 0.08 s."""
 
 MOST_UNCERTAIN = 0.5
 """Relative standard uncertainty of a scale from which its 95 % interval holds zero."""
@@ -69,6 +87,9 @@ class IdentificationSettings:
     fixed : mapping of str to float
         Known parameters by name (see `FIXABLE`); the regression leaves them out. Fixing
         ``limit_velocity`` sets the threshold δv instead of choosing it from the sweep.
+    stated : mapping of str to float
+        Values of a data sheet by name (see `STATED`). They take no part in the identification: a
+        found value that contradicts one gives a warning with the likely cause.
     position_bias : float, optional
         Bias x̄ of (10), m. Given, the regression takes the paper's form of four columns, and the
         preload is F_0 = k·x̄; by default the preload is a regressor of its own.
@@ -112,6 +133,7 @@ class IdentificationSettings:
     area_uncertainty: float = 0.0
     drive_scale_uncertainty: float = 0.0
     position_scale_uncertainty: float = 0.0
+    stated: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -136,7 +158,8 @@ class IdentificationSettings:
                     f"{name} must be at least 0 and below {MOST_UNCERTAIN:g}, got "
                     f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
                 )
-        object.__setattr__(self, "fixed", frozen(self._checked_fixed()))
+        object.__setattr__(self, "fixed", frozen(_checked(self.fixed, FIXABLE, "fixed")))
+        object.__setattr__(self, "stated", frozen(_checked(self.stated, STATED, "stated")))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)
             if "spring_preload" in self.fixed:
@@ -147,18 +170,19 @@ class IdentificationSettings:
         """Derivative window of the published method, samples."""
         return PUBLISHED_WINDOW if self.derivative_window is None else self.derivative_window
 
-    def _checked_fixed(self) -> dict[str, float]:
-        checked = {}
-        for name, value in self.fixed.items():
-            if name not in FIXABLE:
-                raise ValueError(
-                    f"{name!r} is not a parameter that can be fixed; "
-                    f"choose from {', '.join(FIXABLE)}"
-                )
-            if name in _MAY_BE_NEGATIVE:
-                checked[name] = require_finite(name, value)
-            elif name in _POSITIVE:
-                checked[name] = require_positive(name, value)
-            else:
-                checked[name] = require_non_negative(name, value)
-        return checked
+
+def _checked(values: Mapping[str, float], names: tuple[str, ...], what: str) -> dict[str, float]:
+    """Return the values of parameters as finite numbers with their signs."""
+    checked = {}
+    for name, value in values.items():
+        if name not in names:
+            raise ValueError(
+                f"{name!r} is not a parameter that can be {what}; choose from {', '.join(names)}"
+            )
+        if name in _MAY_BE_NEGATIVE:
+            checked[name] = require_finite(name, value)
+        elif name in _POSITIVE:
+            checked[name] = require_positive(name, value)
+        else:
+            checked[name] = require_non_negative(name, value)
+    return checked

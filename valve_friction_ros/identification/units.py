@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-__all__ = ["CLOCK_OFFSET", "PARAMETER_UNITS", "UNITS", "column_suffix"]
+__all__ = ["CLOCK_OFFSET", "PARAMETER_UNITS", "SLIDING", "UNITS", "column_suffix"]
+
+SLIDING = "sliding_friction"
+"""Parameter name: ∫|F_friction|·|dx| / ∫|dx| over the record, N."""
 
 CLOCK_OFFSET = "clock_offset"
 """Parameter name. Its value, s, is positive where the stem's stamps are late."""
@@ -27,7 +30,7 @@ PARAMETER_UNITS: Mapping[str, str] = MappingProxyType(
         "coulomb_asymmetry": "1",
         "viscous_asymmetry": "1",
         CLOCK_OFFSET: "s",
-        "sliding_friction": "N",
+        SLIDING: "N",
     }
 )
 """Unit of every parameter that a result can hold; those after `UNITS` only if demanded."""

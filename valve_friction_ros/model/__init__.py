@@ -1,34 +1,41 @@
 """The valve, its friction model and its simulation; no ROS."""
 
-from valve_friction_ros.model.bench import (
-    BENCH_VALVE,
-    GRAPHITE_PACKING,
-    GRAPHITE_VALVE,
-    HIGH_FRICTION,
-    LOW_FRICTION,
-    PRESSURE_RANGE,
-)
-from valve_friction_ros.model.drive import Drive
-from valve_friction_ros.model.excitations import (
-    Excitation,
-    IsaSteps,
-    SampledPressure,
-    SineWave,
-    SquareWave,
-    TriangleWave,
-)
-from valve_friction_ros.model.instruments import DEFAULT_LAG, SensorNoise, converter_response
-from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.model.simulation import (
-    StemState,
-    Trajectory,
-    advance,
-    balanced_state,
-    compile_kernels,
-    simulate,
-)
-from valve_friction_ros.model.valve import Valve
+from typing import TYPE_CHECKING
+
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.model.bench import (
+        BENCH_VALVE,
+        GRAPHITE_PACKING,
+        GRAPHITE_VALVE,
+        HIGH_FRICTION,
+        LOW_FRICTION,
+        PRESSURE_RANGE,
+    )
+    from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
+    from valve_friction_ros.model.excitations import (
+        Excitation,
+        IsaSteps,
+        SampledPressure,
+        SineWave,
+        SquareWave,
+        TriangleWave,
+    )
+    from valve_friction_ros.model.instruments import SensorNoise, converter_response
+    from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+    from valve_friction_ros.model.recording import Recording
+    from valve_friction_ros.model.simulation import (
+        StemState,
+        Trajectory,
+        advance,
+        balanced_state,
+        compile_kernels,
+        simulate,
+    )
+    from valve_friction_ros.model.valve import Valve
+else:
+    __getattr__ = names_on_demand(__name__)
 
 __all__ = [
     "BENCH_VALVE",

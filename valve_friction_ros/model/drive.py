@@ -2,7 +2,10 @@
 
 from enum import Enum
 
-__all__ = ["Drive"]
+__all__ = ["DEFAULT_LAG", "Drive"]
+
+DEFAULT_LAG = 1.3
+"""Time constant of the V/P converter, s: 1.2 to 1.5 s reproduce the paper's |ẋ|max of 0.013 m/s."""
 
 
 class Drive(Enum):

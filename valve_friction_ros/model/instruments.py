@@ -7,12 +7,10 @@ import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.checks import require_non_negative, require_positive
+from valve_friction_ros.model.drive import DEFAULT_LAG
 from valve_friction_ros.model.recording import Recording
 
-__all__ = ["DEFAULT_LAG", "SensorNoise", "converter_response"]
-
-DEFAULT_LAG = 1.3
-"""Time constant of the V/P converter, s: 1.2 to 1.5 s reproduce the paper's |ẋ|max of 0.013 m/s."""
+__all__ = ["SensorNoise", "converter_response"]
 
 
 def converter_response(

@@ -16,6 +16,10 @@ first integral :math:`h_1` and second integral :math:`h_2`,
 where :math:`a_0` is the acceleration at t = 0 and :math:`j_0 = (f_1 - k v_0)/m` the jerk that the
 force and the spring would give without damping. No step size enters, so nothing can become
 unstable, however stiff the friction.
+
+With the Laplace transform 1/P of h, that of its derivative by :math:`\omega_0^2` is −1/P², and that
+by :math:`2\beta` is −p/P². All derivatives of the motion by damping and stiffness therefore follow
+from :math:`q = h * h`, the response convolved with itself, its slope and its integrals.
 """
 
 import math
@@ -23,7 +27,14 @@ from typing import NamedTuple
 
 from valve_friction_ros.model.compiled import compiled
 
-__all__ = ["Motion", "Response", "first_turn", "impulse_response", "motion_after"]
+__all__ = [
+    "Motion",
+    "Response",
+    "first_turn",
+    "impulse_response",
+    "motion_after",
+    "self_convolution",
+]
 
 
 _MOST_TERMS = 64
@@ -157,6 +168,119 @@ def impulse_response(damping: float, stiffness: float, time: float) -> Response:
     if discriminant > 0.01 * quarter:
         return _overdamped_response(damping, discriminant, stiffness, time)
     return _oscillating_response(damping, discriminant, stiffness, time)
+
+
+@compiled
+def _series_convolution(damping: float, stiffness: float, time: float) -> Response:
+    """Power series of h ∗ h: that of h drives it."""
+    friction, spring = damping * time, stiffness * time * time
+    response, response_before = time, 0.0
+    term, previous = 0.0, 0.0
+    slope = value = integral = second_integral = 0.0
+    for order in range(2, _MOST_TERMS):
+        products = order * (order - 1)
+        following = time * time * response_before - friction * (order - 1) * term
+        previous, term = term, (following - spring * previous) / products
+        following = -(friction * (order - 1) * response + spring * response_before) / products
+        response_before, response = response, following
+        value += term
+        slope += order * term / time
+        integral += term * time / (order + 1)
+        second_integral += term * time * time / ((order + 1) * (order + 2))
+        if order > 3 and not (abs(term) > 1e-18 * value or abs(previous) > 1e-18 * value):
+            break
+    return Response(slope, value, integral, second_integral)
+
+
+@compiled
+def _third_decay_integral(rate: float, time: float, second: float) -> float:
+    """Third integral from 0 to `time` of exp(rate·t), given the second."""
+    exponent = rate * time
+    if abs(exponent) >= 0.5:
+        return (second - time * time / 2) / rate
+    term = 1.0 / 6.0
+    total = term
+    for order in range(4, _MOST_TERMS):
+        if not abs(term) > 1e-18:
+            break
+        term *= exponent / order
+        total += term
+    return total * time * time * time
+
+
+@compiled
+def _overdamped_convolution(
+    damping: float, discriminant: float, stiffness: float, time: float, response: Response
+) -> Response:
+    """H ∗ h of two decays with well separated rates: (e₁ − e₂)² transformed, over their spread."""
+    fast = -(damping / 2 + math.sqrt(discriminant))
+    slow = stiffness / fast
+    square = 4 * discriminant
+    slope, value = -2 * response.slope, -2 * response.value
+    integral, second_integral = -2 * response.integral, -2 * response.second_integral
+    for rate in (fast, slow):
+        decay = math.exp(rate * time)
+        first, second = _decay_integrals(rate, time)
+        third = _third_decay_integral(rate, time, second)
+        slope += decay * (1 + rate * time)
+        value += time * decay
+        integral += time * first - second
+        second_integral += time * second - 2 * third
+    return Response(slope / square, value / square, integral / square, second_integral / square)
+
+
+@compiled
+def _oscillating_convolution(
+    damping: float, discriminant: float, stiffness: float, time: float, response: Response
+) -> Response:
+    """H ∗ h of a damped oscillation, or of two nearly equal decays."""
+    square = discriminant * time * time
+    if abs(square) < 1.0:
+        term, total = 1.0 / 6.0, 0.0
+        for order in range(1, _MOST_TERMS):
+            if not abs(order * term) > 1e-18:
+                break
+            total += order * term
+            term *= square / ((2 * order + 2) * (2 * order + 3))
+        value = math.exp(-damping / 2 * time) * time * time * time * total
+    else:
+        cosine = 2 * response.slope + damping * response.value
+        value = (time * cosine - 2 * response.value) / (4 * discriminant)
+    slope = (time * response.value - damping * value) / 2
+    integral = (response.integral - slope - damping * value) / stiffness
+    second_integral = (response.second_integral - value - damping * integral) / stiffness
+    return Response(slope, value, integral, second_integral)
+
+
+@compiled
+def self_convolution(damping: float, stiffness: float, time: float, response: Response) -> Response:
+    """Convolve the impulse response with itself: the slope, q = h ∗ h, and its two integrals.
+
+    They are what an impulse response loses by a unit of damping and of stiffness:
+
+        ∂h/∂damping = −q̇ and ∂h/∂stiffness = −q,
+
+    and so on for the integrals; q̈ = h − damping·q̇ − stiffness·q.
+
+    Parameters
+    ----------
+    damping, stiffness, time : float
+        As for `impulse_response`.
+    response : Response
+        What that returned.
+
+    Returns
+    -------
+    Response
+        q̇ (s²), q (s³), ∫q (s⁴), ∬q (s⁵) at `time`.
+    """
+    if damping * time < 0.5 and stiffness * time * time < 0.25:
+        return _series_convolution(damping, stiffness, time)
+    quarter = damping * damping / 4
+    discriminant = quarter - stiffness
+    if discriminant > 0.01 * quarter:
+        return _overdamped_convolution(damping, discriminant, stiffness, time, response)
+    return _oscillating_convolution(damping, discriminant, stiffness, time, response)
 
 
 @compiled

@@ -7,10 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled, compiled_products
-from valve_friction_ros.model.linear_motion import impulse_response
-from valve_friction_ros.model.stem_motion import STRIBECK_STEP, Dynamics, sliding_friction
+from valve_friction_ros.model.dynamics import Dynamics, sliding_friction
+from valve_friction_ros.model.linear_motion import impulse_response, self_convolution
+from valve_friction_ros.model.stem_motion import STRIBECK_STEP
 
-__all__ = ["ChordLadder", "SlidingMap", "chord_ladder", "has_short_cut", "slid", "sliding_map"]
+__all__ = [
+    "ChordLadder",
+    "SlidingMap",
+    "chord_ladder",
+    "has_short_cut",
+    "map_slopes",
+    "slid",
+    "sliding_map",
+]
 
 _FALLEN = 6.0
 """Speed over the Stribeck velocity above which the remaining fall is below rounding: e⁻³⁶."""
@@ -57,6 +66,34 @@ def sliding_map(dynamics: Dynamics, period: float) -> SlidingMap:
         response.integral / (dynamics.mass * period),
         reach,
     )
+
+
+@compiled
+def map_slopes(dynamics: Dynamics, period: float) -> NDArray[np.float64]:
+    """Differentiate the map by viscous friction, spring constant and mass, shape (3, 8)."""
+    mass = dynamics.mass
+    damping, stiffness = dynamics.viscous_friction / mass, dynamics.spring_constant / mass
+    response = impulse_response(damping, stiffness, period)
+    lost = self_convolution(damping, stiffness, period, response)
+    bend = response.value - damping * lost.slope - stiffness * lost.value
+    slopes = np.empty((3, 8))
+    directions = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-damping, -stiffness, 1.0))
+    for row, direction in enumerate(directions):
+        by_damping, by_stiffness = direction[0] / mass, direction[1] / mass
+        by_mass = direction[2] / mass
+        slope = -bend * by_damping - lost.slope * by_stiffness
+        value = -lost.slope * by_damping - lost.value * by_stiffness
+        integral = -lost.value * by_damping - lost.integral * by_stiffness
+        second = -lost.integral * by_damping - lost.second_integral * by_stiffness
+        slopes[row, 0] = -by_stiffness * response.integral - stiffness * integral
+        slopes[row, 1] = value
+        slopes[row, 2] = (integral - by_mass * response.integral) / mass
+        slopes[row, 3] = (second - by_mass * response.second_integral) / (mass * period)
+        slopes[row, 4] = slope
+        slopes[row, 5] = -by_stiffness * response.value - stiffness * value
+        slopes[row, 6] = (value - by_mass * response.value) / mass
+        slopes[row, 7] = (integral - by_mass * response.integral) / (mass * period)
+    return slopes
 
 
 @compiled

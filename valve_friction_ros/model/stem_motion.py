@@ -7,17 +7,29 @@ friction of the two directions may differ. Chords follow friction that falls wit
 """
 
 import math
-from typing import NamedTuple
 
 from valve_friction_ros.model.compiled import compiled
+from valve_friction_ros.model.dynamics import Dynamics, sliding_friction
 from valve_friction_ros.model.linear_motion import (
     Motion,
     first_turn,
     impulse_response,
     motion_after,
 )
+from valve_friction_ros.model.stem_tangent import (
+    LET_GO,
+    RESTS,
+    SLIDES,
+    STOPS,
+    TURNS,
+    WAITED,
+    Phase,
+    Tangent,
+    carry_slide,
+    leave,
+)
 
-__all__ = ["STRIBECK_STEP", "Dynamics", "advance_stem", "sliding_friction"]
+__all__ = ["STRIBECK_STEP", "advance_stem"]
 
 _NARROW = 1e-3
 """Least width of a chord over its largest change of speed. Chosen: avoids a division by
@@ -47,19 +59,6 @@ STRIBECK_STEP = 0.04
 """Approximate change of speed per chord, over the Stribeck velocity.
 
 Chosen: the error of the position against Radau's method stays below 0.1 µm on the bench."""
-
-
-class Dynamics(NamedTuple):
-    """Parameters of one direction of motion, as floats for compiled kernels (SI units)."""
-
-    mass: float
-    viscous_friction: float
-    coulomb_friction: float
-    static_friction: float
-    spring_constant: float
-    limit_velocity: float
-    travel: float
-    stribeck_velocity: float
 
 
 @compiled
@@ -158,14 +157,6 @@ def _slide_up(
     if rest <= duration:
         return end.position, 0.0, time
     return end.position, max(end.velocity, 0.0), time
-
-
-@compiled
-def sliding_friction(dynamics: Dynamics, speed: float) -> float:
-    """Friction of the sliding stem, N."""
-    ratio = speed / dynamics.stribeck_velocity
-    fall = (dynamics.static_friction - dynamics.coulomb_friction) * math.exp(-ratio * ratio)
-    return dynamics.coulomb_friction + fall + dynamics.viscous_friction * speed
 
 
 @compiled
@@ -270,6 +261,7 @@ def advance_stem(
     duration: float,
     upward: Dynamics,
     downward: Dynamics,
+    tangent: Tangent | None = None,
 ) -> tuple[float, float]:
     """Advance the stem by `duration` under a force that is linear in time.
 
@@ -286,6 +278,9 @@ def advance_stem(
         Length of the step, s.
     upward, downward : Dynamics
         Parameters of the model for either way.
+    tangent : Tangent, optional
+        Derivatives of the stem, after `begin_step`; they are carried along. Friction must not fall
+        with the speed then.
 
     Returns
     -------
@@ -294,26 +289,58 @@ def advance_stem(
     """
     shortest_phase = 1e-12 * duration
     elapsed = 0.0
+    spring = upward.spring_constant
+    has_stopped = False
     for _ in range(_MOST_EVENTS):
         if not elapsed < duration:
             return position, velocity
-        pull = force + slope * elapsed - upward.spring_constant * position
+        pull = force + slope * elapsed - spring * position
         if velocity == 0.0:
             side, wait = _breakaway(position, pull, slope, upward, downward)
             elapsed += wait
             if elapsed >= duration:
                 return position, velocity
+            if tangent is not None:
+                way = upward if side > 0 else downward
+                pull = max(
+                    side * (force + slope * elapsed - spring * position), way.static_friction
+                )
+                cause = WAITED if wait > 0.0 else TURNS if has_stopped else LET_GO
+                push = (pull - way.coulomb_friction) / way.mass
+                leave(tangent, side, position, push, side * slope, spring, elapsed, cause)
         else:
             side = 1.0 if velocity > 0 else -1.0
+        way = upward if side > 0 else downward
+        stop = _stop_ahead(side, upward.travel)
         reached, speed, time = _slide_one_way(
             side * position,
             abs(velocity),
-            upward if side > 0 else downward,
+            way,
             side * (force + slope * elapsed),
             side * slope,
             duration - elapsed,
-            _stop_ahead(side, upward.travel),
+            stop,
         )
+        if tangent is not None:
+            has_stopped = speed == 0.0
+            end = SLIDES if speed > 0.0 else STOPS if reached == stop else RESTS
+            pull = side * (force + slope * elapsed - spring * position)
+            if velocity == 0.0:
+                pull = max(pull, way.static_friction)
+            carry_slide(
+                tangent,
+                Phase(
+                    side,
+                    elapsed,
+                    time,
+                    side * position,
+                    abs(velocity),
+                    pull,
+                    side * slope,
+                    way,
+                    end,
+                ),
+            )
         position, velocity = side * reached, side * speed
         elapsed += max(time, shortest_phase)
     raise ArithmeticError("the stem starts or stops a million times within a sample: sample faster")

@@ -8,15 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled, compiled_products
+from valve_friction_ros.model.dynamics import Dynamics
 from valve_friction_ros.model.sliding_map import (
     ChordLadder,
     SlidingMap,
     chord_ladder,
     has_short_cut,
+    map_slopes,
     slid,
     sliding_map,
 )
-from valve_friction_ros.model.stem_motion import Dynamics, advance_stem
+from valve_friction_ros.model.stem_motion import advance_stem
+from valve_friction_ros.model.stem_tangent import (
+    Tangent,
+    begin_step,
+    face,
+    keep,
+    set_anew,
+)
 
 __all__ = ["run_stem"]
 
@@ -159,6 +168,53 @@ def _slide_on_falling(
     return sample
 
 
+@compiled_products
+def _carry(
+    tangent: Tangent | None,
+    first: int,
+    last: int,
+    side: float,
+    way: Dynamics,
+    slide: SlidingMap,
+    forces: NDArray[np.float64],
+    grip: _Signal,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    period: float,
+) -> None:
+    """Carry the derivatives through the samples that `_slide_on` has filled in.
+
+    The inner loop has few arrays, no call and no branch, so that the processor takes several
+    parameters at once.
+    """
+    if tangent is None or first == last:
+        return
+    face(tangent, side)
+    slopes, moved = map_slopes(way, period), np.empty((3, 2))
+    signals, facing, state = tangent.signals, tangent.facing, tangent.state
+    for sample in range(first, last):
+        x, v = positions[sample], velocities[sample]
+        e = forces[sample] - side * (way.coulomb_friction + _more(grip, sample))
+        d = forces[sample + 1] - side * (way.coulomb_friction + _more(grip, sample + 1)) - e
+        for row in range(3):
+            by = slopes[row]
+            moved[row, 0] = by[0] * x + by[1] * v + (by[2] * e + by[3] * d)
+            moved[row, 1] = by[4] * v + by[5] * x + (by[6] * e + by[7] * d)
+        x_viscous, x_spring, x_mass = moved[0, 0], moved[1, 0], moved[2, 0]
+        v_viscous, v_spring, v_mass = moved[0, 1], moved[1, 1], moved[2, 1]
+        for one in range(facing.shape[1]):
+            force = facing[0, one] * signals[sample, one]
+            change = facing[0, one] * signals[sample + 1, one] - force
+            place, following = slid(
+                slide, state[0, one], state[1, one], force + facing[1, one], change
+            )
+            viscous, spring, mass = facing[2, one], facing[3, one], facing[4, one]
+            place += viscous * x_viscous + spring * x_spring + mass * x_mass
+            following += viscous * v_viscous + spring * v_spring + mass * v_mass
+            state[0, one], state[1, one] = place, following
+            tangent.positions[sample + 1, one] = place
+
+
 @compiled
 def _graded(way: Dynamics, more: float) -> Dynamics:
     """Return the dynamics with `more` Coulomb and static friction."""
@@ -185,21 +241,25 @@ def run_stem(
     grip: _Signal = None,
     anew: _Signal = None,
     leaving: _Signal = None,
+    tangent: Tangent | None = None,
 ) -> int:
     """Step through `forces` (actuator less preload, N) from the state at sample 0.
 
     Rest and sliding over several samples take short cuts; `advance_stem` steps all samples between
     them, and so every sample with an event. `grip` (N) is added to the Coulomb and the static
     friction of each sample. Where `anew` is a number, the stem is set to that place (m) and to the
-    velocity `leaving` (m/s). The samples that took no short cut are counted and returned.
+    velocity `leaving` (m/s). A `tangent`, set up for the first sample, is carried along
+    if friction does not fall with the speed. The samples that took no short cut are counted and
+    returned.
     """
     up, down = sliding_map(upward, period), sliding_map(downward, period)
     steps_up, steps_down = chord_ladder(upward, period), chord_ladder(downward, period)
     is_quick = has_short_cut(upward, period) and has_short_cut(downward, period)
     falls = upward.stribeck_velocity > 0.0
+    keep(tangent, -1, 0)
     sample = 0
     for stepped in range(forces.size):
-        at, velocity = positions[sample], velocities[sample]
+        at, velocity, first = positions[sample], velocities[sample], sample
         side = 1.0 if velocity > 0 else -1.0
         way = upward if velocity > 0 else downward
         if velocity == 0.0:
@@ -214,12 +274,31 @@ def run_stem(
         elif is_quick:
             slide = up if velocity > 0 else down
             sample = _slide_on(sample, side, way, slide, forces, grip, anew, positions, velocities)
+        if velocity == 0.0:
+            keep(tangent, first, sample)
+        else:
+            slide = up if velocity > 0 else down
+            _carry(
+                tangent,
+                first,
+                sample,
+                side,
+                way,
+                slide,
+                forces,
+                grip,
+                positions,
+                velocities,
+                period,
+            )
         if sample == forces.size - 1:
             return stepped
         if anew is not None and leaving is not None and not np.isnan(anew[sample + 1]):
             positions[sample + 1], velocities[sample + 1] = anew[sample + 1], leaving[sample + 1]
+            set_anew(tangent, sample + 1)
         else:
             more = 0.5 * (_more(grip, sample) + _more(grip, sample + 1))
+            begin_step(tangent, sample, period)
             positions[sample + 1], velocities[sample + 1] = advance_stem(
                 positions[sample],
                 velocities[sample],
@@ -228,6 +307,8 @@ def run_stem(
                 period,
                 _graded(upward, more),
                 _graded(downward, more),
+                tangent,
             )
+            keep(tangent, sample, sample + 1)
         sample += 1
     raise ArithmeticError("the simulation did not reach its last sample")

@@ -1,16 +1,29 @@
 """What a stroke test may do to a valve, and what will measure it."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
+from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.model.checks import (
     require_finite,
     require_non_negative,
     require_positive,
 )
-from valve_friction_ros.model.instruments import DEFAULT_LAG
+from valve_friction_ros.model.drive import DEFAULT_LAG
 
-__all__ = ["Conditions", "Limits"]
+__all__ = ["AIMS", "Conditions", "Limits"]
+
+_FRICTION = ("coulomb_friction", "viscous_friction", "static_friction")
+
+AIMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "friction": _FRICTION,
+        **{name: (name,) for name in (*_FRICTION, SLIDING, "spring_constant")},
+    }
+)
+"""What a test may be for: the numbers whose intervals count."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from valve_friction_ros.identification import percentage
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
+from valve_friction_ros.planning.conditions import AIMS
 from valve_friction_ros.planning.forecast import Forecast
 from valve_friction_ros.planning.pressure_band import (
     LEAST_STROKE,
@@ -12,7 +13,7 @@ from valve_friction_ros.planning.pressure_band import (
     lowest_pressure,
     stroke,
 )
-from valve_friction_ros.planning.search import AIMS, StrokePlan
+from valve_friction_ros.planning.search import StrokePlan
 
 __all__ = ["plan_remarks"]
 

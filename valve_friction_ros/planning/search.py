@@ -2,29 +2,18 @@
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
-from valve_friction_ros.identification import SLIDING, IdentificationSettings, RefusalError
+from valve_friction_ros.identification import IdentificationSettings, RefusalError
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.planning.conditions import Conditions, Limits
+from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
 from valve_friction_ros.planning.forecast import Forecast, forecast, moved
 from valve_friction_ros.planning.friction_range import FrictionRange
 from valve_friction_ros.planning.pressure_band import PressureBand, pressure_band
 from valve_friction_ros.planning.stroke_test import SHAPES, Pattern, StrokeTest, stroke_test
 
-__all__ = ["AIMS", "StrokePlan", "plan_test"]
-
-_FRICTION = ("coulomb_friction", "viscous_friction", "static_friction")
-
-AIMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "friction": _FRICTION,
-        **{name: (name,) for name in (*_FRICTION, SLIDING, "spring_constant")},
-    }
-)
-"""What a test may be for: the numbers whose intervals count."""
+__all__ = ["StrokePlan", "plan_test"]
 
 _SHAPES = (("full",), ("stairs",), ("turning",), ("full", "stairs"))
 _SPEEDS = ((1.0,), (0.4,), (0.15,), (1.0, 0.4), (1.0, 0.15), (1.0, 0.3, 0.1))

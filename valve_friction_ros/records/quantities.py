@@ -3,8 +3,6 @@
 import re
 from collections.abc import Mapping
 
-import numpy as np
-
 from valve_friction_ros.records.units import POSITION_UNITS, PRESSURE_UNITS, Unit, unit_named
 
 __all__ = ["AREA", "LENGTH", "MASS", "PRESSURE", "quantity", "span"]
@@ -35,6 +33,8 @@ def _unit(text: str, name: str | None, units: Mapping[str, Unit]) -> Unit:
 
 
 def _si(number: str, unit: Unit) -> float:
+    import numpy as np  # noqa: PLC0415 - slow to import
+
     return float(unit.to_si(np.array([float(number.replace(",", "."))]))[0])
 
 

@@ -59,9 +59,9 @@ class Stretch:
         """
         with np.errstate(invalid="ignore"):
             since = np.rint(times - first)
-        outside = (since < _nanoseconds(self.begin)) | (since > _nanoseconds(self.end))
-        inside: NDArray[np.bool_] = ~outside | ~np.isfinite(times)
-        if inside.any():
-            newest = times[inside][-1]
-            inside &= ~(np.rint(newest - times) > _nanoseconds(self.last))
+            outside = (since < _nanoseconds(self.begin)) | (since > _nanoseconds(self.end))
+            inside: NDArray[np.bool_] = ~outside | ~np.isfinite(times)
+            if inside.any():
+                newest = times[inside][-1]
+                inside &= ~(np.rint(newest - times) > _nanoseconds(self.last))
         return inside

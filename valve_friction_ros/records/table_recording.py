@@ -36,12 +36,18 @@ __all__ = ["drive_column", "read_table"]
 _LATEST_TIME = 9e9
 """Latest time whose nanoseconds a signed 64-bit number holds, s, rounded down."""
 
+_FAR = 1e200
+"""Times beyond this overflow as nanoseconds, and are too late in any unit."""
+
 _Times = NDArray[np.float64] | NDArray[np.int64]
 
 
 def _on_clock(times: _Times, unit: str) -> _Times:
-    """Return times in ns; those that were written as dates are."""
-    return times if times.dtype == np.int64 else times * NANOSECONDS[unit]
+    """Return times in ns, finite ones also where they are refused; those of dates are."""
+    if times.dtype == np.int64:
+        return times
+    far = np.isfinite(times) & (np.abs(times) > _FAR)
+    return np.where(far, np.copysign(_FAR, times), times) * NANOSECONDS[unit]
 
 
 def _stamps(table: Table, name: str, unit: str) -> NDArray[np.int64]:

@@ -1,10 +1,11 @@
 """Units of recorded files, and their sizes in SI units."""
 
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = [
     "FORCE_UNITS",
@@ -31,7 +32,7 @@ class Unit(NamedTuple):
     multiplier: float
     divisor: float = 1.0
 
-    def to_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_si(self, values: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Convert values in this unit."""
         return values * self.multiplier / self.divisor
 

@@ -11,6 +11,7 @@ from typing import Any
 from valve_friction_ros.identification import (
     FIXABLE,
     METHODS,
+    STATED,
     IdentificationSettings,
     require_valve_units,
 )
@@ -57,6 +58,21 @@ class ValveFile:
     known: MappingProxyType[str, float]
     columns: Columns = field(default_factory=Columns)
     settings: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """What can be compared with a result: neither fixed values nor an assumed mass.
+
+        ``IdentificationSettings(stated=described.stated)`` does.
+        """
+        assumed = self.settings.get("assumed_mass")
+        return {
+            name: self.known[name]
+            for name in STATED
+            if name in self.known
+            and f"fixed.{name}" not in self.settings
+            and not (name == "mass" and self.known[name] == assumed)
+        }
 
 
 def _number(key: str, value: object) -> float:

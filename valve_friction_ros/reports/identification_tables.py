@@ -202,7 +202,10 @@ def settings_table(record: IdentifiedRecord) -> Table:
     result, valve = record.result, record.valve
     shown = result.to_dict()
     settings = shown["settings"]
-    fixed = ", ".join(f"{name} = {value:g}" for name, value in settings["fixed"].items())
+    fixed, stated = (
+        ", ".join(f"{name} = {value:g}" for name, value in settings[which].items())
+        for which in ("fixed", "stated")
+    )
     window = shown["derivative_window"]
     source = "chosen from the noise of the record"
     if settings["derivative_window"] is not None:
@@ -215,6 +218,7 @@ def settings_table(record: IdentifiedRecord) -> Table:
         *_calibration(settings),
         *(result.drawing.settings or {}).items(),
         ("given parameters", fixed or "none"),
+        *([("stated values, compared with those found", stated)] if stated else []),
         ("position bias x̄", "not given" if bias is None else f"{bias:g} m"),
         (
             "mass where the record does not determine it",

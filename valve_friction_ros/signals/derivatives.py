@@ -1,12 +1,12 @@
 """Velocity and acceleration of the stem by local polynomials, Appendix A."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-__all__ = ["Derivatives", "differentiate"]
+__all__ = ["Derivatives", "differentiate", "savgol_weights"]
 
 
 class Derivatives(NamedTuple):
@@ -29,6 +29,36 @@ class Derivatives(NamedTuple):
     def inner(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the part of `samples`, shape (n,), with derivatives, shape (n − d + 1,)."""
         return samples[self.margin : samples.size - self.margin]
+
+
+def savgol_weights(
+    window: int, order: int, degree: int = 0, sample_period: float = 1.0
+) -> NDArray[np.float64]:
+    """Return the weights of a Savitzky–Golay filter, to convolve a signal with.
+
+    They are those of `scipy.signal.savgol_coeffs`, whose import takes half a second.
+
+    Parameters
+    ----------
+    window : int
+        Length of the window, samples, above `order`.
+    order : int
+        Order of the polynomials.
+    degree : int
+        Degree of the derivative in the middle of the window; 0 smoothes.
+    sample_period : float
+        Time between two samples, s.
+
+    Returns
+    -------
+    ndarray of float, shape (window,)
+        The weights, the last sample's first.
+    """
+    # Over places from −1 to 1 the powers stay apart, however long the window is.
+    powers = np.vander(np.linspace(-1.0, 1.0, window), order + 1, increasing=True)
+    size = 0.5 * (window - 1) * sample_period
+    weights = np.linalg.pinv(powers)[degree] * (math.factorial(degree) / size**degree)
+    return np.asarray(weights[::-1], dtype=np.float64)
 
 
 def differentiate(
@@ -71,11 +101,11 @@ def differentiate(
             "use a longer record or a shorter window"
         )
     velocity, acceleration = (
-        np.convolve(
-            position,
-            scipy.signal.savgol_coeffs(window, order, deriv=degree, delta=sample_period),
-            "valid",
-        )
+        np.convolve(position, savgol_weights(window, order, degree, sample_period), "valid")
         for degree in (1, 2)
     )
-    return Derivatives(velocity, acceleration, window // 2)
+    return Derivatives(
+        np.asarray(velocity, dtype=np.float64),
+        np.asarray(acceleration, dtype=np.float64),
+        window // 2,
+    )

@@ -3,8 +3,9 @@
 import math
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from valve_friction_ros.signals.derivatives import savgol_weights
 
 __all__ = ["position_noise", "quantisation_step", "sensor_noise", "velocity_noise"]
 
@@ -55,5 +56,5 @@ def sensor_noise(signal: NDArray[np.float64]) -> float:
 
 def velocity_noise(noise: float, sample_period: float, window: int, order: int) -> float:
     """Propagate white position `noise` in m to the standard deviation of the velocity in m/s."""
-    weights = scipy.signal.savgol_coeffs(window, order, deriv=1, delta=sample_period)
+    weights = savgol_weights(window, order, 1, sample_period)
     return noise * float(np.linalg.norm(weights))

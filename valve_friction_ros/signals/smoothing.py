@@ -12,8 +12,9 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from valve_friction_ros.signals.derivatives import savgol_weights
 
 __all__ = [
     "find_corners",
@@ -43,6 +44,9 @@ _CORNER_SCALES = (1, 2, 4)
 """Windows over which corners are searched, over the shortest. Chosen: a slope's noise falls with
 the 1.5th power of the window, so the longest finds corners eight times smaller."""
 
+_LONG = 512
+"""Weights from which a Fourier transform is quicker than their products."""
+
 _DEVIATIONS = 4.0
 """Standard deviations above the expected variance beyond which a residual holds signal: 3 of
 100,000 windows by chance."""
@@ -55,6 +59,25 @@ def _window_slopes(signal: NDArray[np.float64], window: int) -> NDArray[np.float
     return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
 
 
+def _peaks(signal: NDArray[np.float64], least: float, distance: int) -> NDArray[np.intp]:
+    """Find local maxima of at least `least`, the highest of those nearer than `distance`.
+
+    A plateau has its maximum in its middle; none is at an end of the signal.
+    """
+    begins = np.flatnonzero(np.diff(signal, prepend=np.nan))
+    levels = signal[begins]
+    middles = (begins + np.append(begins[1:], signal.size) - 1) // 2
+    inner = levels[1:-1]
+    is_peak = (inner > levels[:-2]) & (inner > levels[2:]) & (inner >= least)
+    peaks = middles[1:-1][is_peak]
+    kept = np.ones(peaks.size, dtype=np.bool_)
+    for highest in np.argsort(signal[peaks], kind="stable")[::-1].tolist():
+        if kept[highest]:
+            kept &= np.abs(peaks - peaks[highest]) >= distance
+            kept[highest] = True
+    return np.asarray(peaks[kept], dtype=np.intp)
+
+
 def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDArray[np.intp]:
     """Find where the slopes over `window` samples on both sides differ, unlike those nearby."""
     if signal.size < 4 * window:
@@ -62,7 +85,7 @@ def _sharp_jumps(signal: NDArray[np.float64], noise: float, window: int) -> NDAr
     place = np.arange(window) - (window - 1) / 2
     slopes = _window_slopes(signal, window)
     jump = np.abs(slopes[window:] - slopes[:-window]) / (noise * np.sqrt(2 / (place @ place)))
-    peaks, _ = scipy.signal.find_peaks(jump, height=_CORNER_GATE, distance=window)
+    peaks = _peaks(jump, _CORNER_GATE, window)
     before = jump[np.maximum(peaks - window, 0)]
     after = jump[np.minimum(peaks + window, jump.size - 1)]
     background = np.maximum(np.maximum(before, after), _CORNER_GATE / _CORNER_SHARPNESS)
@@ -166,19 +189,28 @@ def smoothing_leverage(size: int, corners: NDArray[np.intp], window: int) -> NDA
     return shares
 
 
+def _convolved(signal: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convolve a signal with fewer weights, where they overlap in full."""
+    if weights.size < _LONG:
+        return np.asarray(np.convolve(signal, weights, "valid"), dtype=np.float64)
+    length = 1 << (signal.size - 1).bit_length()  # what goes round is before the full overlap
+    product = np.fft.rfft(signal, length) * np.fft.rfft(weights, length)
+    return np.asarray(np.fft.irfft(product, length)[weights.size - 1 : signal.size])
+
+
 def _local_cubics(stretch: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     """Filter as Savitzky and Golay, the ends by the cubics of the first and the last window.
 
     The result is that of `scipy.signal.savgol_filter` with ``mode="interp"``. That function repeats
     the fit of the cubics for each part, and takes n·window products; the Fourier transform needs
-    fewer.
+    fewer where the window is long.
     """
     cubics, half = _cubics(window), window // 2
     level = stretch[0]
     shifted = stretch - level
     first = cubics[:half] @ (cubics.T @ shifted[:window])
     last = cubics[window - half :] @ (cubics.T @ shifted[-window:])
-    middle = scipy.signal.oaconvolve(shifted, (cubics @ cubics[half])[::-1], mode="valid")
+    middle = _convolved(shifted, (cubics @ cubics[half])[::-1])
     return np.asarray(np.concatenate((first, middle, last)) + level, dtype=np.float64)
 
 
@@ -216,7 +248,7 @@ def _is_noise(residual: NDArray[np.float64], noise: float, window: int) -> bool:
     length = max(window // 4, 1)
     blocks = residual.size // length
     means = residual[: blocks * length].reshape(blocks, length).mean(axis=1)
-    taken = -scipy.signal.savgol_coeffs(window, _ORDER)
+    taken = -savgol_weights(window, _ORDER)
     taken[window // 2] += 1.0
     expected = noise * float(np.linalg.norm(np.convolve(taken, np.full(length, 1 / length))))
     highest = expected**2 * (1 + _DEVIATIONS * math.sqrt(2 / blocks))

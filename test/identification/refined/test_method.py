@@ -7,7 +7,6 @@ import pytest
 
 from benchmark.bounds import case_bounds
 from benchmark.cases import Case
-from benchmark.emps import RECORD, emps_bounds
 from benchmark.runs import SETTINGS, run
 from valve_friction_ros.identification import (
     UNITS,
@@ -128,38 +127,6 @@ class TestMass:
         mass = found.parameters["mass"]
         assert mass.verdict is Verdict.IDENTIFIED
         assert mass.value == pytest.approx(150.0, rel=0.02)
-
-
-class TestRealMachine:
-    @pytest.fixture(scope="class")
-    def bounds(self):
-        if not RECORD.is_file():
-            pytest.skip("the benchmark record is not the project's to distribute; it is not here")
-        return {bound.what.split()[1]: bound for bound in emps_bounds()}
-
-    @pytest.mark.parametrize(
-        "name", ["mass", "viscous_friction", "coulomb_friction", "spring_preload"]
-    )
-    def test_published_value(self, bounds, name):
-        assert bounds[name].met, bounds[name].reached
-
-    def test_verdicts(self):
-        if not RECORD.is_file():
-            pytest.skip("the benchmark record is not the project's to distribute; it is not here")
-        time, force, position = np.loadtxt(RECORD, delimiter=",", skiprows=1, unpack=True)
-        settings = IdentificationSettings(fixed={"spring_constant": 0.0})
-        record = Recording(float(np.median(np.diff(time))), force, position)
-        found = identify_refined(record, Valve(1.0), settings)
-        verdicts = {name: one.verdict for name, one in found.parameters.items()}
-        assert verdicts["mass"] is Verdict.IDENTIFIED
-        shown = {Verdict.IDENTIFIED, Verdict.WEAK}
-        assert verdicts["viscous_friction"] in shown
-        assert verdicts["coulomb_friction"] in shown
-        assert verdicts["static_friction"] is Verdict.NOT_IDENTIFIABLE
-        assert verdicts["spring_constant"] is Verdict.FIXED
-        assert found.misfit.describes
-        assert found.stem is None
-        assert found.fit > 0.9
 
 
 @pytest.mark.parametrize(("name", "waiting"), [("closed", 41_740.0), ("open", 230_000.0)])

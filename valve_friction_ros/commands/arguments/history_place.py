@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from valve_friction_ros.history import URL_VARIABLE, HistoryServer, Place, is_url
+from valve_friction_ros.history import URL_VARIABLE, HistoryServer, is_url
 from valve_friction_ros.records.data_folder import history_file
 
 __all__ = ["PLACE", "history_place", "usual_history"]
@@ -13,7 +13,7 @@ PLACE = "FILE.sqlite|URL"
 """How the help calls it."""
 
 
-def history_place(text: str) -> Place:
+def history_place(text: str) -> Path | HistoryServer:
     """Read a path, or the address of a server."""
     if not is_url(text):
         return Path(text)

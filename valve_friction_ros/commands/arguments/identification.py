@@ -2,18 +2,18 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 from valve_friction_ros.identification import (
     CALIBRATION,
     DEFAULT_METHOD,
     FIXABLE,
-    METHODS,
+    METHOD_NAMES,
     TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
 from valve_friction_ros.records.spelling import nearest, resembling
+from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["add_identification_arguments", "identification_settings", "method_name"]
 
@@ -23,7 +23,7 @@ def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
     defaults = IdentificationSettings()
     parser.add_argument(
         "--method",
-        choices=[*METHODS],
+        choices=METHOD_NAMES,
         help="best: robust wherever it applies; robust: imperfections of a plant in the fit; "
         "refined: the Karnopp model alone; published: the paper's model 1; signature: model 2, two "
         f"periods or more of a slow triangle ({DEFAULT_METHOD})",
@@ -103,33 +103,32 @@ def method_name(options: argparse.Namespace, described: Mapping[str, Any]) -> st
 
 
 def identification_settings(
-    options: argparse.Namespace,
-    known: Mapping[str, float],
-    described: Mapping[str, Any] = MappingProxyType({}),
+    options: argparse.Namespace, described: ValveFile
 ) -> IdentificationSettings:
     """Build the settings from the parsed arguments, and from what the valve file names.
 
-    `described` are the valve file's settings; an option goes before them. Raises ValueError if they
-    do not go together.
+    An option goes before the settings of the valve file. Raises ValueError if they do not go
+    together.
     """
     defaults = IdentificationSettings()
 
     def given(name: str, option: Any) -> Any:
         if option is not None:
             return option
-        return described.get(name, getattr(defaults, name, None))
+        return described.settings.get(name, getattr(defaults, name, None))
 
     fixed = {
         name.removeprefix("fixed."): value
-        for name, value in described.items()
+        for name, value in described.settings.items()
         if name.startswith("fixed.")
-    }
+    } | _fixed(options.fix, described.known)
     return IdentificationSettings(
         derivative_window=given("derivative_window", options.derivative_window),
         order=given("polynomial_order", options.order) or defaults.order,
-        fixed={**fixed, **_fixed(options.fix, known)},
+        fixed=fixed,
+        stated={name: each for name, each in described.stated.items() if name not in fixed},
         position_bias=given("position_bias", options.position_bias),
         timing_uncertainty=given("timing_uncertainty", options.timing_uncertainty),
         **{name: given(name, getattr(options, name)) for name in CALIBRATION},
-        assumed_mass=known.get("mass", defaults.assumed_mass),
+        assumed_mass=described.known.get("mass", defaults.assumed_mass),
     )

@@ -2,8 +2,10 @@
 
 import argparse
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from valve_friction_ros.history import KeptValve
+if TYPE_CHECKING:
+    from valve_friction_ros.history import KeptValve
 
 __all__ = ["add_valve_argument", "chosen_valves"]
 
@@ -19,14 +21,14 @@ def add_valve_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _is_called(valve: KeptValve, name: str) -> bool:
+def _is_called(valve: "KeptValve", name: str) -> bool:
     namespace = valve.name.rpartition("/")[0]
     return name == valve.tag or f"/{name.strip('/')}" in (valve.name, namespace)
 
 
 def chosen_valves(
-    valves: Sequence[KeptValve], names: Sequence[str] | None, option: str
-) -> tuple[KeptValve, ...]:
+    valves: "Sequence[KeptValve]", names: Sequence[str] | None, option: str
+) -> "tuple[KeptValve, ...]":
     """Return the valves of these names: tag, namespace or identifier; all without names.
 
     Raises ValueError, which names `option` and the valves, if there is no such valve.

@@ -4,25 +4,19 @@ import argparse
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from valve_friction_ros.commands.arguments.estimate_file import read_estimate
 from valve_friction_ros.commands.arguments.history_place import PLACE, history_place
-from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
-from valve_friction_ros.history import History
 from valve_friction_ros.identification import (
     CALIBRATION,
     TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
-from valve_friction_ros.planning import (
-    AIMS,
-    Conditions,
-    FrictionRange,
-    Limits,
-    known_friction,
-    unknown_friction,
-)
-from valve_friction_ros.records.valve_file import ValveFile
+from valve_friction_ros.planning import AIMS, Conditions, Limits
+
+if TYPE_CHECKING:
+    from valve_friction_ros.planning import FrictionRange
+    from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = [
     "add_planning_arguments",
@@ -155,6 +149,10 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
     """Return the values of the earlier result, if one is named."""
+    from valve_friction_ros.commands.arguments.estimate_file import read_estimate  # noqa: PLC0415
+    from valve_friction_ros.commands.arguments.kept_valves import chosen_valves  # noqa: PLC0415
+    from valve_friction_ros.history import History  # noqa: PLC0415 - slow to import
+
     if options.estimate is not None:
         return read_estimate(options.estimate)
     if options.history is None:
@@ -171,11 +169,16 @@ def _earlier(options: argparse.Namespace) -> Mapping[str, float]:
     return entry.values
 
 
-def frictions_from(options: argparse.Namespace, described: ValveFile) -> FrictionRange:
+def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "FrictionRange":
     """Return the valves to plan for.
 
     Raises ValueError if the spring is unknown, or a number is impossible.
     """
+    from valve_friction_ros.planning import (  # noqa: PLC0415 - slow to import
+        known_friction,
+        unknown_friction,
+    )
+
     found = dict(described.known)
     found |= {name: one for name, one in _earlier(options).items() if math.isfinite(one)}
     given = {name: getattr(options, name) for name in _KNOWN}
@@ -234,7 +237,7 @@ def planned_conditions(options: argparse.Namespace) -> Conditions:
     )
 
 
-def planned_settings(options: argparse.Namespace, described: ValveFile) -> IdentificationSettings:
+def planned_settings(options: argparse.Namespace, described: "ValveFile") -> IdentificationSettings:
     """Return how the test will be identified, with timing and calibration of the valve file."""
     timing = options.timing_uncertainty
     if timing is None:

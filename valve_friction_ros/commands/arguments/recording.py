@@ -1,20 +1,21 @@
 """Arguments of the commands that read a recording: the file, its valve, and what it leaves open."""
 
 import argparse
+import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from valve_friction_ros.model import Valve
 from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.recorded_valve import RecordedValve
-from valve_friction_ros.records.recordings import ReadingOptions, holds_force, read_recordings
-from valve_friction_ros.records.stores import on_disk
-from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
+
+if TYPE_CHECKING:
+    from valve_friction_ros.model import Valve
+    from valve_friction_ros.records.recorded_valve import RecordedValve
+    from valve_friction_ros.records.recordings import ReadingOptions
+    from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = [
     "add_reading_arguments",
@@ -53,14 +54,12 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what a file does not say itself."""
     stretch = parser.add_argument_group("part of the recording")
-    for name, help_text in (
-        ("begin", "leave out what lies before S seconds after the first sample"),
-        ("end", "leave out what lies after S seconds after the first sample"),
-        ("last", "only the last S seconds, as a node with `window` S takes them"),
+    for name, default, help_text in (
+        ("begin", -math.inf, "leave out what lies before S seconds after the first sample"),
+        ("end", math.inf, "leave out what lies after S seconds after the first sample"),
+        ("last", math.inf, "only the last S seconds, as a node with `window` S takes them"),
     ):
-        stretch.add_argument(
-            f"--{name}", type=float, default=getattr(Stretch(), name), metavar="S", help=help_text
-        )
+        stretch.add_argument(f"--{name}", type=float, default=default, metavar="S", help=help_text)
     bag = parser.add_argument_group(
         "bags", "topics are found by their types, unless these options name them"
     )
@@ -106,11 +105,14 @@ def given_columns(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def reading_options(
     arguments: argparse.Namespace, columns: Columns | None = None
-) -> ReadingOptions:
+) -> "ReadingOptions":
     """Build the options of reading from the parsed arguments, and from what the valve file says.
 
     Raises ValueError if they do not go together.
     """
+    from valve_friction_ros.records.recordings import ReadingOptions  # noqa: PLC0415 - slow
+    from valve_friction_ros.records.stretch import Stretch  # noqa: PLC0415
+
     return ReadingOptions(
         replace(columns or Columns(), **given_columns(arguments)),
         TopicChoice(
@@ -129,13 +131,18 @@ def _own_description(recording: Path) -> Path | None:
 
 def described(
     recording: Path, valve_file: Path | None, arguments: argparse.Namespace
-) -> tuple[ValveFile, ReadingOptions]:
+) -> "tuple[ValveFile, ReadingOptions]":
     """Read the valve file of a recording, or that in a bag; a recorded force needs none.
 
     Return the options of reading too.
 
     Raises ValueError if the valve file cannot be read, or is needed and not given.
     """
+    from valve_friction_ros.model import Valve  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.records.recordings import holds_force  # noqa: PLC0415
+    from valve_friction_ros.records.stores import on_disk  # noqa: PLC0415
+    from valve_friction_ros.records.valve_file import ValveFile, read_valve_file  # noqa: PLC0415
+
     valve_file = valve_file or _own_description(recording)
     if valve_file is not None:
         description = read_valve_file(valve_file, arguments.valve_name)
@@ -151,7 +158,7 @@ def described(
     return ValveFile(Valve(), MappingProxyType({})), reading
 
 
-def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
+def require_one(recorded: "Sequence[RecordedValve]", purpose: str) -> None:
     """Refuse several valves where `purpose` is for one.
 
     The ValueError names the valves and the option that chooses one.
@@ -161,12 +168,14 @@ def require_one(recorded: Sequence[RecordedValve], purpose: str) -> None:
         raise ValueError(f"{purpose} one valve: choose one of {names} by --valve-name")
 
 
-def read_one(path: Path, valve: Valve, reading: ReadingOptions) -> RecordedValve:
+def read_one(path: Path, valve: "Valve", reading: "ReadingOptions") -> "RecordedValve":
     """Read the one valve that a file holds, or that was chosen.
 
     Raises ValueError or RefusalError if it cannot be read: one line that names the file, the cause
     and what to do.
     """
+    from valve_friction_ros.records.recordings import read_recordings  # noqa: PLC0415 - slow
+
     recorded = read_recordings(path, valve, reading)
     require_one(recorded, f"{path} holds several, and this command takes")
     return recorded[0]

@@ -32,7 +32,7 @@ from valve_friction_ros.identification.preparation import compile_methods
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SquareWave
 from valve_friction_ros.streams import RecordBuffer
 
-__all__ = ["REFUSALS", "declare", "run"]
+__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (BenchError, RefusalError)
 
@@ -44,31 +44,6 @@ _START_TIMEOUT = 30.0
 _UNDER_WAY = 2.0
 """Signal let pass after a change, s: samples still under way belong to the time before it."""
 _FRICTION = ("mass", "viscous_friction", "coulomb_friction", "static_friction")
-
-
-def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments, and what the help says around them."""
-    parser.description = (
-        "Start a simulated valve and its monitor as processes, identify the friction, tighten the "
-        "packing while it runs, and identify again."
-    )
-    parser.epilog = (
-        "Exit code 0: all numbers are within tolerance, and the excess friction was diagnosed; 1: "
-        "not so; "
-        "2: the bench did not run, or the picture could not be written."
-    )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("valve_friction_demo.png"),
-        metavar="FILE.png",
-        help="picture of the result (%(default)s)",
-    )
-    parser.add_argument(
-        "--dashboard",
-        action="store_true",
-        help="show three valves, healthy, tightening and leaking, on the dashboard until Ctrl-C",
-    )
 
 
 def _record(client: BenchClient, console: Console, label: str) -> None:

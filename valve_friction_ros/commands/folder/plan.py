@@ -79,7 +79,7 @@ def make_plan(
                 description.valve,
                 reading,
                 method_name(options, description.settings),
-                identification_settings(options, description.known, description.settings),
+                identification_settings(options, description),
                 baselines.of(found.name),
             )
         except (ValueError, OSError) as error:

@@ -23,29 +23,13 @@ from valve_friction_ros.fleet import (
 )
 from valve_friction_ros.fleet.row import Cell
 
-__all__ = ["Rows", "ShareOut", "add_sharing_arguments", "finished", "workers"]
+__all__ = ["Rows", "ShareOut", "finished", "workers"]
 
 Rows = list[Mapping[str, Cell]]
 """The cells of all valves of a recording."""
 
 ShareOut = Callable[[Iterable[Job], Callable[[], bool]], Iterator[tuple[Job, Rows | DeadWorker]]]
 """Identifies recordings until it is to stop: yields each with its rows as it finishes."""
-
-
-def add_sharing_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare on how many processes, or on which cluster."""
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        metavar="N",
-        help=f"recordings identified at the same time, each by its own process ({usable_cores()})",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="instead of processes of this machine: the workers of a Dask cluster, which see DIR "
-        "under the same path; tcp://host:8786 or tls://host:8786 (the extra `cluster`)",
-    )
 
 
 @contextlib.contextmanager

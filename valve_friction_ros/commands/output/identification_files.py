@@ -12,37 +12,7 @@ from valve_friction_ros.identification import RefusalError, Result
 from valve_friction_ros.model import Recording
 from valve_friction_ros.records.recorded_valve import RecordedValve
 
-__all__ = ["IdentificationFiles", "add_file_arguments", "baseline_from", "identification_files"]
-
-
-def add_file_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the picture, the report, and the baseline that friction is compared with."""
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the identification")
-    parser.add_argument(
-        "--report",
-        type=Path,
-        metavar="FILE.html",
-        help="write a page for people, one file: diagnosis, parameters, pictures, settings",
-    )
-    parser.add_argument(
-        "--baseline-coulomb-friction",
-        type=float,
-        metavar="N",
-        help="F_c of this valve when it was healthy; its diagnosis compares with it",
-    )
-    parser.add_argument(
-        "--baseline-half-width",
-        type=float,
-        metavar="N",
-        help="half the width of the 95 %% interval of the baseline (0: it is exact)",
-    )
-    parser.add_argument(
-        "--baseline-recording",
-        type=Path,
-        metavar="FILE",
-        help="recording of this valve when it was healthy, read and identified as FILE is; its "
-        "friction is the baseline, and --report draws its signature",
-    )
+__all__ = ["IdentificationFiles", "baseline_from", "identification_files"]
 
 
 def baseline_from(options: argparse.Namespace) -> Baseline | None:

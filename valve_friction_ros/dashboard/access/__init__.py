@@ -3,11 +3,18 @@
 Only ``gate.py`` and ``guard.py`` import the libraries of the pages.
 """
 
-from valve_friction_ros.dashboard.access.access import Access
-from valve_friction_ros.dashboard.access.accounts import Account, Role, accounts_from
-from valve_friction_ros.dashboard.access.log_in import LogIn, Refusal
-from valve_friction_ros.dashboard.access.passwords import HashedPassword
-from valve_friction_ros.dashboard.access.sessions import Sessions
+from typing import TYPE_CHECKING
+
+from valve_friction_ros.on_demand import names_on_demand
+
+if TYPE_CHECKING:
+    from valve_friction_ros.dashboard.access.access import Access
+    from valve_friction_ros.dashboard.access.accounts import Account, Role, accounts_from
+    from valve_friction_ros.dashboard.access.log_in import LogIn, Refusal
+    from valve_friction_ros.dashboard.access.passwords import HashedPassword
+    from valve_friction_ros.dashboard.access.sessions import Sessions
+else:
+    __getattr__ = names_on_demand(__name__)
 
 __all__ = [
     "Access",

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
@@ -206,11 +205,14 @@ class _Smoothed(NamedTuple):
 
     def averaged(self, length: int) -> "_Smoothed":
         """Return its means over `length` steps about each; their noise is not taken as less."""
-        whole, even, odd = (
-            scipy.ndimage.uniform_filter1d(row, length, mode="nearest")
-            for row in (self.whole, *self.halves)
-        )
+        whole, even, odd = (_averaged(row, length) for row in (self.whole, *self.halves))
         return _Smoothed(whole, np.stack([even, odd]), self.variance, self.window)
+
+
+def _averaged(signal: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    """Average over `length` samples about each; the ends are held."""
+    padded = np.pad(signal, (length // 2, (length - 1) // 2), mode="edge")
+    return np.asarray(np.convolve(padded, np.full(length, 1.0 / length), "valid"))
 
 
 def _noise_on_grid(signal: StampedSignal, grid: NDArray[np.float64], noise: float) -> float:

@@ -65,6 +65,11 @@ noise, which may be at most this share of twice the mean speed."""
 _OF_STOPS = 3e-3
 """Share of the travel next to a stop where nothing is taken: the stop carries force there."""
 
+_SURE_MARGIN, _CLOSE = 2.0, 0.5
+"""Distance of an average from a rest or a reversal, in its own lengths: that at which it surely is
+of a sliding stem, and that at which it is taken where there is no other, for the sliding friction
+alone."""
+
 _LARGEST_LAG = 0.15
 _LAGS: _Array = np.linspace(-_LARGEST_LAG, _LARGEST_LAG, 301, dtype=np.float64)
 """Lags over which the posterior is integrated, s; beyond, the signals are not one record."""
@@ -92,12 +97,20 @@ _LEAST_MISFIT = 3e-4
 """Deviations beyond which an average is left out, and the share of the friction to which no force
 balance is trusted further."""
 
-_LEAST_SHARED = 0.01
-_LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.03, 0.05
-"""Least share of the information that both halves must have in common; least half width over the
-value of any number, as no force balance of a plant is the whole truth to more than that; the same
-without a spring, where the reversals that are left out hold more of the friction; and where no
-second averaging time confirms it."""
+_CHANCE, _OVERLAP, _LEAST_SHARED = 3.0, 3.0, 1e-9
+"""Deviations of chance that the share of the information must exceed which both halves have in
+common; averages that tell as much as one that does not overlap with others; a share of nothing."""
+
+_BINS = 12
+"""Bins of the friction curve in each direction."""
+
+_LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.04, 0.06
+"""Least half width over the value of any number, as no force balance of a plant is the whole truth
+to more than that; the same without a spring, where the reversals that are left out hold more of the
+friction; and where no second averaging time confirms it."""
+
+_CONFIRMED = 2
+"""Averaging times that confirm each other."""
 
 _NEARLY = 5.0
 _SCATTERS = 2.0
@@ -205,6 +218,7 @@ class _Averages(NamedTuple):
     taken: NDArray[np.intp]
     speed: float
     noise: Mapping[str, float]
+    is_sure: bool
 
     @property
     def mean_velocity(self) -> _Array:
@@ -255,7 +269,9 @@ def _averages(
     ):
         return None
     averaged = [averaged_twice(half, length) for half in force.halves(time)]
-    return _Averages(time, averaged, position, velocity, length, taken, speed, noise)
+    return _Averages(
+        time, averaged, position, velocity, length, taken, speed, noise, margin >= _SURE_MARGIN
+    )
 
 
 class _Solved(NamedTuple):
@@ -298,6 +314,8 @@ class FrictionCurve:
         Most probable time by which the stem is seen late, s.
     inflation : float
         Of the residual over what noise explains.
+    is_sure : bool
+        Whether each average is of a stem that surely slides all the time.
     fit, misfit : float
         Share of the force that the balance reproduces, and deviation of what it leaves, N.
     """
@@ -311,6 +329,7 @@ class FrictionCurve:
     stribeck_velocity: float
     lag: float
     inflation: float
+    is_sure: bool
     fit: float
     misfit: float
 
@@ -398,6 +417,7 @@ class _Regression:
         } | {"viscous_friction": max(float(np.sum(common) / np.sum(weight)), 0.0)}
         turns = np.count_nonzero(np.diff(side[weight > 0]))
         self.strokes = int(turns) + 1
+        self.independent = max(taken.size / _OVERLAP, 1.0)
         self.slopes = [np.gradient(half, averages.time) for half in averages.force]
 
     def falling(self, stribeck: float) -> _Array:
@@ -437,7 +457,8 @@ class _Regression:
         cross = even.T @ (odd * weight[:, None])
         own = 0.5 * (even.T @ (even * weight[:, None]) + odd.T @ (odd * weight[:, None]))
         right = 0.5 * (even.T @ (weight * forces[1]) + odd.T @ (weight * forces[0]))
-        information = _shared(own, 0.5 * (cross + cross.T)) / variance + np.diag(precision)
+        shared, right = _shared(own, 0.5 * (cross + cross.T), right, self.independent)
+        information = shared / variance + np.diag(precision)
         unit = 1.0 / np.sqrt(np.diag(information))
         covariance = np.linalg.pinv(
             information * np.outer(unit, unit), rcond=1e-13, hermitian=True
@@ -526,9 +547,10 @@ class _Regression:
                 for speed, one in near
                 if name in self.gradients(speed, one.scale.size)
             ]
-            numbers[name] = posterior.number(
-                gradient / solved.scale, float(np.std(others or [0.0]))
-            )
+            spread = math.hypot(float(np.std(others or [0.0])), self.definition(name, solved))
+            numbers[name] = posterior.number(gradient / solved.scale, spread)
+        known = sum(self.fixed.get(name, 0.0) * share for name, share in self.over_distance.items())
+        numbers[SLIDING] = replace(numbers[SLIDING], value=numbers[SLIDING].value + known)
         return FrictionCurve(
             self.averages.length * float(self.averages.time[1] - self.averages.time[0]),
             *self.bins(solved),
@@ -537,6 +559,7 @@ class _Regression:
             stribeck,
             self.later(solved),
             inflated,
+            self.averages.is_sure,
             1.0 - solved.misfit / float(np.std(self.averages.force[0][self.averages.taken])),
             solved.misfit,
         )
@@ -588,8 +611,9 @@ class _Regression:
         ]
         velocity, friction = averages.mean_velocity[taken], 0.5 * (rest[0] + rest[1])
         order = np.argsort(velocity)
-        parts = np.array_split(order[solved.weight[order] > 0], 24)
-        parts = [part for part in parts if part.size >= 2]
+        order = order[solved.weight[order] > 0]
+        ways = (order[velocity[order] < 0], order[velocity[order] > 0])
+        parts = [part for way in ways for part in np.array_split(way, _BINS) if part.size >= 2]
         return (
             np.array([float(np.mean(velocity[part])) for part in parts]),
             np.array([float(np.mean(friction[part])) for part in parts]),
@@ -601,13 +625,22 @@ def _at(signal: "_Array | float", taken: NDArray[np.intp]) -> "_Array | float":
     return signal[taken] if isinstance(signal, np.ndarray) else signal
 
 
-def _shared(own: _Array, cross: _Array) -> _Array:
-    """Return the information that both halves share, as much as is left of each direction."""
+def _shared(own: _Array, cross: _Array, right: _Array, independent: float) -> tuple[_Array, _Array]:
+    """Return the information that both halves share, and the right-hand side that goes with it.
+
+    Along each direction the halves agree in a share s of what each of them holds, which n averages
+    know to (1 − s)/√n. What chance may have made of noise says nothing: the prior is left alone.
+    """
     values, vectors = np.linalg.eigh(own)
     root = np.sqrt(np.maximum(values, 1e-13 * values[-1]))
     shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
     back = (vectors * root) @ turned
-    return np.asarray((back * np.clip(shares, _LEAST_SHARED, 1.0)) @ back.T)
+    shares = np.clip(shares, _LEAST_SHARED, 1.0)
+    chance = _CHANCE * (1.0 - shares) / math.sqrt(independent)
+    sure = np.maximum(1.0 - (chance / shares) ** 2, 0.0)
+    information = (back * np.maximum(sure * shares, _LEAST_SHARED)) @ back.T
+    said = sure * (turned.T @ ((vectors / root).T @ right))
+    return np.asarray(information), np.asarray(back @ said)
 
 
 class _Posterior:
@@ -750,8 +783,8 @@ def friction_curves(
     longer = [time for time in _AVERAGING_TIMES if time >= least] or [least, 2.0 * least]
     shorter = [time for time in _SHORT_AVERAGING_TIMES if time >= least]
     curves: list[FrictionCurve] = []
-    attempts = [(2.0, longer, _MOST_CURVES), (2.0, shorter, 1)]
-    attempts.append((0.5, [*reversed(shorter), *longer], 2))
+    attempts = [(_SURE_MARGIN, longer, _MOST_CURVES), (_SURE_MARGIN, shorter, 1)]
+    attempts.append((_CLOSE, [*reversed(shorter), *longer], 2))
     for margin, times, most in attempts:
         for time in times:
             if len(curves) < most:
@@ -772,10 +805,13 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
     result: dict[str, Estimated] = {}
     has_spring = any("spring_constant" in curve.numbers for curve in curves)
     least = _LEAST_HALF_WIDTH if has_spring else _LEAST_OF_MACHINE
-    if len(curves) < 2:
+    if len(curves) < _CONFIRMED or not curves[0].is_sure:
         least = _LEAST_ALONE
-    for name in {name for curve in curves for name in curve.numbers}:
-        known = [curve.numbers[name] for curve in curves if name in curve.numbers]
+    sure = [curve for curve in curves if curve.is_sure]
+    for name in {SLIDING, *(name for curve in sure for name in curve.numbers)}:
+        known = [curve.numbers[name] for curve in sure or curves if name in curve.numbers]
+        if not known:
+            continue
         best = min(known, key=lambda one: one.half_width / max(abs(one.value), 1e-300))
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
         half_width = math.hypot(
@@ -792,10 +828,10 @@ def checked_by_curve(
 ) -> dict[str, Estimated]:
     """Return the numbers of a simulation, checked and sharpened by those of the force balance.
 
-    Where the simulated stem follows the record to within noise, the sliding friction comes from the
-    one that knows it better, and from the simulation where both exclude each other: reversals and
-    rests tell it a lag from a viscous friction. Where the stem does not, spring, preload and
-    sliding friction come from the force balance, with an interval that reaches the simulation.
+    Where the simulated stem follows the record to within noise, spring, preload and sliding
+    friction come from the one that knows them better, and from the simulation where both exclude
+    each other: reversals and rests tell it a lag from a viscous friction. Where the stem does not,
+    they come from the force balance, with an interval that reaches the simulation.
     """
     result = dict(simulated)
     for name in (SLIDING, "spring_constant", "spring_preload"):
@@ -807,7 +843,7 @@ def checked_by_curve(
         if inflation > NOISE_LIKE:
             wider = theirs.half_width if agree else max(theirs.half_width, apart)
             result[name] = replace(theirs, half_width=wider)
-        elif name == SLIDING and agree and theirs.half_width < ours.half_width:
+        elif agree and theirs.half_width < ours.half_width:
             result[name] = theirs
     return result
 

@@ -36,7 +36,11 @@ from valve_friction_ros.identification.robust.verdicts import (
     fit_misfit,
     fit_verdicts,
 )
-from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
+from valve_friction_ros.identification.settings import (
+    REGRESSED,
+    TIMING_UNCERTAINTY,
+    IdentificationSettings,
+)
 from valve_friction_ros.identification.trust.calibration import BUDGET
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
@@ -65,7 +69,6 @@ __all__ = [
     "FRICTION_CURVE",
     "IMPERFECTIONS_FOUND",
     "METHOD",
-    "TIMING_UNCERTAINTY",
     "has_no_place_for",
     "identify_robust",
     "prior_of",
@@ -89,11 +92,10 @@ _MOVED_NOISE, _MOVED_SHARE = 8.0, 5e-3
 """Time, s, kept before and after the motion; samples whose median is where the stem stands; and
 the distance at which it has left there, in deviations of its noise and as a share of its range."""
 
-TIMING_UNCERTAINTY = 0.04
-"""Timing uncertainty without a setting, s.
+_CLEARLY = 1.0 / 3.0
+"""Half width over the sliding friction below which force and stem surely belong together.
 
-Chosen: stamps, transmitters and tubing of a plant without special care add up to some tens of
-milliseconds; 95 % are below 0.08 s."""
+Chosen: noise, drift or another valve's pressure gave 0.49 and more in 116 records."""
 
 
 def identify_robust(
@@ -134,13 +136,11 @@ def identify_robust(
     require_moving_stem(uniform, valve, settings)
     record = around_motion(stamped_record(recording))
     curves = friction_curves(record, valve, lag_prior_of(settings), known_of(settings))
-    numbers = curve_numbers(curves)
-    if not (SLIDING in numbers and numbers[SLIDING].value > 0):
-        require_related_signals(uniform)
     try:
+        require_related_signals(uniform)
         outcome = _of_simulation(record, valve, settings, curves)
     except RefusalError as refusal:
-        if not curves:
+        if not _dissipate(curves):
             raise
         outcome = _of_force_balance(curves, settings, str(refusal))
     published, beside = published_beside(uniform, valve, settings)
@@ -183,6 +183,12 @@ def identify_robust(
         stem=outcome.stem,
         sliding_speed=outcome.sliding_speed,
     )
+
+
+def _dissipate(curves: Sequence[FrictionCurve]) -> bool:
+    """Whether friction takes work from the force beyond doubt, as it does where both are one's."""
+    sliding = curve_numbers(curves).get(SLIDING)
+    return sliding is not None and sliding.half_width < _CLEARLY * sliding.value
 
 
 class _Outcome(NamedTuple):
@@ -242,7 +248,7 @@ def _of_force_balance(
 ) -> _Outcome:
     """Take the force balance of the sliding stem alone; `why` says why none was simulated."""
     numbers = curve_numbers(curves)
-    best = min(curves, key=lambda curve: curve.numbers[SLIDING].half_width)
+    best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
     return _Outcome(
         parameters=curve_verdicts(numbers, settings, best.stribeck_velocity),
@@ -354,7 +360,7 @@ def _balanced_model(
             spring_constant=values["spring_constant"],
             spring_preload=values["spring_preload"],
         )
-    except ValueError:
+    except (KeyError, ValueError):
         return None
 
 

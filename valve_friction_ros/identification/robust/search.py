@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from valve_friction_ros.identification.robust.broad_model import ABSENT, SWINGING, BroadModel
 from valve_friction_ros.identification.robust.coordinates import MAIN, Coordinates
 from valve_friction_ros.identification.robust.fitted_record import (
@@ -18,7 +16,6 @@ from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit,
 from valve_friction_ros.identification.robust.starts import (
     lagging,
     nearest,
-    overall_spring,
     sliding,
     split,
     splits,
@@ -28,7 +25,6 @@ __all__ = ["Prior", "posteriors_at", "search"]
 
 _SLIP_SHARES = (0.35, 0.55, 0.75, 0.9)
 _SLIPS = (0.15, 0.4, 0.8)
-_STRIBECK_SPEEDS = (0.4e-3, 1.2e-3, 4e-3)
 _LIMIT_VELOCITIES = (2e-4, 6e-4)
 _SUSPICIOUS = 2.0
 """Inflation of a residual beyond which other starts are tried: half of it is not noise."""
@@ -53,7 +49,6 @@ _IMPROBABLE = 25.0
 """Steps of a quarter of the timing uncertainty along that valley, steps of a fit there, and the
 rise of the sum of squares after which the valley is left."""
 
-_TRIED = 2
 _FEW_STEPS = 6
 _MORE_STEPS = 12
 
@@ -148,13 +143,6 @@ class _Search:
         """Whether another branch may be tried."""
         return self.work < _MOST_WORK
 
-    def from_moves(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
-        """Fit each move for itself, from the nearest starts; then the whole from the best."""
-        near = nearest(self.stepwise, starts)[:_TRIED]
-        apart = [self.fit(one, names, _MORE_STEPS, self.stepwise) for one in near]
-        best = min(apart, key=lambda one: one.objective)
-        return self.fit(best.at, names, _MORE_STEPS)
-
     def slip_starts(self, *places: Coordinates) -> list[Coordinates]:
         """Return starts whose friction falls as soon as the stem moves."""
         starts: list[Coordinates] = []
@@ -172,50 +160,6 @@ class _Search:
                         }
                     )
         return starts
-
-    def slipping(self, full: PosteriorFit) -> PosteriorFit:
-        """Fit friction that falls as soon as the stem moves."""
-        overall = {**self.base, **overall_spring(self.model.record)}
-        plain = {**self.base, **{name: full.at[name] for name in (*MAIN, *TIMING)}}
-        starts = self.slip_starts(self.base, plain, overall)
-        names = (*self.main, "slip_force")
-        near = nearest(self.model, starts)[:_TRIED]
-        trials = [self.fit(one, names, _MORE_STEPS) for one in near]
-        if self.may_go_on:
-            trials.append(self.from_moves(starts, names))
-        best = min(trials, key=lambda one: one.objective)
-        return self.full(best.at)
-
-    def falling(self, full: PosteriorFit) -> PosteriorFit:
-        """Fit friction that falls over a range of speeds."""
-        spring = {name: full.at[name] for name in ("spring_constant", "spring_preload")}
-        springs = (spring, overall_spring(self.model.record))
-        top = float(np.quantile(self.model.record.slow.speed, 0.98))
-        starts = [
-            {
-                **self.base,
-                **one,
-                **split(self.sliding, share),
-                "slip_force": slip * share * self.sliding.friction,
-                "stribeck_velocity": speed,
-            }
-            for speed in _STRIBECK_SPEEDS
-            if speed < max(top, 2 * _STRIBECK_SPEEDS[0])
-            for share in (0.5, 0.75)
-            for slip in (0.3, 1.0)
-            for one in springs
-        ]
-        fallen = full.at["slip_force"] + max(full.at["at_low_speed"], 0.1) * self.sliding.friction
-        plain = {name: full.at[name] for name in (*MAIN, "mass")}
-        starts += [
-            {**self.base, **plain, "slip_force": fallen, "stribeck_velocity": speed}
-            for speed in _STRIBECK_SPEEDS
-        ]
-        near = nearest(self.stepwise, starts)[:1]
-        names = (*self.main, "slip_force", "stribeck_velocity")
-        first = self.fit(near[0], names, _FEW_STEPS, self.stepwise)
-        others = tuple(name for name in self.all if name != "at_low_speed")
-        return self.full(first.at, (*others, "stribeck_velocity"))
 
     def curved(self, full: PosteriorFit) -> PosteriorFit:
         """Fit from the friction curves, each move for itself first."""
@@ -322,10 +266,7 @@ class _Search:
     def best(self) -> PosteriorFit:
         """Return the most probable of all fits."""
         best = self.full(self.start())
-        branches = [self.curved, self.stopping]
-        if "slip_force" in self.all:
-            branches = [self.curved, self.slipping, self.falling, self.stopping]
-        for branch in branches:
+        for branch in (self.curved, self.stopping):
             is_likely = best.inflation < _SUSPICIOUS and best.stages[-1].penalty < UNLIKELY
             if is_likely or not self.may_go_on:
                 break
@@ -341,8 +282,9 @@ def search(
     The sliding friction of a regression is split into F_c and F_v in several ways, without and
     with a slip. The way whose simulated stem is nearest starts a fit of the Karnopp model alone,
     that one with the likeliest lag, and the better of both a fit with all imperfections. Where the
-    residual is more than noise, a slip, a friction that falls with speed and a dead zone are tried
-    as well. At the end viscous friction is traded for lag, both ways along their common valley.
+    residual is more than noise, the fit begins once more at the friction curve, each move for
+    itself first, and then with a dead zone. At the end viscous friction is traded for lag, both
+    ways along their common valley.
 
     Raises
     ------

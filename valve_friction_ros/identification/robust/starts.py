@@ -11,7 +11,7 @@ from valve_friction_ros.identification.robust.coordinates import Coordinates
 from valve_friction_ros.identification.robust.fitted_record import FittedRecord
 from valve_friction_ros.identification.robust.imperfections import BOUNDS, TIMING
 
-__all__ = ["Sliding", "lagging", "nearest", "overall_spring", "sliding", "splits"]
+__all__ = ["Sliding", "lagging", "nearest", "sliding", "splits"]
 
 _SLIDING = 0.15
 """Share of the top speed above which a stem surely slides."""
@@ -65,17 +65,6 @@ def sliding(record: FittedRecord) -> Sliding:
             "their directions and their units"
         )
     return Sliding(max(dry + viscous * speed, 1.0), speed, spring, preload)
-
-
-def overall_spring(record: FittedRecord) -> dict[str, float]:
-    """Return the spring by which force and position have the same spread.
-
-    A hysteresis loop widens the force and the position alike, whatever the friction does.
-    """
-    position = record.slow.lowest + 0.5 * (record.slow.place + 1.0) * record.slow.range
-    spring = float(np.std(record.slow.force) / np.std(position))
-    preload = float(np.mean(record.slow.force) - spring * np.mean(position))
-    return {"spring_constant": spring, "spring_preload": preload}
 
 
 def split(sliding: Sliding, share: float) -> dict[str, float]:

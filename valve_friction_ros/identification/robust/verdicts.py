@@ -124,11 +124,10 @@ def curve_verdicts(
 ) -> dict[str, Parameter]:
     """Return every reported number of a force balance with its verdict.
 
-    Spring, preload and sliding friction may be identified. What the sliding friction is made of is
-    at most weak where a spring returns the stem, as no simulated stem confirms it.
+    Mass, spring, preload and sliding friction may be identified. What the sliding friction is made
+    of is at most weak, as no simulated stem confirms it.
     """
     verdicts = {}
-    split = "" if settings.fixed.get("spring_constant") == 0.0 else _UNCONFIRMED
     for name in (*UNITS, SLIDING):
         one = numbers.get(name)
         if name in settings.fixed and name != "limit_velocity":
@@ -139,7 +138,7 @@ def curve_verdicts(
             verdicts[name] = not_identifiable(name, "the record does not determine it")
         else:
             width = one.half_width
-            reason = split if name in _BY_SPEED else ""
+            reason = _UNCONFIRMED if name in _BY_SPEED else ""
             if not reason and width > WEAK_SHARE * abs(one.value):
                 reason = main_doubt(one.budget, width / max(abs(one.value), 1e-300))
             verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason)

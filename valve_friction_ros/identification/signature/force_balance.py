@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from valve_friction_ros.identification.identified_model import identified_model
+from valve_friction_ros.identification.model_to_simulate import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.identified_model import identified_model
+from valve_friction_ros.identification.model_to_simulate import identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.trust.excitation import (

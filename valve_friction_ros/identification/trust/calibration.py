@@ -9,7 +9,14 @@ from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import WEAK_SHARE, Parameter, Verdict
 from valve_friction_ros.model.drive import Drive
 
-__all__ = ["BUDGET", "COVERAGE", "calibrated", "calibration_share", "with_calibration"]
+__all__ = [
+    "BUDGET",
+    "COVERAGE",
+    "OF_FORCE",
+    "calibrated",
+    "calibration_share",
+    "with_calibration",
+]
 
 BUDGET = "uncertainty_budget"
 """Name of the evidence that splits the standard uncertainty of each parameter by its sources."""
@@ -26,6 +33,9 @@ _EXPONENTS: Mapping[str, tuple[int, int]] = {
     "limit_velocity": (0, 1),
 }
 """Powers of the scales of force and length that a parameter grows with; of others none."""
+
+OF_FORCE = frozenset(name for name, (force, _) in _EXPONENTS.items() if force)
+"""Parameters that grow with the scale of the forces."""
 
 COVERAGE = 2.0
 """Half width of a 95 % interval over the standard uncertainty (GUM, k = 2)."""

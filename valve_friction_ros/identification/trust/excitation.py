@@ -30,6 +30,11 @@ __all__ = [
 _LEAST_WINDOWS = 10
 """Derivative windows in a record. Chosen: fewer give no two strokes with a rest and a motion."""
 
+_SHORTEST_PERIOD = 1e-6
+_LONGEST_PERIOD = 3600.0
+"""Sample periods, s. Chosen: a hundred times beyond recorders of valves either way; with stranger
+ones the simulation would divide by zero, or take a million steps a sample."""
+
 _MOTION_OVER_NOISE = 10.0
 """Range of the position over its white noise.
 
@@ -107,7 +112,15 @@ def require_drive(recording: Recording, valve: Valve) -> None:
 
 
 def require_enough_samples(recording: Recording, window: int) -> None:
-    """Refuse a recording shorter than ten derivative windows of the published method."""
+    """Refuse a recording shorter than ten derivative windows of the published method.
+
+    A sample period that no recorder has is refused, too: its unit of time is wrong.
+    """
+    if not _SHORTEST_PERIOD <= recording.sample_period <= _LONGEST_PERIOD:
+        raise RefusalError(
+            f"a sample every {recording.sample_period:.3g} s is none of a valve: "
+            "check the unit of time"
+        )
     least = _LEAST_WINDOWS * window
     if len(recording) < least:
         raise LittleMotionError(

@@ -2,9 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from valve_friction_ros.identification.trust.rounding import percentage
-from valve_friction_ros.model.valve import Valve
+
+if TYPE_CHECKING:
+    from valve_friction_ros.model.valve import Valve
 
 __all__ = ["LEAST_FIT", "Misfit", "stem_distance"]
 
@@ -74,7 +77,7 @@ class Misfit:
         return self.systematic <= self.tolerated
 
 
-def stem_distance(rms: float, valve: Valve) -> str:
+def stem_distance(rms: float, valve: "Valve") -> str:
     """Write the distance of simulated and measured stem, in micrometres and percent of travel."""
     share = valve.share_of_travel(rms)
     of_travel = f", {percentage(share)} of travel" if math.isfinite(share) else ""

@@ -3,12 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 
 __all__ = ["FINEST_SLIDING", "SLIDING", "mean_over_distance", "mean_sliding_friction", "mean_speed"]
-
-SLIDING = "sliding_friction"
-"""Parameter name: ∫|F_friction|·|dx| / ∫|dx| over the record, N."""
 
 FINEST_SLIDING = 3e-3
 """Least half width of its interval, as a share of the value, however quiet the record is.

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
+from valve_friction_ros.identification.trust.student import student_quantile
 
 __all__ = [
     "CONFIDENCE",
@@ -156,7 +156,7 @@ def _unknown(free: int) -> Covariance:
 
 def half_width(standard_error: float, freedom: float) -> float:
     """Half the width of the interval that covers the true value with `CONFIDENCE`."""
-    return float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * standard_error
+    return student_quantile(0.5 + CONFIDENCE / 2, freedom) * standard_error
 
 
 def stroke_length(simulated: NDArray[np.float64]) -> int:

@@ -48,8 +48,8 @@ class Parameter:
     published : float
         Estimate of the published method, SI unit; nan where that method refused the record.
     uncalibrated : Parameter or None
-        The same before the uncertainty of area and sensor scales widened its interval; None where
-        there is no such uncertainty.
+        The same before the uncertainty of area and sensor scales widened its interval, and before
+        stated values put the scale in doubt; None where neither did.
     """
 
     name: str

@@ -5,10 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import stdtrit
 
-from valve_friction_ros.history.student import student_quantile
+from valve_friction_ros.identification.trust.student import student_quantile
 
 
-@given(st.integers(1, 2000), st.floats(0.6, 1 - 1e-7))
+@given(
+    st.one_of(st.integers(1, 2000), st.floats(1.0, 1e6)),
+    st.floats(0.6, 1 - 1e-7),
+)
 def test_it_is_that_of_scipy(freedom, probability):
     assert student_quantile(probability, freedom) == pytest.approx(
         stdtrit(freedom, probability), rel=1e-7

@@ -1,0 +1,301 @@
+"""Stated data of a valve, compared with what its record shows."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import valve_friction_ros as vf
+from valve_friction_ros.identification import Parameter, Verdict
+from valve_friction_ros.identification.trust.stated import Cause, Contradiction, contradictions
+from valve_friction_ros.identification.trust.verdict import fixed, not_identifiable, with_verdict
+
+AREA, SPRING, PRELOAD, ATMOSPHERE = 0.0445, 204941.0, 2000.0, 101325.0
+VALVE = vf.Valve(diaphragm_area=AREA, travel=28.575e-3)
+PACKING = vf.KarnoppParameters(1.6, 4865.0, 400.0, 450.0, SPRING, PRELOAD)
+STATED = {"spring_constant": SPRING, "spring_preload": PRELOAD}
+FORCES = (
+    "viscous_friction",
+    "coulomb_friction",
+    "static_friction",
+    "sliding_friction",
+    "spring_constant",
+    "spring_preload",
+)
+
+
+def recorded(packing=PACKING):
+    """A minute of a sine at 100 Hz with sensor noise; both stops stay out of reach."""
+    time = np.arange(6000) / 100
+    pressure = 1.1e5 + 5e4 * np.sin(2 * np.pi * time / 10)
+    stem = vf.simulate(VALVE, packing, pressure, sample_period=0.01)
+    return vf.SensorNoise(1e-5, 50.0, seed=1).applied_to(
+        vf.Recording(0.01, pressure, stem.position)
+    )
+
+
+@pytest.fixture(scope="module")
+def record():
+    return recorded()
+
+
+def found(record, stated, method="best", **typed):
+    settings = vf.IdentificationSettings(stated=stated)
+    return vf.identify(record, replace(VALVE, **typed), settings, method)
+
+
+def told(result):
+    return result.evidence.get("contradicted_data", {})
+
+
+def verdicts(result):
+    return {name: result.parameters[name].verdict for name in FORCES}
+
+
+class TestOfARecord:
+    @pytest.mark.parametrize("method", ["robust", "refined", "published"])
+    def test_right_data_change_nothing(self, record, method):
+        stated = {**STATED, "mass": 1.6}
+        result, without = found(record, stated, method), found(record, {}, method)
+        assert repr(result.parameters) == repr(without.parameters)  # nan equals itself there
+        assert result.warnings == without.warnings
+        assert told(result) == {}
+
+    @pytest.mark.parametrize("method", ["robust", "refined"])
+    def test_an_area_typed_twice_too_large(self, record, method):
+        result = found(record, {"spring_constant": SPRING}, method, diaphragm_area=2 * AREA)
+        (one,) = told(result).values()
+        assert (one.name, one.cause, one.stated) == ("spring_constant", Cause.AREA_SCALE, SPRING)
+        assert one.factor == pytest.approx(2.0, rel=1e-3)
+        assert one.found == result.parameters["spring_constant"].value
+        assert set(verdicts(result).values()) == {Verdict.WEAK}
+        assert result.warnings[0] == (
+            f"spring_constant is {one.found:.6g} N/m by the record and 204941 N/m as stated: check "
+            "diaphragm_area (doubled) and the unit of the pressure; 0.0445 m² in place of 0.089 m² "
+            "agrees with the stated spring"
+        )
+        reason = result.parameters["coulomb_friction"].reason
+        assert reason == (
+            "the scale of the forces is in doubt: the stated spring_constant contradicts the record"
+        )
+
+    def test_gauge_for_absolute_pressure(self, record):
+        """The finding's own: a gauge sensor with the reference of an absolute one."""
+        result = found(record, {"spring_preload": PRELOAD}, pressure_reference=ATMOSPHERE)
+        (one,) = told(result).values()
+        assert (one.name, one.cause) == ("spring_preload", Cause.ZERO_OF_PRESSURE)
+        assert one.pressure == pytest.approx(-ATMOSPHERE, rel=1e-2)
+        assert math.isnan(one.factor)
+        assert set(verdicts(result).values()) == {Verdict.WEAK}
+        assert result.warnings[0].endswith(
+            "gauge pressure is read as absolute pressure; set pressure_reference to 0 in place of "
+            "101325"
+        )
+
+    def test_absolute_for_gauge_pressure(self, record):
+        absolute = vf.Recording(0.01, record.drive + ATMOSPHERE, record.position)
+        result = found(absolute, {"spring_preload": PRELOAD})
+        assert result.warnings[0].endswith(
+            "absolute pressure is read as gauge pressure; set pressure_reference to 101325 in "
+            "place of 0"
+        )
+
+    def test_a_spring_that_agrees_confirms_the_scale(self, record):
+        """A wrong zero of the pressure then leaves the friction in newtons as it is."""
+        result = found(record, STATED, pressure_reference=ATMOSPHERE)
+        assert [*told(result)] == ["spring_preload"]
+        assert result.parameters["spring_preload"].verdict is Verdict.WEAK
+        for name in ("coulomb_friction", "spring_constant"):
+            assert result.parameters[name].verdict is Verdict.IDENTIFIED
+
+    def test_the_ratio_to_a_baseline_stays(self, record):
+        grown = recorded(replace(PACKING, coulomb_friction=600.0, static_friction=650.0))
+        ratios = []
+        for stated in ({}, {"spring_constant": SPRING}):
+            healthy, now = (found(one, stated, diaphragm_area=2 * AREA) for one in (record, grown))
+            ratios.append(vf.compare(now, vf.Baseline.of(healthy)))
+        without, doubted = ratios
+        assert now.parameters["coulomb_friction"].verdict is Verdict.WEAK
+        assert doubted.ratio == without.ratio
+        assert doubted.level == without.level
+
+    def test_it_is_said_once(self, record):
+        result = found(record, {"spring_constant": SPRING}, diaphragm_area=2 * AREA)
+        again = replace(result, evidence={**result.evidence, "averaged_samples": 1})
+        assert again.warnings == result.warnings
+        assert again.parameters == result.parameters
+
+    def test_as_text_and_json(self, record):
+        result = found(record, {"spring_constant": SPRING}, diaphragm_area=2 * AREA)
+        assert f"note: {result.warnings[0]}" in result.summary()
+        shown = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+        assert shown["settings"]["stated"] == {"spring_constant": SPRING}
+        one = shown["evidence"]["contradicted_data"]["spring_constant"]
+        assert (one["cause"], one["pressure"]) == ("area scale", None)
+
+
+def test_twenty_drawn_valves_contradict_nothing():
+    """Sizes of small to large actuators, all data right within the ±10 % of a catalogue."""
+    random = np.random.default_rng(26)
+    compared = 0
+    for _ in range(20):
+        area, travel = (
+            math.exp(random.uniform(*map(math.log, ends)))
+            for ends in ((0.004, 0.12), (0.008, 0.08))
+        )
+        low, width = random.uniform(2e4, 1e5), random.uniform(5e4, 2e5)
+        spring, friction = area * width / travel, area * width * random.uniform(0.01, 0.1)
+        mass = 40.0 * area
+        packing = vf.KarnoppParameters(
+            mass, 2.0 * math.sqrt(spring * mass), friction, 1.2 * friction, spring, area * low
+        )
+        valve = vf.Valve(diaphragm_area=area, travel=travel)
+        time = np.arange(4000) / 100
+        pressure = low + width * (0.5 + 0.4 * np.sin(2 * np.pi * time / random.uniform(8, 13)))
+        stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+        noise = vf.SensorNoise(3e-4 * travel, 3e-4 * width, seed=int(random.integers(2**31)))
+        record = noise.applied_to(vf.Recording(0.01, pressure, stem.position))
+        names = ("spring_constant", "spring_preload", "mass")
+        stated = {name: getattr(packing, name) * random.uniform(0.9, 1.1) for name in names}
+        result = vf.identify(record, valve, vf.IdentificationSettings(stated=stated))
+        assert told(result) == {}
+        spring_found = result.parameters["spring_constant"]
+        compared += spring_found.half_width < 0.1 * spring_found.value
+    assert compared == 20
+
+
+def estimates(spring=SPRING, preload=PRELOAD, mass=1.6, share=0.01):
+    values = {"spring_constant": spring, "spring_preload": preload, "mass": mass}
+    return {
+        name: Parameter(name, value, 0.5 * share * abs(value), share * abs(value), Verdict.WEAK)
+        for name, value in values.items()
+    }
+
+
+def causes(parameters, stated, valve=VALVE):
+    return {one.name: one.cause for one in contradictions(parameters, stated, valve, 0.028575)}
+
+
+class TestRules:
+    @pytest.mark.parametrize("factor", [0.86, 1.0, 1.149])
+    def test_up_to_15_percent_agree(self, factor):
+        assert causes(estimates(factor * SPRING), {"spring_constant": SPRING}) == {}
+
+    @pytest.mark.parametrize(
+        ("factor", "cause"),
+        [
+            (0.84, Cause.OTHER_SPRING),
+            (1.16, Cause.OTHER_SPRING),
+            (1.5, Cause.OTHER_SPRING),
+            (3.0, Cause.OTHER_SPRING),
+            *((1 / 2.1, Cause.AREA_SCALE), (1.9, Cause.AREA_SCALE), (4.0, Cause.AREA_SCALE)),
+            *((6.4516, Cause.AREA_SCALE), (1 / 10.0, Cause.AREA_SCALE)),
+            *((100.0, Cause.AREA_SCALE), (1e4, Cause.AREA_SCALE)),
+        ],
+    )
+    def test_the_factor_names_the_cause(self, factor, cause):
+        stated = {"spring_constant": SPRING}
+        (one,) = contradictions(estimates(factor * SPRING), stated, VALVE, 0.028575)
+        assert one == Contradiction(
+            "spring_constant", SPRING, factor * SPRING, cause, one.factor, one.pressure
+        )
+        assert one.factor == pytest.approx(factor, rel=1e-15)
+
+    def test_twice_the_interval_is_left(self):
+        """9 % either side: 1.2 times lies beyond 15 %, and within 18 % of the found value."""
+        stated = {"spring_constant": SPRING}
+        assert causes(estimates(1.2 * SPRING, share=0.09), stated) == {}
+        assert causes(estimates(1.2 * SPRING, share=0.08), stated) != {}
+
+    def test_a_wide_interval_is_not_compared(self):
+        assert causes(estimates(9 * SPRING, share=0.1), {"spring_constant": SPRING}) == {}
+
+    @pytest.mark.parametrize(
+        "one",
+        [
+            fixed("spring_constant", 1e6),
+            not_identifiable("spring_constant", "not seen"),
+            Parameter("spring_constant", 1e6, math.nan, math.nan, Verdict.WEAK),
+            with_verdict("spring_constant", -1e6, 1e3, 2e3),
+        ],
+        ids=["given", "withheld", "without an interval", "negative"],
+    )
+    def test_what_is_not_compared(self, one):
+        assert causes({"spring_constant": one}, {"spring_constant": SPRING}) == {}
+
+    def test_a_stated_absence_of_a_spring_is_not_compared(self):
+        assert causes(estimates(), {"spring_constant": 0.0}) == {}
+
+    @pytest.mark.parametrize("factor", [0.5, 1.4, 2.0])
+    def test_the_preload_tells_the_area_from_the_spring(self, factor):
+        """Preload 4000 N: 1.4 times is 1600 N more, beyond 15 % of the spring's 5856·1.4 N."""
+        stated = {"spring_constant": SPRING, "spring_preload": 4000.0}
+        both = estimates(factor * SPRING, factor * 4000.0)
+        assert causes(both, stated) == {"spring_constant": Cause.AREA_SCALE}
+        spring_only = estimates(factor * SPRING, 4000.0)
+        assert causes(spring_only, stated) == {"spring_constant": Cause.OTHER_SPRING}
+
+    def test_area_and_zero_of_pressure_at_once(self):
+        stated = {"spring_constant": SPRING, "spring_preload": PRELOAD}
+        valve = replace(VALVE, diaphragm_area=2 * AREA)
+        preload = 2 * (PRELOAD + ATMOSPHERE * AREA)
+        told = contradictions(estimates(2 * SPRING, preload), stated, valve, 0.028575)
+        assert [one.cause for one in told] == [Cause.AREA_SCALE, Cause.ZERO_OF_PRESSURE]
+        assert told[1].pressure == pytest.approx(ATMOSPHERE, rel=1e-12)
+
+    @pytest.mark.parametrize("air", [0.92, 1.08])
+    def test_the_air_of_another_altitude(self, air):
+        parameters = estimates(preload=PRELOAD + air * ATMOSPHERE * AREA)
+        assert causes(parameters, STATED) == {"spring_preload": Cause.ZERO_OF_PRESSURE}
+
+    @pytest.mark.parametrize("pressure", [5e4, 1.5e5, -5e4, -ATMOSPHERE])
+    def test_another_preload(self, pressure):
+        """Also a whole atmosphere too little, where the reference is that of gauge pressure."""
+        parameters = estimates(preload=PRELOAD + pressure * AREA)
+        (one,) = contradictions(parameters, STATED, VALVE, 0.028575)
+        assert one.cause is Cause.OTHER_PRELOAD
+        assert one.pressure == pytest.approx(pressure, rel=1e-12)
+
+    def test_a_small_difference_of_the_preload(self):
+        """15 % of the spring's 5856 N are 878 N."""
+        assert causes(estimates(preload=PRELOAD + 870.0), STATED) == {}
+        assert causes(estimates(preload=PRELOAD + 890.0), STATED) != {}
+
+    def test_a_force_has_no_zero_of_pressure(self):
+        parameters = estimates(preload=PRELOAD + ATMOSPHERE * AREA)
+        (one,) = contradictions(parameters, STATED, vf.Valve(travel=0.028575), 0.028575)
+        assert one.cause is Cause.OTHER_PRELOAD
+        assert math.isnan(one.pressure)
+
+    def test_a_mass(self):
+        assert causes(estimates(mass=1.8), {"mass": 1.6}) == {}
+        assert causes(estimates(mass=3.2), {"mass": 1.6}) == {"mass": Cause.OTHER_MASS}
+
+
+class TestSettings:
+    def test_they_are_frozen_numbers(self):
+        given = {"spring_constant": 2e5, "spring_preload": -100, "mass": 1.6}
+        settings = vf.IdentificationSettings(stated=given)
+        given["mass"] = 2.0
+        assert settings.stated == {"spring_constant": 2e5, "spring_preload": -100.0, "mass": 1.6}
+        with pytest.raises(TypeError):
+            settings.stated["mass"] = 2.0
+
+    @pytest.mark.parametrize(
+        ("stated", "words"),
+        [
+            (
+                {"coulomb_friction": 100.0},
+                "'coulomb_friction' is not a parameter that can be stated; choose from "
+                "spring_constant, spring_preload, mass",
+            ),
+            ({"mass": 0.0}, "mass must be"),
+            ({"spring_constant": -1.0}, "spring_constant must not be negative"),
+            ({"spring_preload": math.nan}, "spring_preload must be"),
+        ],
+    )
+    def test_impossible(self, stated, words):
+        with pytest.raises(ValueError, match=f"^{words}"):
+            vf.IdentificationSettings(stated=stated)

@@ -1,0 +1,477 @@
+"""What each sub-command takes, and what its help says around it.
+
+Nothing slow is imported here, so that a help text is there at once; what runs a sub-command is
+imported when its arguments have been read.
+"""
+
+import argparse
+import math
+from collections.abc import Callable, Mapping
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from types import MappingProxyType
+
+from valve_friction_ros.commands.arguments.actuator_questions import QUESTIONS
+from valve_friction_ros.commands.arguments.fail_on import add_fail_on
+from valve_friction_ros.commands.arguments.history_place import (
+    PLACE,
+    history_place,
+    usual_history,
+)
+from valve_friction_ros.commands.arguments.identification import add_identification_arguments
+from valve_friction_ros.commands.arguments.kept_valves import add_valve_argument
+from valve_friction_ros.commands.arguments.planning import add_planning_arguments
+from valve_friction_ros.commands.arguments.recording import (
+    add_reading_arguments,
+    add_recording_arguments,
+    add_table_arguments,
+)
+from valve_friction_ros.dashboard.access import Role
+from valve_friction_ros.history import URL_VARIABLE
+from valve_friction_ros.identification import LEAST_FIT
+from valve_friction_ros.records.data_folder import history_file
+from valve_friction_ros.records.spelling import nearest
+
+__all__ = ["DECLARATIONS", "EARLIEST", "LATEST", "PAGE", "SERVICES"]
+
+
+def _add_files(parser: argparse.ArgumentParser) -> None:
+    """Declare the picture, the report, and the baseline that friction is compared with."""
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the identification")
+    parser.add_argument(
+        "--report",
+        type=Path,
+        metavar="FILE.html",
+        help="write a page for people, one file: diagnosis, parameters, pictures, settings",
+    )
+    parser.add_argument(
+        "--baseline-coulomb-friction",
+        type=float,
+        metavar="N",
+        help="F_c of this valve when it was healthy; its diagnosis compares with it",
+    )
+    parser.add_argument(
+        "--baseline-half-width",
+        type=float,
+        metavar="N",
+        help="half the width of the 95 %% interval of the baseline (0: it is exact)",
+    )
+    parser.add_argument(
+        "--baseline-recording",
+        type=Path,
+        metavar="FILE",
+        help="recording of this valve when it was healthy, read and identified as FILE is; its "
+        "friction is the baseline, and --report draws its signature",
+    )
+
+
+def _add_sharing(parser: argparse.ArgumentParser) -> None:
+    """Declare on how many processes, or on which cluster."""
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="recordings identified at the same time, each by its own process (a core each)",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="instead of processes of this machine: the workers of a Dask cluster, which see DIR "
+        "under the same path; tcp://host:8786 or tls://host:8786 (the extra `cluster`)",
+    )
+
+
+def _identify(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
+    parser.epilog = (
+        "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
+        "were refused, or a file could not be written; 1: some valves were refused; 3: a diagnosis "
+        "reached --fail-on. Without a baseline no friction is compared: a line on stderr "
+        "says so, and the exit code stays 0 unless signals or model are in doubt."
+    )
+    add_recording_arguments(parser)
+    add_identification_arguments(parser)
+    _add_files(parser)
+    add_fail_on(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _identify_folder(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Identify all recordings in a folder and in the folders below it, on all cores or on the "
+        "workers of a Dask cluster. The "
+        "results are a table with a row for each valve, and a page that ranks the valves. After an "
+        "interruption the same command goes on."
+    )
+    parser.epilog = (
+        "Exit code 0: all were identified; 1: some were refused; 2: all recordings or an option "
+        "were refused; 3: a diagnosis reached --fail-on; 130, 143: interrupted."
+    )
+    parser.add_argument(
+        "folder",
+        metavar="DIR",
+        help="where the recordings are: a folder, or s3://bucket/folder and other stores by "
+        "fsspec's names (the extra `stores`)",
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        action="append",
+        required=True,
+        metavar="FILE",
+        help="FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page for people, valves ranked), "
+        "written at the end and when interrupted; may be repeated; until then the rows, in the "
+        "order in which they finished, are in FILE.sqlite",
+    )
+    parser.add_argument(
+        "--no-reports",
+        action="store_true",
+        help="with FILE.html: no page for each valve in the folder FILE_reports, which takes a "
+        "second and half a megabyte each",
+    )
+    parser.add_argument(
+        "--baselines",
+        type=Path,
+        metavar="FILE.csv",
+        help="friction of the healthy valves: an earlier output of this command for a folder with "
+        "the same names, or a table with the columns recording (empty: any), valve and "
+        "coulomb_friction_n; the diagnosis compares with it",
+    )
+    add_fail_on(parser)
+    parser.add_argument(
+        "--valve",
+        type=Path,
+        metavar="FILE.yaml",
+        help="valve of the recordings that have neither NAME.valve.yaml beside them nor valve.yaml "
+        "in their bag or beside them",
+    )
+    _add_sharing(parser)
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="identify again what was refused before"
+    )
+    parser.add_argument(
+        "--redo", action="store_true", help="replace rows that were made with other options"
+    )
+    add_identification_arguments(parser)
+    add_reading_arguments(parser)
+
+
+def _describe_valve(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Write the valve file of an actuator. What the options leave open is asked for; with --yes "
+        "only what must be known."
+    )
+    parser.epilog = "Exit code 2: an answer is missing or impossible, or the file was not written."
+    parser.add_argument("--output", type=Path, metavar="FILE.yaml", help="file (standard output)")
+    parser.add_argument("--replace", action="store_true", help="replace a file that is there")
+    parser.add_argument("--yes", action="store_true", help="take the defaults instead of asking")
+    for each in QUESTIONS:
+        parser.add_argument(
+            f"--{each.name.replace('_', '-')}",
+            dest=f"answer_{each.name}",
+            metavar="ANSWER",
+            help=f"{each.words}: {each.example}" + (f" ({each.default})" if each.default else ""),
+        )
+    add_table_arguments(parser, "how its tables are written; kept in the section `columns:`")
+
+
+def _plan_test(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Plan the stroke test with the smallest predicted intervals, by the Fisher information of "
+        "simulated tests, and write it as a file that `pressure_source` plays. No valve is moved."
+    )
+    parser.epilog = (
+        "All values are in SI units unless an option says otherwise. Exit code 2: a file or an "
+        "option was refused, no test within the limits tells the friction, or a file could not be "
+        "written."
+    )
+    parser.add_argument(
+        "--valve", type=Path, required=True, metavar="VALVE.yaml", help="the valve file"
+    )
+    parser.add_argument(
+        "--valve-name", metavar="NAME", help="one of several valves, of the valve file or --history"
+    )
+    add_planning_arguments(parser)
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("stroke_test.csv"),
+        metavar="FILE.csv",
+        help="corners of the pressure: time_s and pressure_pa (%(default)s)",
+    )
+    parser.add_argument("--replace", action="store_true", help="replace a file that is there")
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE.png", help="draw pressure and expected stem"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _percent(text: str) -> float:
+    """Read a percentage of at most 100; return the share."""
+    try:
+        share = float(text.rstrip(" %")) / 100
+    except ValueError:
+        share = math.nan
+    if not share <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no percentage, such as 90")
+    return share
+
+
+def _validate(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Simulate a recording with an identified model, and compare the stems. Validate on another "
+        "recording than the one that was identified."
+    )
+    parser.epilog = (
+        "All values are in SI units. Exit code 2: a file or the record was refused, or the picture "
+        "could not be written; 3: the fit is below --fail-below."
+    )
+    add_recording_arguments(parser)
+    parser.add_argument(
+        "--estimate",
+        type=Path,
+        required=True,
+        metavar="ESTIMATE.json",
+        help="the model, as `valve_friction identify --json` prints it",
+    )
+    parser.add_argument(
+        "--fail-below",
+        type=_percent,
+        metavar="PERCENT",
+        help="exit code 3 if the fit is below this; below "
+        f"{100 * LEAST_FIT:g} it is called poor in any case",
+    )
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both stems")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+SERVICES = {
+    "identify": "identify the buffered samples, and say the diagnosis",
+    "set_baseline": "take the last result as the friction of the healthy valve",
+    "restore_baseline": "undo the last set_baseline",
+    "save": "save the buffered samples as a bag",
+    "report": "write a page about the last result",
+    "clear": "empty the buffer",
+    "reset_usage": "count the usage anew, as the packing is renewed",
+}
+
+
+_ANSWER_TIMEOUT = 300.0
+
+
+def _service(name: str) -> str:
+    if name not in SERVICES:
+        raise argparse.ArgumentTypeError(
+            f"unknown service {name[:60]!r}; {nearest(name, SERVICES)}"
+        )
+    return name
+
+
+def _call(parser: argparse.ArgumentParser) -> None:
+    listed = "\n".join(f"  {name:<17} {text}" for name, text in SERVICES.items())
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.description = f"Call a service of a running identifier, and wait:\n{listed}"
+    parser.epilog = (
+        "Exit code 2: the identifier is not there, refused, or did not answer in time; "
+        "3: the diagnosis reached --fail-on."
+    )
+    parser.add_argument("valve", metavar="VALVE", help="its namespace, such as /fv_101")
+    parser.add_argument("service", type=_service, metavar="SERVICE", help="one of the above")
+    parser.add_argument(
+        "--timeout",
+        type=float,
+        default=_ANSWER_TIMEOUT,
+        metavar="S",
+        help="how long to wait for the answer (%(default)g)",
+    )
+    add_fail_on(parser)
+
+
+EARLIEST = datetime(1970, 1, 1, tzinfo=timezone.utc)
+
+
+LATEST = datetime(2262, 1, 1, tzinfo=timezone.utc)
+"""Whose nanoseconds still are a signed 64-bit number."""
+
+
+def _time(text: str) -> datetime:
+    """Read a date, or a date and a time, in UTC unless it says otherwise."""
+    try:
+        time = datetime.fromisoformat(text.replace("Z", "+00:00"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no time: write it as 2026-11-21 or 2026-11-21T18:30"
+        ) from None
+    time = time if time.tzinfo else time.replace(tzinfo=timezone.utc)
+    if not EARLIEST <= time <= LATEST:
+        raise argparse.ArgumentTypeError(f"{text!r} is not between 1970 and 2262")
+    return time
+
+
+def _until(text: str) -> datetime:
+    """Read the end of a stretch; a date stands for the whole day."""
+    is_date = "T" not in text and " " not in text
+    return min(_time(text) + timedelta(days=is_date), LATEST)
+
+
+def _history(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "List what the identifiers have kept: identifications, refusals, baselines, trend, "
+        "usage, answers to its command and recorded alarms."
+    )
+    parser.epilog = (
+        "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
+        "picture could not be written; 3: the latest diagnosis of a valve reached --fail-on."
+    )
+    parser.add_argument(
+        "file",
+        type=history_place,
+        nargs="?",
+        default=usual_history(),
+        metavar=PLACE,
+        help="the identifiers' history_file, or the server of their history_url "
+        f"(that of {URL_VARIABLE}, else {history_file()})",
+    )
+    add_valve_argument(parser)
+    parser.add_argument(
+        "--since", type=_time, default=EARLIEST, metavar="TIME", help="only from this time on"
+    )
+    parser.add_argument(
+        "--until",
+        type=_until,
+        default=LATEST,
+        metavar="TIME",
+        help="only before this time; a date stands for its whole day",
+    )
+    parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
+    parser.add_argument(
+        "--usage",
+        action="store_true",
+        help="in place of the identifications: distance, reversals, breakaways and times, by days",
+    )
+    add_fail_on(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _history_copy(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Copy a history: from a file to a PostgreSQL server, back, or between two of a kind. Only "
+        "what the other one lacks, or has otherwise, is written, so a copy that was interrupted is "
+        "called again. Then all rows are compared, by count and checksum."
+    )
+    parser.epilog = (
+        "The address of a server is postgresql://user@host/database; its password belongs into "
+        "~/.pgpass or PGPASSWORD. Exit code 1: rows differ, as the other one has kept them "
+        "otherwise; 2: one of the two cannot be read or written."
+    )
+    parser.add_argument(
+        "source", type=history_place, metavar="FROM", help=f"the history that is copied, {PLACE}"
+    )
+    parser.add_argument(
+        "target", type=history_place, metavar="TO", help="where to; it is made if it is missing"
+    )
+    add_valve_argument(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _dashboard_account(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Print an account of the dashboard: its name, role and the hash of a password, which is "
+        "asked for twice on a terminal, else read from the first line of the standard input."
+    )
+    parser.epilog = (
+        "`valve_friction dashboard-account anna --role operate >> accounts; chmod 600 accounts` "
+        "adds it to a file, which the dashboard reads when it starts. Exit code 2: the name or the "
+        "password was refused."
+    )
+    parser.add_argument("name", metavar="NAME", help="letters, digits and _.@+-")
+    parser.add_argument(
+        "--role",
+        choices=[role.value for role in Role],
+        default=Role.VIEW.value,
+        help="view: look only; operate: call services of identifiers too (%(default)s)",
+    )
+
+
+PAGE = "reproduction.html"
+
+
+def _reproduce_paper(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Run the paper's experiments, identification and validation on the simulated bench, and "
+        f"write {PAGE} and every figure, beside the paper's numbers. The last line counts the "
+        "matches, and names what does not match."
+    )
+    parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("reproduction"),
+        metavar="FOLDER",
+        help="where the report goes (%(default)s)",
+    )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of bench_low.yaml, bench_high.yaml and bench_graphite.yaml; by default the "
+        "package's own",
+    )
+    parser.add_argument(
+        "--position-noise-um",
+        type=float,
+        metavar="UM",
+        help="standard deviation of the stem sensor, µm, instead of the configured one",
+    )
+    parser.add_argument(
+        "--pressure-noise-pa",
+        type=float,
+        metavar="PA",
+        help="standard deviation of the pressure sensor, Pa, instead of the configured one",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of the noise (%(default)s)"
+    )
+
+
+def _demo(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Start a simulated valve and its monitor as processes, identify the friction, tighten the "
+        "packing while it runs, and identify again."
+    )
+    parser.epilog = (
+        "Exit code 0: all numbers are within tolerance, and the excess friction was diagnosed; 1: "
+        "not so; "
+        "2: the bench did not run, or the picture could not be written."
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("valve_friction_demo.png"),
+        metavar="FILE.png",
+        help="picture of the result (%(default)s)",
+    )
+    parser.add_argument(
+        "--dashboard",
+        action="store_true",
+        help="show three valves, healthy, tightening and leaking, on the dashboard until Ctrl-C",
+    )
+
+
+DECLARATIONS: Mapping[str, Callable[[argparse.ArgumentParser], None]] = MappingProxyType(
+    {
+        "identify": _identify,
+        "identify-folder": _identify_folder,
+        "describe-valve": _describe_valve,
+        "plan-test": _plan_test,
+        "validate": _validate,
+        "call": _call,
+        "history": _history,
+        "history copy": _history_copy,
+        "dashboard-account": _dashboard_account,
+        "reproduce-paper": _reproduce_paper,
+        "demo": _demo,
+    }
+)
+"""What declares the arguments of each sub-command, by its name."""

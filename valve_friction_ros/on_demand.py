@@ -1,0 +1,59 @@
+"""Public names of a package that are loaded on their first use.
+
+A package that re-exports what its modules hold would otherwise load all of them with the first:
+``valve_friction identify --help`` needs the names of the settings, and not a compiler.
+"""
+
+import ast
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+__all__ = ["names_on_demand"]
+
+
+def _homes(source: Path) -> dict[str, str]:
+    """Return the module of each name that a package imports for the type checker alone."""
+    tree = ast.parse(source.read_bytes())
+    return {
+        alias.name: str(statement.module)
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for statement in block.body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
+    }
+
+
+def names_on_demand(package: str) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` (PEP 562) of a package.
+
+    Its names are those that its ``__init__.py`` imports in ``if TYPE_CHECKING:``, so there is one
+    list of them, which the type checker reads too. None may be called like a module of the
+    package: whoever imported that module first would get it in place of the name.
+
+    Parameters
+    ----------
+    package : str
+        Its ``__name__``.
+
+    Returns
+    -------
+    callable
+        Takes a name and loads it; raises AttributeError for one that is not in the list.
+    """
+    homes: dict[str, str] = {}
+
+    def load(name: str) -> Any:
+        module = sys.modules[package]
+        if not homes:
+            homes.update(_homes(Path(str(module.__file__))))
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        found = getattr(import_module(homes[name]), name)
+        setattr(module, name, found)
+        return found
+
+    return load
