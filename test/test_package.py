@@ -85,7 +85,7 @@ LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
 }
 BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
 DATABASE_LIBRARIES = {"psycopg"}
-DASHBOARD_LIBRARIES = {"fastapi", "nicegui", "starlette"}  # NiceGUI is built on the others
+DASHBOARD_LIBRARIES = {"fastapi", "nicegui", "starlette", "uvicorn"}  # NiceGUI is built on them
 
 CLUSTER_LIBRARIES = {"dask", "distributed"}
 

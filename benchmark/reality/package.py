@@ -177,11 +177,8 @@ def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     friction, findings = diagnose_valve(answer.native, baseline)
     found = {}
     if friction.status_signal is not StatusSignal.GOOD or friction.level is not Level.OK:
-        side = "other"
-        if friction.status_signal is not StatusSignal.CHECK_FUNCTION:
-            is_low = friction.status_signal is StatusSignal.OUT_OF_SPECIFICATION
-            side = "low" if is_low else "high"
-        found[side] = _words(friction)
+        side = friction.state.side
+        found["other" if side is None else side.value] = _words(friction)
     for finding in findings:
         if finding.status_signal is not StatusSignal.GOOD or finding.level is not Level.OK:
             found["other"] = _words(finding)
