@@ -243,7 +243,10 @@ class TestCsvOfOtherPrograms:
     def test_units_delimiter_and_decimal_comma(
         self, answer, csv_answer, tmp_path, columns_of, quick_record
     ):
-        """A spreadsheet's: kPa, mm, ms, semicolons and decimal commas; the same digits."""
+        """A spreadsheet's: kPa, mm, ms, semicolons and decimal commas; the same digits.
+
+        Units round the last bit, and an average at the edge of an outlier may fall either way.
+        """
         columns = columns_of(quick_record)
         scaled = zip(
             (f"{1e3 * value:.0f}" for value in columns["time_s"]),
@@ -262,8 +265,8 @@ class TestCsvOfOtherPrograms:
             *("--pressure-column", "p [kPa]", "--pressure-unit", "kPa"),
         )
         for name, entry in csv_answer["parameters"].items():
-            value = found["parameters"][name]["value"]
-            assert value == pytest.approx(entry["value"], rel=1e-9, nan_ok=True), name
+            value, edge = found["parameters"][name]["value"], 1e-3 * (entry["half_width"] or 0.0)
+            assert value == pytest.approx(entry["value"], rel=1e-9, abs=edge, nan_ok=True), name
 
     def test_an_unknown_unit(self, call, bag):
         code, _, err = call(bag, "--pressure-unit", "torr")

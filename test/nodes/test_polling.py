@@ -141,7 +141,7 @@ def test_one_signal_waits_for_the_other_that_has_more_than_its_share(bench):
     """Otherwise the stem would run ahead of its pressure."""
     node, _, client = bench
     arrived = []
-    inputs = ValveInputs(node, "stem", arrived.append)
+    inputs = ValveInputs(node, "stem", arrived.append, lambda *_: None)
     pressure = client.node.create_publisher(FluidPressure, "actuator_pressure", stream())
     stem = client.node.create_publisher(JointState, "stem_state", stream())
     for publisher in pressure, stem:

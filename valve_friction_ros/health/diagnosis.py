@@ -54,9 +54,6 @@ class FrictionLimits:
         Ratio from which friction is excessive.
     low_ratio : float
         Ratio below which friction has collapsed: the packing is worn and may leak.
-    low_warn_ratio : float
-        Ratio below which a valve is worth maintenance, as above `warn_ratio`: its inverse, but
-        halfway to `low_ratio` by logarithm where that is nearer to 1.
 
     Raises
     ------
@@ -85,7 +82,11 @@ class FrictionLimits:
 
     @property
     def low_warn_ratio(self) -> float:
-        """Ratio below which a valve is worth maintenance; between `low_ratio` and 1."""
+        """Ratio below which a valve is worth maintenance, between `low_ratio` and 1.
+
+        The inverse of `warn_ratio`, but halfway to `low_ratio` by logarithm where that is nearer
+        to 1.
+        """
         return max(1 / self.warn_ratio, math.sqrt(self.low_ratio))
 
 

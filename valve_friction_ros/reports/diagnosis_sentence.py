@@ -32,6 +32,7 @@ _ALARMS = {
     FrictionState.FALLEN: _Finding(
         "the friction has fallen, {ratio}", "look at the packing at the next stop: it may be worn"
     ),
+    FrictionState.UNCLEAR: _Finding("the friction cannot be told from before, {ratio}", _AGAIN),
     FrictionState.PERHAPS_GROWN: _Finding("the friction has perhaps grown, {ratio}", _AGAIN),
     FrictionState.PERHAPS_FALLEN: _Finding("the friction has perhaps fallen, {ratio}", _AGAIN),
 }

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from valve_friction_ros.identification import (
     CALIBRATION,
@@ -13,7 +13,9 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
 )
 from valve_friction_ros.records.spelling import nearest, resembling
-from valve_friction_ros.records.valve_file import ValveFile
+
+if TYPE_CHECKING:
+    from valve_friction_ros.records.valve_file import ValveFile
 
 __all__ = ["add_identification_arguments", "identification_settings", "method_name"]
 
@@ -103,7 +105,7 @@ def method_name(options: argparse.Namespace, described: Mapping[str, Any]) -> st
 
 
 def identification_settings(
-    options: argparse.Namespace, described: ValveFile
+    options: argparse.Namespace, described: "ValveFile"
 ) -> IdentificationSettings:
     """Build the settings from the parsed arguments, and from what the valve file names.
 

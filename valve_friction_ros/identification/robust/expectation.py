@@ -4,8 +4,15 @@ import math
 from collections.abc import Mapping
 
 from valve_friction_ros.identification.robust.fitted_record import fitted_record
-from valve_friction_ros.identification.robust.intervals import estimated
+from valve_friction_ros.identification.robust.friction_curve import (
+    checked_by_curve,
+    curve_numbers,
+    friction_curves,
+)
+from valve_friction_ros.identification.robust.intervals import Estimated, estimated
 from valve_friction_ros.identification.robust.method import (
+    known_of,
+    lag_prior_of,
     prior_of,
     require_record,
     stamped_record,
@@ -68,12 +75,16 @@ def expected_half_widths(
         "mass": parameters.mass,
         "start_position": start,
     }
-    record = fitted_record(stamped_record(recording), valve)
-    fits = posteriors_at(record, prior_of(settings), truth, with_competitors)
+    stamped = stamped_record(recording)
+    fits = posteriors_at(fitted_record(stamped, valve), prior_of(settings), truth, with_competitors)
+    numbers: Mapping[str, Estimated] = estimated(fits)
+    if with_competitors:
+        curves = friction_curves(stamped, valve, lag_prior_of(settings), known_of(settings))
+        numbers = checked_by_curve(numbers, curve_numbers(curves), fits[0].inflation)
     return {
         name: math.hypot(
             one.half_width,
             COVERAGE * calibration_share(name, settings, valve.driven_by) * one.value,
         )
-        for name, one in estimated(fits).items()
+        for name, one in numbers.items()
     }

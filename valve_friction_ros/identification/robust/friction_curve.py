@@ -112,6 +112,9 @@ friction; and where no second averaging time confirms it."""
 _CONFIRMED = 2
 """Averaging times that confirm each other."""
 
+_AS_WELL = 1.15
+"""Half width over the least, both by their values, up to which an averaging time knows as well."""
+
 _NEARLY = 5.0
 _SCATTERS = 2.0
 """Half width over the least up to which an averaging time counts, and deviations of their scatter
@@ -797,7 +800,7 @@ def friction_curves(
 
 
 def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
-    """Return each number from the averaging time that knows it best.
+    """Return each number from the shortest averaging time that knows it as well as any.
 
     The interval holds the scatter of those averaging times that know it nearly as well, and at
     least `_LEAST_HALF_WIDTH`.
@@ -812,7 +815,10 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
         known = [curve.numbers[name] for curve in sure or curves if name in curve.numbers]
         if not known:
             continue
-        best = min(known, key=lambda one: one.half_width / max(abs(one.value), 1e-300))
+        least_width = min(one.half_width / max(abs(one.value), 1e-300) for one in known)
+        best = next(
+            one for one in known if one.half_width <= _AS_WELL * least_width * abs(one.value)
+        )
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
         half_width = math.hypot(
             best.half_width,

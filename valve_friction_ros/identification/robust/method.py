@@ -213,7 +213,10 @@ def _of_simulation(
 ) -> _Outcome:
     """Simulate the stem with all imperfections; the friction curve is its start and its check."""
     if settings.fixed.get("spring_constant") == 0.0:
-        raise RefusalError("without a spring no force returns a simulated stem")
+        raise RefusalError(
+            "the forces with and against the motion do not surely differ: check that both signals "
+            "belong to this machine, and that it has no spring"
+        )
     fits = search(fitted_record(record, valve), prior_of(settings), curves)
     fit, numbers = fits[0], estimated(fits)
     misfit = fit_misfit(fit, numbers)
