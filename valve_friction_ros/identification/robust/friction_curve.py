@@ -16,6 +16,7 @@ here as well as any other. The numbers are also where the simulation starts (`se
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -750,6 +751,9 @@ class _Posterior:
             inside = _normal((mean + middle - values) / record)
             inside = inside - _normal((mean - middle - values) / record)
             low, high = (middle, high) if weights @ inside < CONFIDENCE else (low, middle)
+        # The tails of the lag are heavier than normal ones: its share is that of the interval.
+        whole = high / NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
+        timing = min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
         return Estimated(mean, high, Budget(record, timing, {}))
 
 
