@@ -113,8 +113,8 @@ friction; and where no second averaging time confirms it."""
 _CONFIRMED = 2
 """Averaging times that confirm each other."""
 
-_AS_WELL = 1.15
-"""Half width over the least, both by their values, up to which an averaging time knows as well."""
+_AS_WELL = 1.1
+"""Half width over the least up to which an averaging time knows a number as well."""
 
 _NEARLY = 5.0
 _SCATTERS = 2.0
@@ -819,10 +819,8 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
         known = [curve.numbers[name] for curve in sure or curves if name in curve.numbers]
         if not known:
             continue
-        least_width = min(one.half_width / max(abs(one.value), 1e-300) for one in known)
-        best = next(
-            one for one in known if one.half_width <= _AS_WELL * least_width * abs(one.value)
-        )
+        least_width = min(one.half_width for one in known)
+        best = next(one for one in known if one.half_width <= _AS_WELL * least_width)
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
         half_width = math.hypot(
             best.half_width,
