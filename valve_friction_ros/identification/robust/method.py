@@ -136,13 +136,14 @@ def identify_robust(
     require_moving_stem(uniform, valve, settings)
     record = around_motion(stamped_record(recording))
     curves = friction_curves(record, valve, lag_prior_of(settings), known_of(settings))
+    balanced = curve_numbers(curves)
     try:
         require_related_signals(uniform)
-        outcome = _of_simulation(record, valve, settings, curves)
+        outcome = _of_simulation(record, valve, settings, curves, balanced)
     except RefusalError as refusal:
-        if not _dissipate(curves):
+        if not _dissipates(balanced):
             raise
-        outcome = _of_force_balance(curves, settings, str(refusal))
+        outcome = _of_force_balance(curves, balanced, settings, str(refusal))
     published, beside = published_beside(uniform, valve, settings)
     misfit = outcome.misfit
     return Result(
@@ -185,9 +186,9 @@ def identify_robust(
     )
 
 
-def _dissipate(curves: Sequence[FrictionCurve]) -> bool:
-    """Whether friction takes work from the force beyond doubt, as it does where both are one's."""
-    sliding = curve_numbers(curves).get(SLIDING)
+def _dissipates(balanced: Mapping[str, Estimated]) -> bool:
+    """Whether friction surely takes work from the force, as it does where both are of one valve."""
+    sliding = balanced.get(SLIDING)
     return sliding is not None and sliding.half_width < _CLEARLY * sliding.value
 
 
@@ -210,6 +211,7 @@ def _of_simulation(
     valve: Valve,
     settings: IdentificationSettings,
     curves: Sequence[FrictionCurve],
+    balanced: Mapping[str, Estimated],
 ) -> _Outcome:
     """Simulate the stem with all imperfections; the friction curve is its start and its check."""
     if settings.fixed.get("spring_constant") == 0.0:
@@ -227,7 +229,7 @@ def _of_simulation(
             "valve, and their units, and that its stem reaches both ends of the travel; if the "
             "packing was changed during the record, clear the buffer and record again"
         )
-    numbers = checked_by_curve(numbers, curve_numbers(curves), fit.inflation)
+    numbers = checked_by_curve(numbers, balanced, fit.inflation)
     misfit = fit_misfit(fit, numbers)
     return _Outcome(
         parameters=fit_verdicts(fit, numbers, settings, misfit),
@@ -247,10 +249,12 @@ def _of_simulation(
 
 
 def _of_force_balance(
-    curves: Sequence[FrictionCurve], settings: IdentificationSettings, why: str
+    curves: Sequence[FrictionCurve],
+    numbers: Mapping[str, Estimated],
+    settings: IdentificationSettings,
+    why: str,
 ) -> _Outcome:
     """Take the force balance of the sliding stem alone; `why` says why none was simulated."""
-    numbers = curve_numbers(curves)
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
     return _Outcome(
