@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 OLDEST ?= .venv-oldest
+KILTED ?= .venv-kilted
 PYTEST_ARGS ?=
 ACCURACY_ARGS ?=
 BENCH_ARGS ?=
@@ -47,8 +48,8 @@ test: lint  ## lint, then all tests; PYTEST_ARGS="-k name" for some
 
 # What depends most on the libraries, in a few minutes: figures, reports, tables, kernels, statistics.
 OLDEST_TESTS = $(addprefix test/,test_package.py test_front_door.py model/test_simulation.py \
-    model/test_value_types.py signals identification/test_refusals.py records health/test_diagnosis.py \
-    history/test_file.py history/test_trend.py figures reports nodes/test_start.py)
+    model/test_value_types.py test_signals.py identification/test_refusals.py records health/test_diagnosis.py \
+    history/test_file.py history/test_trend.py figures test_reports.py nodes/test_start.py)
 
 .PHONY: test-oldest
 test-oldest:  ## some tests with the oldest versions that the package declares
@@ -60,6 +61,14 @@ test-oldest:  ## some tests with the oldest versions that the package declares
 	3) ;; \
 	*) exit $$code ;; \
 	esac
+
+# ROS of a sourced installation would come before that of the wheels.
+.PHONY: test-kilted
+test-kilted:  ## the tests of the nodes with ROS 2 Kilted, from wheels
+	@$(python-found)
+	@"$(PYTHON)" requirements/install.py "$(KILTED)" kilted
+	@env -u PYTHONPATH -u AMENT_PREFIX_PATH -u LD_LIBRARY_PATH RMW_IMPLEMENTATION=rmw_fastrtps_cpp \
+	    "$(KILTED)/bin/python" -m pytest -n 2 --dist loadfile $(PYTEST_ARGS) test/nodes
 
 .PHONY: lint
 lint: venv-test  ## ruff and mypy
@@ -161,9 +170,14 @@ mutants: venv-test  ## what the tests would not notice, in hours; MUTANTS_ARGS="
 	@"$(VENV)/bin/python" -m pip install -q --no-deps --disable-pip-version-check -r requirements/mutants.txt
 	@"$(VENV)/bin/python" -m benchmark.mutants $(MUTANTS_ARGS)
 
+.PHONY: release-check
+release-check:  ## what a release still lacks: what only the owner knows, notices, versions
+	@$(python-found)
+	@"$(PYTHON)" .ci/release.py
+
 .PHONY: clean
 clean:  ## remove what make and colcon made
-	@rm -rf -- "$(VENV)" "$(OLDEST)" build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	@rm -rf -- "$(VENV)" "$(OLDEST)" "$(KILTED)" build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
 	@find . -name __pycache__ -type d -prune -exec rm -rf -- {} +
 
 define python-found

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Run the benchmark: python -m benchmark.accuracy, or `make accuracy`."""
 
 import argparse
@@ -6,7 +15,7 @@ import multiprocessing
 import os
 import statistics
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +24,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmark.alarms import GROWTH, AlarmCounts, Diagnosed, diagnosed
-from benchmark.bounds import Bound, alarm_bounds, by_case, case_bounds, coverage_bounds
+from benchmark.bounds import (
+    Bound,
+    alarm_bounds,
+    by_case,
+    case_bounds,
+    coverage_bounds,
+    default_bounds,
+)
 from benchmark.cases import CONDITIONS, EXCITATIONS, NOISES, Case
 from benchmark.emps import emps_bounds
 from benchmark.information import Information, information
@@ -23,10 +39,11 @@ from benchmark.picture import draw
 from benchmark.plants import PLANTS
 from benchmark.report import bounds_table, cases_table, information_table
 from benchmark.runs import Outcome, run
+from valve_friction_ros.identification import DEFAULT_METHOD
 
 __all__ = ["Results", "main"]
 
-PARTS = ("cases", "coverage", "alarms", "emps", "information", "timing")
+PARTS = ("cases", "coverage", "default", "alarms", "emps", "information", "timing")
 
 _FIRST_COVERAGE_SEED = 10_000
 _FIRST_GROWN_SEED = 20_000
@@ -40,8 +57,9 @@ class Results:
 
     Attributes
     ----------
-    outcomes, coverage : list of Outcome
-        Of the cases, and of the records for the coverage.
+    outcomes, coverage, default : list of Outcome
+        Of the cases and of the records for the coverage, by the method ``bench``, and of the main
+        noise at 1 kHz by the default method.
     alarms : AlarmCounts or None
         Of the two valves that are watched.
     bounds : list of Bound
@@ -49,11 +67,12 @@ class Results:
     information : list of Information
         What any method could reach on the square wave.
     seconds : dict of str to float
-        Median time of one identification, by valve.
+        Median time of one identification, by valve and method.
     """
 
     outcomes: list[Outcome] = field(default_factory=list)
     coverage: list[Outcome] = field(default_factory=list)
+    default: list[Outcome] = field(default_factory=list)
     alarms: AlarmCounts | None = None
     bounds: list[Bound] = field(default_factory=list)
     information: list[Information] = field(default_factory=list)
@@ -96,6 +115,10 @@ def _run(task: tuple[Case, int]) -> Outcome:
     return run(*task)
 
 
+def _run_default(task: tuple[Case, int]) -> Outcome:
+    return run(*task, DEFAULT_METHOD)
+
+
 def _diagnosed(task: tuple[float, int]) -> Diagnosed:
     return diagnosed(*task)
 
@@ -116,13 +139,14 @@ def _in_parallel(
         return list(progress.track(results, total=len(tasks), description=title))
 
 
-def _timing(results: Results) -> None:
+def _timing(results: Results, _: argparse.Namespace, __: Console) -> None:
     for name in PLANTS:
         case = Case(name, "square", "28.6 µm", "1 kHz")
         case.record(0)
-        results.seconds[name] = statistics.median(
-            run(case, seed).seconds for seed in range(_TIMED_RUNS)
-        )
+        for method in (DEFAULT_METHOD, "bench"):
+            results.seconds[f"{name}, {method}"] = statistics.median(
+                run(case, seed, method).seconds for seed in range(_TIMED_RUNS)
+            )
 
 
 def _coverage(results: Results, options: argparse.Namespace, console: Console) -> None:
@@ -135,6 +159,19 @@ def _coverage(results: Results, options: argparse.Namespace, console: Console) -
     results.coverage = _in_parallel("coverage", _run, tasks, options.jobs, console)
     for group in by_case(results.coverage).values():
         results.bounds += coverage_bounds(group)
+
+
+def _default(results: Results, options: argparse.Namespace, console: Console) -> None:
+    tasks = [
+        (Case(plant, excitation, "28.6 µm", "1 kHz"), seed)
+        for plant in PLANTS
+        for excitation in EXCITATIONS
+        for seed in range(options.other_seeds)
+    ]
+    results.default = _in_parallel("default", _run_default, tasks, options.jobs, console)
+    for group in by_case(results.default).values():
+        results.bounds += default_bounds(group)
+    console.print(cases_table(results.default))
 
 
 def _alarms(results: Results, options: argparse.Namespace, console: Console) -> None:
@@ -156,7 +193,7 @@ def _cases(results: Results, options: argparse.Namespace, console: Console) -> N
     console.print(cases_table(results.outcomes))
 
 
-def _emps(results: Results, console: Console) -> None:
+def _emps(results: Results, _: argparse.Namespace, console: Console) -> None:
     bounds = emps_bounds()
     if bounds is None:
         console.print("EMPS is skipped: its record is not here")
@@ -164,7 +201,7 @@ def _emps(results: Results, console: Console) -> None:
         results.bounds += bounds
 
 
-def _information(results: Results, console: Console) -> None:
+def _information(results: Results, _: argparse.Namespace, console: Console) -> None:
     results.information = [
         information(name, noise)
         for name, plant in PLANTS.items()
@@ -175,6 +212,17 @@ def _information(results: Results, console: Console) -> None:
     console.print(information_table(results.information))
 
 
+_RUNS: Mapping[str, Callable[[Results, argparse.Namespace, Console], None]] = {
+    "timing": _timing,
+    "emps": _emps,
+    "coverage": _coverage,
+    "default": _default,
+    "alarms": _alarms,
+    "cases": _cases,
+    "information": _information,
+}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the parts that were asked for; return 1 if a bound is missed."""
     parser = _parser()
@@ -183,18 +231,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"{options.output}: there is no folder {options.output.parent}")
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
     results = Results()
-    if "timing" in options.parts:
-        _timing(results)
-    if "emps" in options.parts:
-        _emps(results, console)
-    if "coverage" in options.parts:
-        _coverage(results, options, console)
-    if "alarms" in options.parts:
-        _alarms(results, options, console)
-    if "cases" in options.parts:
-        _cases(results, options, console)
-    if "information" in options.parts:
-        _information(results, console)
+    for name, part in _RUNS.items():
+        if name in options.parts:
+            part(results, options, console)
     console.print(bounds_table(results.bounds))
     for name, seconds in results.seconds.items():
         console.print(f"{name}: {seconds:.2f} s to identify 52 s at 1 kHz")

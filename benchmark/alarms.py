@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """False alarms of an unchanged valve, and alarms of one whose friction has grown."""
 
 from dataclasses import dataclass, replace
@@ -8,7 +17,7 @@ import numpy as np
 from benchmark.cases import EXCITATIONS, NOISES, PERIOD
 from benchmark.runs import SETTINGS
 from valve_friction_ros.health import Baseline, FrictionLimits, diagnose
-from valve_friction_ros.identification import RefusalError, Result, identify_refined
+from valve_friction_ros.identification import RefusalError, Result, identify_bench
 from valve_friction_ros.model import (
     BENCH_VALVE,
     LOW_FRICTION,
@@ -73,7 +82,7 @@ def _clean(growth: float) -> Recording:
 def _identified(growth: float, seed: int) -> Result:
     noise = NOISES["28.6 µm"]
     recording = SensorNoise(noise.position, noise.pressure, seed).applied_to(_clean(growth))
-    return identify_refined(recording, BENCH_VALVE, SETTINGS)
+    return identify_bench(recording, BENCH_VALVE, SETTINGS)
 
 
 @cache

@@ -1,7 +1,16 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What an identification must reach, checked on the outcomes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +28,7 @@ __all__ = [
     "case_bounds",
     "coverage_bounds",
     "coverage_of",
+    "default_bounds",
     "worst",
 ]
 
@@ -156,6 +166,12 @@ _CHECKS: tuple[Callable[[Sequence[Outcome]], list[Bound]], ...] = (
 def case_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
     """Check every bound that applies to the outcomes of one case."""
     return [bound for check in _CHECKS for bound in check(outcomes)]
+
+
+def default_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:
+    """Check that the default method claims nothing wrong in one case."""
+    bounds = [bound for check in (_claims, _mass) for bound in check(outcomes)]
+    return [replace(bound, what=f"default method, {bound.what}") for bound in bounds]
 
 
 def coverage_bounds(outcomes: Sequence[Outcome]) -> list[Bound]:

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What the tests would not notice: python -m benchmark.mutants, or `make mutants`.
 
 mutmut changes an operator, a number, an argument or a word of a function at a time, and the tests
@@ -63,7 +72,7 @@ _IDENTIFICATION = "valve_friction_ros/identification"
 _TESTS = "test/identification"
 ROOMS = {
     "trust": Room(f"{_IDENTIFICATION}/trust", (f"{_TESTS}/trust", f"{_TESTS}/test_refusals.py")),
-    "refined": Room(f"{_IDENTIFICATION}/refined", (f"{_TESTS}/refined",)),
+    "engine": Room(f"{_IDENTIFICATION}/engine", (f"{_TESTS}/engine",)),
     "published": Room(f"{_IDENTIFICATION}/published", (f"{_TESTS}/published",)),
     "health": Room("valve_friction_ros/health", ("test/health",)),
 }

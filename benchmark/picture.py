@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The results as one picture."""
 
 from collections.abc import Sequence
@@ -40,7 +49,7 @@ def draw(
     """Draw errors, coverage, friction forces and alarms; what was not run stays empty."""
     figure = Figure(figsize=(14, 11), layout="constrained")
     (errors, covered), (forces, ratios) = figure.subplots(2, 2)
-    figure.suptitle("Accuracy of the refined estimate on simulated valves")
+    figure.suptitle("Accuracy of the method bench on simulated valves")
     _draw_errors(errors, [*outcomes, *coverage])
     _draw_coverage(covered, coverage)
     _draw_forces(forces, outcomes)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One identification of a benchmark record, and how far it is from the truth."""
 
 import math
@@ -15,7 +24,7 @@ from valve_friction_ros.identification import (
     RefusalError,
     Result,
     Verdict,
-    identify_refined,
+    identify,
 )
 
 __all__ = ["SETTINGS", "TRUE_NAMES", "Outcome", "force_error", "run", "run_speeds", "wrong_claims"]
@@ -92,12 +101,12 @@ def force_error(case: Case, result: Result) -> float:
     return float(np.max(np.abs(found / truth - 1)))
 
 
-def run(case: Case, seed: int) -> Outcome:
+def run(case: Case, seed: int, method: str = "bench") -> Outcome:
     """Identify one record and compare with the truth."""
     recording = case.record(seed)
     begin = time.perf_counter()
     try:
-        result = identify_refined(recording, case.plant.valve, SETTINGS)
+        result = identify(recording, case.plant.valve, SETTINGS, method)
     except RefusalError as refusal:
         return Outcome(case, seed, time.perf_counter() - begin, str(refusal))
     seconds = time.perf_counter() - begin

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The identifiers of a plant's valves, each in its valve's namespace, in one process.
 
 ``ros2 launch valve_friction_ros monitor.launch.py valves:=fv_101,fv_102
@@ -22,6 +31,8 @@ from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
+
+from valve_friction_ros.records.spelling import nearest, resembling
 
 PACKAGE = "valve_friction_ros"
 NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
@@ -87,12 +98,21 @@ def plant_valves(text: str, usual: dict[str, str]) -> list[PlantValve]:
     return valves
 
 
+def require_known(context: LaunchContext) -> None:
+    """Refuse a name that resembles one of the arguments; others may be of a file that includes."""
+    names = {*ARGUMENTS, "config"}
+    for name in set(context.launch_configurations) - names:
+        if close := resembling(name, names):
+            raise ValueError(f"there is no argument '{name}': {nearest(name, close)}")
+
+
 def identifiers(context: LaunchContext) -> list[Node]:
     """Make one process for all valves, or one for each."""
 
     def argument(name: str) -> str:
         return str(LaunchConfiguration(name).perform(context))
 
+    require_known(context)
     if not Path(argument("config")).is_file():
         raise ValueError(f"config '{argument('config')}' is no file: give that of a parameter file")
     valves = plant_valves(argument("valves"), {name: argument(name) for name in INPUTS})
@@ -107,7 +127,7 @@ def identifiers(context: LaunchContext) -> list[Node]:
         "respawn_delay": 2.0,
         "ros_arguments": ["--log-level", argument("log_level")],
     }
-    if argument("one_process").lower() in {"true", "1"}:
+    if argument("one_process").lower() == "true":
         remappings = [rule for one in valves for rule in one.remappings(f"{one.namespace}/")]
         names = {"valves": [valve.namespace for valve in valves]}
         parameters = [argument("config"), shared | names]
@@ -129,39 +149,61 @@ def identifiers(context: LaunchContext) -> list[Node]:
 
 def dashboard(context: LaunchContext) -> list[Node]:
     """Make the dashboard, if it is asked for."""
-    if str(LaunchConfiguration("dashboard").perform(context)).lower() not in {"true", "1"}:
+    if str(LaunchConfiguration("dashboard").perform(context)).lower() != "true":
         return []
+    time = {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}
     return [
         Node(
             package=PACKAGE,
             executable="dashboard",
             name="dashboard",
             output="screen",
-            parameters=[LaunchConfiguration("config")],
+            parameters=[LaunchConfiguration("config"), time],
             respawn=LaunchConfiguration("respawn"),
             respawn_delay=2.0,
+            ros_arguments=["--log-level", LaunchConfiguration("log_level")],
         )
     ]
 
 
+YES_OR_NO = ["true", "false", "True", "False"]
 ARGUMENTS = {
     "valves": (
         "fv_101",
         "Namespaces of the valves, separated by commas, or a YAML file of valves.",
+        None,
     ),
     "pressure_topic": (
         "actuator_pressure",
         "Actuator pressure, sensor_msgs/FluidPressure; may contain {valve}.",
+        None,
     ),
-    "stem_topic": ("stem_state", "Stem position, sensor_msgs/JointState; may contain {valve}."),
-    "one_process": ("true", "false to start a process for each valve."),
-    "dashboard": ("false", "true to start the dashboard too, on http://127.0.0.1:8080/."),
-    "respawn": ("true", "false to leave a process ended that has ended by itself."),
-    "log_level": ("info", "debug, info, warn, error or fatal."),
-    "use_sim_time": ("false", "true to take time from /clock, as when a bag is played."),
+    "stem_topic": (
+        "stem_state",
+        "Stem position, sensor_msgs/JointState; may contain {valve}.",
+        None,
+    ),
+    "one_process": ("true", "false to start a process for each valve.", YES_OR_NO),
+    "dashboard": (
+        "false",
+        "true to start the dashboard too, on http://127.0.0.1:8080/.",
+        YES_OR_NO,
+    ),
+    "respawn": (
+        "true",
+        "false to leave a process ended that has ended by itself.",
+        YES_OR_NO,
+    ),
+    "log_level": ("info", "Of the nodes.", ["debug", "info", "warn", "error", "fatal"]),
+    "use_sim_time": (
+        "false",
+        "true to take time from /clock, as when a bag is played.",
+        YES_OR_NO,
+    ),
     "reliability": (
         "auto",
-        "Of the inputs: auto takes what is published; reliable; best_effort.",
+        "Of the inputs: auto takes what is published.",
+        ["auto", "reliable", "best_effort"],
     ),
 }
 
@@ -172,8 +214,10 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *(
-                DeclareLaunchArgument(name, default_value=default, description=description)
-                for name, (default, description) in ARGUMENTS.items()
+                DeclareLaunchArgument(
+                    name, default_value=default, description=description, choices=choices
+                )
+                for name, (default, description, choices) in ARGUMENTS.items()
             ),
             DeclareLaunchArgument(
                 "config",

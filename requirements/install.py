@@ -4,7 +4,8 @@ run.txt goes in, ros.txt where no ROS 2 Jazzy is sourced, the package itself as 
 with the word `dashboard` dashboard.txt too, with `database` also database.txt, with `cluster` also
 cluster.txt, with `test` also
 test.txt, with `docs` also docs.txt;
-with `oldest` oldest.txt in place of them all.
+with `oldest` oldest.txt in place of them all; with `kilted` what `test` adds, and ros-kilted.txt in
+place of ros.txt.
 It is made anew when Python, ROS or one of the files changed. Where the versions of oldest.txt
 cannot be had, it ends with one line and the exit code 3.
 This file must parse on any Python, to say that it is too old.
@@ -28,6 +29,7 @@ ORDER = [
     ("docs", "builds the documentation"),
 ]
 ADDED = {ORDER[last][0]: ORDER[: last + 1] for last in range(len(ORDER))}
+ADDED["kilted"] = ADDED["test"]
 """The files that a word adds to run.txt, in this order, and what they hold."""
 
 
@@ -106,9 +108,11 @@ def main(path, word):
     check_python(oldest, word == "docs")
     import venv
 
-    system = sourced_ros()
+    kilted = word == "kilted"  # from wheels in any case
+    system = not kilted and sourced_ros()
     libraries = "requirements/oldest.txt" if oldest else "requirements/run.txt"
-    wheels = [libraries] + ([] if system else ["requirements/ros.txt"])
+    ros = "requirements/ros-kilted.txt" if kilted else "requirements/ros.txt"
+    wheels = [libraries] + ([] if system else [ros])
     sources = ["requirements/install.py", "requirements/build.txt", "setup.py", "setup.cfg"]
     found = read(path, "made-by-make")
     made = repr((sys.version, os.path.realpath(sys.executable), os.path.abspath(path), PROJECT))
@@ -136,7 +140,8 @@ def main(path, word):
 
     if not found.startswith(made) or not os.path.exists(os.path.join(path, "bin", "python")):
         refuse_strange(path)
-        where = "the sourced ROS 2 Jazzy" if system else "ROS 2 Jazzy from wheels"
+        distribution = "ROS 2 Kilted" if kilted else "ROS 2 Jazzy"
+        where = "the sourced " + distribution if system else distribution + " from wheels"
         print("Making %s with %s: once, about a minute ..." % (path, where), flush=True)
         venv.create(path, system_site_packages=system, clear=True, symlinks=True)
         finish("")

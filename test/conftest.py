@@ -1,6 +1,17 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Shared by all tests: the bench valves and their simulated records."""
 
 import signal
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -33,6 +44,19 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # The same examples in every run, and no deadline: the first call of a kernel compiles it.
 settings.register_profile("project", deadline=None, derandomize=True)
 settings.load_profile("project")
+
+
+def pytest_configure(config):
+    """Compile the kernels once, before processes that test side by side begin.
+
+    Of kernels that two processes compile at once, each keeps its own, which may differ from the
+    cached one in the last digit.
+    """
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        words = (
+            "from valve_friction_ros.identification.preparation import compile_methods as c; c()"
+        )
+        subprocess.run([sys.executable, "-c", words], check=True, cwd=config.rootpath)
 
 
 def pytest_collection_modifyitems(items):

@@ -1,9 +1,20 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Signs and units of doc/conventions.md, with expectations derived from the force balance itself.
 
 m·ẍ = S_a·(P − P_ref) − k·x − F_0 − friction, on a valve with round numbers.
 """
 
+import ast
 import re
+from collections import defaultdict
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -11,14 +22,15 @@ import numpy as np
 import pytest
 
 import valve_friction_ros as vf
-from valve_friction_ros.health import Baseline, diagnose
-from valve_friction_ros.history import MONTH, FrictionPoint, trend_of
+from valve_friction_ros.health import Baseline, DatedNumber, diagnose
+from valve_friction_ros.history import MONTH, trend_of
 from valve_friction_ros.identification import (
+    IMPERFECTIONS_FOUND,
     PARAMETER_UNITS,
     RefusalError,
     Result,
     StemComparison,
-    identify_refined,
+    identify_plant,
     step_test,
     validate,
 )
@@ -111,12 +123,12 @@ def stem():
 
 
 class TestRecords:
-    def test_clock_offset_is_positive_where_the_stem_is_stamped_late(self, stem):
+    def test_lag_is_positive_where_the_stem_is_stamped_late(self, stem):
         """A late stamp t + 0.1 s: the position of sample n appears at sample n + 10."""
         late = Recording(PERIOD, PRESSURE[10:], stem[:-10])
         early = Recording(PERIOD, PRESSURE[:-10], stem[10:])
         offsets = [
-            identify_refined(record, VALVE).parameters["clock_offset"].value
+            identify_plant(record, VALVE).evidence[IMPERFECTIONS_FOUND]["lag"]["value"]
             for record in (late, early)
         ]
         assert offsets[0] == pytest.approx(0.1, abs=0.03)
@@ -152,7 +164,7 @@ class TestHealth:
 
     def test_drift_is_positive_where_friction_grows(self):
         day = 86_400 * 10**9
-        points = [FrictionPoint(k * day, 100.0 + k, 0.5) for k in range(10)]
+        points = [DatedNumber(k * day, 100.0 + k, 0.5) for k in range(10)]
         trend = trend_of(points)
         assert trend is not None
         assert trend.drift == pytest.approx(MONTH / day, rel=0.01)
@@ -200,3 +212,26 @@ def test_no_two_modules_of_tests_have_one_name():
     """Two of one name in different rooms cannot be collected in one run."""
     names = [path.name for path in TESTS.rglob("*.py") if path.name != "conftest.py"]
     assert sorted(names) == sorted(set(names))
+
+
+def public_types():
+    """Names of the public classes of the package, with the files that declare each."""
+    sources = Path(vf.__file__).resolve().parent
+    found = defaultdict(list)
+    for path in sorted(sources.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found[node.name].append(path.relative_to(sources).as_posix())
+    return found
+
+
+def test_a_public_type_has_a_name_of_its_own():
+    types = public_types()
+    assert len(types) > 100
+    assert not {name: paths for name, paths in types.items() if len(paths) > 1}
+
+
+def test_the_types_of_the_page_are_there():
+    named = re.findall(r"^\| `([A-Z]\w+)` \|", PAGE, re.MULTILINE)
+    assert len(named) > 8
+    assert not set(named) - set(public_types())

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The pages of the reference hold what the code declares."""
 
 import ast
@@ -5,13 +14,14 @@ import re
 from pathlib import Path
 
 import pytest
+from browser import axe_violations, chromium
 from extension.command_options import command_as_markdown, command_names, parser_of
 from extension.diagnostic_keys import declared_keys, entries, is_explained
 from extension.history_schema import schema, schema_as_markdown
 from extension.meanings import meanings, require_all
-from extension.node_parameters import NODES, parameter_entries, parameters_as_markdown
+from extension.node_parameters import parameter_entries, parameters_as_markdown
 
-from valve_friction_ros.nodes.identifier.parameters import PARAMETERS
+from valve_friction_ros.settings import NODES
 
 PROJECT = Path(__file__).resolve().parents[1]
 REFERENCE = PROJECT / "doc" / "reference"
@@ -26,12 +36,12 @@ def test_a_page_shows_the_parameters_of_each_node(node):
     assert re.search(rf"^```{{node-parameters}} {node}\b", shown("nodes"), re.MULTILINE)
     for entry in parameter_entries(node):
         assert entry.meaning.count(" ") >= 2, entry.term
-        assert entry.facts.startswith(("`", "empty")), entry.term
+        assert entry.facts.startswith(("`", "empty", "not stated")), entry.term
 
 
 def test_each_parameter_has_its_description_unit_and_default():
     text = parameters_as_markdown("identifier")
-    for spec in PARAMETERS:
+    for spec in NODES["identifier"]:
         assert re.search(r" \[[^\]]+\]", spec.description), f"{spec.name} has no unit"
         assert f"`{spec.name}`\n: " in text
     assert (
@@ -39,6 +49,8 @@ def test_each_parameter_has_its_description_unit_and_default():
         "  Length of the record that is kept and identified.\n"
     ) in text
     assert "`joint`\n: `stem`; at start only\n" in text
+    assert "`travel`\n: not stated: `0.028575` m is assumed\n" in text
+    assert "`mass`\n: not stated; 1e-06 to 1e+06\n" in text
     assert "`valve_tag`\n: empty; at start only\n" in text
 
 
@@ -88,4 +100,28 @@ def test_a_name_without_a_meaning_is_refused():
         require_all("keys", ["old", "new"], ["old"])
     with pytest.raises(ValueError, match=r"no code has: \['gone'\]"):
         require_all("keys", ["old"], ["old", "gone"])
-    assert meanings()["graph"].keys() == {"dashboard", "identifier", "simulator", "pressure_source"}
+    assert meanings()["graph"].keys() == {
+        "dashboard",
+        "identifier",
+        "simulator",
+        "pressure_source",
+        "stroke_player",
+    }
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("name", ["index", "how_to/dashboards", "reference/diagnostics"])
+def test_axe_finds_nothing_wrong_with_a_built_page(name, width):
+    """A page of each kind, as the last `make docs` has built it with the style of now."""
+    built = PROJECT / "build" / "docs"
+    styles = [Path("_static") / file for file in ("site.css", "site.js")]
+    if not all(
+        (built / one).is_file()
+        and (built / one).read_bytes() == (PROJECT / "doc" / one).read_bytes()
+        for one in styles
+    ):
+        pytest.skip("the documentation is not built with the style of now: run `make docs`")
+    with chromium() as browser:
+        page = browser.new_page(viewport={"width": width, "height": 900})
+        page.goto((built / f"{name}.html").as_uri())
+        assert axe_violations(page) == []

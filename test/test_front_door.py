@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The names that `import valve_friction_ros` offers: loaded on first use, with examples."""
 
 import doctest
@@ -72,6 +81,19 @@ class TestReadRecording:
         found = vf.read_recording(pandas.DataFrame(columns))
         np.testing.assert_array_equal(found.position, loose_record.position)
 
+    @pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
+    def test_from_a_frame_with_an_index_of_dates(self, columns, loose_record, zone):
+        pandas = pytest.importorskip("pandas")
+        frame = pandas.DataFrame(columns)
+        times = pandas.to_datetime((1e9 * frame.pop("time_s")).round().astype("int64"), utc=True)
+        index = pandas.DatetimeIndex(times)
+        frame.index = index.tz_localize(None) if zone is None else index.tz_convert(zone)
+        dated = [frame, {"time_s": frame.index, **{name: frame[name] for name in frame}}]
+        dated.append(frame.reset_index(names="time_s"))
+        for found in map(vf.read_recording, dated):
+            assert found.start_time == 100.0
+            np.testing.assert_array_equal(found.position, loose_record.position)
+
     def test_from_a_file(self, columns, loose_record, tmp_path):
         path = tmp_path / "record.csv"
         rows = np.column_stack([*columns.values()])
@@ -103,7 +125,7 @@ class TestResult:
         assert lines[0].split()[:2] == ["parameter", "value"]
         names = [line.split()[0] for line in lines[1 : 1 + len(result.parameters)]]
         assert names == list(result.parameters)
-        assert lines[-1] == f"method robust, fit {100 * result.fit:.2f} %"
+        assert lines[-1] == f"method plant, fit {100 * result.fit:.2f} %"
 
     def test_the_summary_adds_reasons_and_warnings(self, result):
         summary = result.summary()
@@ -155,16 +177,10 @@ def test_methods_return_the_same_type(loose_record, benches):
     assert math.isnan(published.rms)
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("sweep", "it is now called 'refined'"),
-        ("guess", "choose from best, robust, refined, published"),
-    ],
-)
-def test_an_unknown_method_is_named(loose_record, benches, name, hint):
-    with pytest.raises(ValueError, match=f"there is no method '{name}': {hint}"):
-        vf.identify(loose_record, benches["low"].valve, method=name)
+def test_an_unknown_method_is_named(loose_record, benches):
+    told = "there is no method 'guess': choose from plant, bench, published, signature"
+    with pytest.raises(ValueError, match=told):
+        vf.identify(loose_record, benches["low"].valve, method="guess")
 
 
 def test_compare_takes_a_result_or_a_number(result):
@@ -172,3 +188,26 @@ def test_compare_takes_a_result_or_a_number(result):
     half = vf.Baseline(friction.value / 2)
     assert vf.compare(result, half).ratio.value == pytest.approx(2.0, rel=1e-12)
     assert vf.compare(result, result).ratio.value == 1.0
+
+
+class TestResultsAtWork:
+    def test_a_method_by_its_name(self, loose_record, benches):
+        found = vf.identify(loose_record, benches["low"].valve, "published")
+        assert found.method == "published"
+        with pytest.raises(ValueError, match="there is no method 'refined_'"):
+            vf.identify(loose_record, benches["low"].valve, "refined_")
+
+    def test_a_result_is_simulated_as_its_model(self, loose_record, benches, result):
+        valve, period = benches["low"].valve, loose_record.sample_period
+        by_result = vf.simulate(valve, result, loose_record.pressure, period).position
+        by_model = vf.simulate(valve, result.model, loose_record.pressure, period).position
+        np.testing.assert_array_equal(by_result, by_model)
+        np.testing.assert_array_equal(result.simulate(loose_record.pressure, period), by_model)
+
+    def test_the_difference_of_two_results(self, result):
+        """Of a result from itself: zero, and its width twice in squares, without calibration."""
+        for name, (difference, width) in result.difference(result).items():
+            own = result.parameters[name].without_calibration
+            assert difference == 0.0
+            assert width == pytest.approx(math.sqrt(2) * own.half_width)
+        assert "coulomb_friction" in result.difference(result)

@@ -1,11 +1,22 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The notebook in `examples/`: its cells run in order, and say what its text promises."""
 
 import ast
 import json
 import struct
+from datetime import datetime, timezone
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -24,6 +35,15 @@ def test_it_goes_from_a_recording_to_a_decision(monkeypatch, capsys):
     printed = capsys.readouterr().out
     assert "friction has grown" in printed
     assert "dead band 13.7 % of the travel" in printed
+    assert "the record speaks very strongly for the first model: it is 1e" in printed
+    low, high, middle = (names[name] for name in ("low", "high", "middle"))
+    assert np.all(low <= high)
+    assert np.mean((low <= middle) & (middle <= high)) > 0.9
+    changes = names["again"].difference(names["result"])
+    assert set(changes) >= {"coulomb_friction", "spring_constant", "sliding_friction"}
+    assert all(abs(change) < half_width for change, half_width in changes.values())
+    date = datetime(2026, 10, 1, 6, tzinfo=timezone.utc)
+    assert names["again"].recording.start_time == pytest.approx(date.timestamp(), abs=1e-3)
 
 
 def test_its_last_lines_are_shown(monkeypatch):

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Layouts and analyzers for other dashboards: they are their script's, and name what there is."""
 
 import json
@@ -94,6 +103,16 @@ def test_plotjuggler_names_what_its_parser_makes():
         "/fv_101/actuator_pressure/fluid_pressure",
         "/fv_101/stem_state/stem/position",
     }
+
+
+def test_a_plant_has_one_fault_for_each_valve_in_ros2_medkit():
+    """Its bridge makes a code of a name: capitals and digits, one _ for all between them."""
+    names = [f"/area_{k // 40}/fv_{100 + k}/identifier: friction" for k in range(500)]
+    codes = {re.sub("[^A-Z0-9]+", "_", one.upper()).strip("_") for one in names}
+    assert len(codes) == len(names)
+    assert re.sub("[^A-Z0-9]+", "_", STATUS.upper()).strip("_") in (
+        CONFIG.parent / "doc/how_to/dashboards.md"
+    ).read_text(encoding="utf-8")
 
 
 def test_the_analyzers_take_every_valve():

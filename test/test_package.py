@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The package as its users get it: built by colcon, started from the installed tree."""
 
 import ast
@@ -31,6 +40,7 @@ EXECUTABLES = {
     "identifiers",
     "pressure_source",
     "simulator",
+    "stroke_player",
     "valve_friction",
 }
 LAUNCH_FILES = ["bench.launch.py", "monitor.launch.py"]
@@ -79,8 +89,10 @@ LIBRARIES = {  # what is imported, by its rosdep key and its name on PyPI
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "numba": ("python3-numba", "numba"),
     "numpy": ("python3-numpy", "numpy"),
+    "pandas": ("python3-pandas", "pandas"),
     "rich": ("python3-rich", "rich"),
     "scipy": ("python3-scipy", "scipy"),
+    "sqlalchemy": ("python3-sqlalchemy", "SQLAlchemy"),
     "yaml": ("python3-yaml", "PyYAML"),
 }
 BAG_LIBRARIES = {"backports": "backports.zstd", "lz4": "lz4", "rosbags": "rosbags"}
@@ -97,8 +109,7 @@ def exec_depends():
 
 def third_party_imports():
     """Modules from outside the package and Python, with the files that import them."""
-    optional = {"pandas"}  # only `Result.to_frame` needs it, and says so
-    own = set(sys.stdlib_module_names) | {NAME} | optional
+    own = set(sys.stdlib_module_names) | {NAME}
     for path in [*(PROJECT / NAME).rglob("*.py"), *(PROJECT / "launch").glob("*.py")]:
         for module in imported_modules(path) - own:
             yield module, path
@@ -116,11 +127,11 @@ def test_manifest_names_every_message_package_and_library():
         if module in BAG_LIBRARIES:
             assert path.parent == PROJECT / NAME / "records" / "bags"
         elif module in DATABASE_LIBRARIES:
-            assert path.parent == PROJECT / NAME / "history" / "server"
+            assert path == PROJECT / NAME / "history" / "database.py"
         elif module in DASHBOARD_LIBRARIES:
             assert path.is_relative_to(PROJECT / NAME / "dashboard")
         elif module in CLUSTER_LIBRARIES:
-            assert path.is_relative_to(PROJECT / NAME / "fleet" / "sharing")
+            assert path == PROJECT / NAME / "fleet" / "cluster.py"
         elif module == "upath":
             assert path == PROJECT / NAME / "records" / "stores.py"
         else:
@@ -162,12 +173,14 @@ def test_setup_names_every_library():
 @pytest.mark.parametrize("extra", ["dashboard", "database"])
 def test_what_is_an_extra(extra):
     """Its limits hold for what is pinned, and a page says how it is installed."""
-    (needed,) = requirements("extras_require")[extra]
-    name, limits = parted(needed.replace("[binary]", ""))
-    lowest, highest = re.fullmatch(r">=(\d+\.\d+),<(\d+)", limits).groups()
-    pinned = [int(part) for part in pins(f"{extra}.txt")[name].split(".")[:2]]
-    assert [int(part) for part in lowest.split(".")] <= pinned < [int(highest), 0]
-    for command in (f"pip install '{needed}'", f"make venv-{extra}"):
+    needed = requirements("extras_require")[extra]
+    for one in needed:
+        name, limits = parted(one.replace("[binary]", ""))
+        lowest, highest = re.fullmatch(r">=(\d+\.\d+),<(\d+)", limits).groups()
+        pinned = [int(n) for n in (pins("run.txt") | pins(f"{extra}.txt"))[name].split(".")[:2]]
+        assert [int(part) for part in lowest.split(".")] <= pinned < [int(highest), 0]
+    wanted = " ".join(f"'{one}'" for one in needed)
+    for command in (f"pip install {wanted}", f"make venv-{extra}"):
         assert command in TEXT
 
 
@@ -217,7 +230,7 @@ def test_the_newest_versions_are_those_that_are_installed():
 
 def test_the_remedy_is_the_extra():
     bags = requirements("extras_require")["bags"]
-    text = (PROJECT / NAME / "records" / "bags" / "libraries.py").read_text()
+    text = (PROJECT / NAME / "records" / "bags" / "storage.py").read_text()
     remedy = re.search(r"pip install ([^`]+)`", text)[1]
     assert sorted(word.strip("'") for word in remedy.split()) == sorted(bags)
     assert f"pip install {remedy}" in TEXT
@@ -278,13 +291,26 @@ def test_a_bench_with_its_identifier_and_without(launch_file, with_identifier):
     given = {"valve": "/area/fv_102", "config": config, "identifier": with_identifier}
     names["LaunchConfiguration"] = lambda name: SimpleNamespace(perform=lambda _: given[name])
     names["Node"] = lambda **settings: settings
-    nodes = {node["name"]: node for node in names["nodes"](None)}
+    names["ParameterValue"] = lambda value, value_type: (value.perform(None), value_type)
+    given |= {"use_sim_time": "false", "log_level": "warn"}
+    context = SimpleNamespace(launch_configurations=given)
+    nodes = {node["name"]: node for node in names["nodes"](context)}
     wanted = {"pressure_source", "simulator"}
     assert set(nodes) == wanted | ({"identifier"} if with_identifier == "true" else set())
     assert {node["namespace"] for node in nodes.values()} == {"/area/fv_102"}
-    assert nodes["simulator"]["parameters"] == [config]
+    time = {"use_sim_time": ("false", bool)}
+    assert nodes["simulator"]["parameters"] == [config, time]
     if with_identifier == "true":
-        assert nodes["identifier"]["parameters"] == [{"valve_tag": "FV-102"}, config]
+        assert nodes["identifier"]["parameters"] == [{"valve_tag": "FV-102"}, config, time]
+
+
+@pytest.mark.parametrize(("name", "typed"), [("bench", "valv"), ("monitor", "one_proces")])
+def test_a_mistyped_argument_is_refused(launch_file, name, typed):
+    names = launch_file(name).require_known.__globals__
+    with pytest.raises(ValueError, match=f"no argument '{typed}': did you mean"):
+        names["require_known"](SimpleNamespace(launch_configurations={typed: "x"}))
+    foreign = dict.fromkeys([*names["ARGUMENTS"], "config", "map"], "x")  # of a file that includes
+    names["require_known"](SimpleNamespace(launch_configurations=foreign))
 
 
 USUAL = {"pressure_topic": "/plant/{valve}/pressure", "stem_topic": "stem"}

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """README and pages: their Python and commands can be pasted, and their links lead somewhere."""
 
 import contextlib
@@ -11,11 +20,26 @@ import yaml
 from documentation import PAGES, PROJECT, README, snippets
 
 from valve_friction_ros.commands.main import run
-from valve_friction_ros.records.yaml_file import read_yaml
+from valve_friction_ros.records.valve_file import read_yaml
 
 
 def test_the_readme_is_short():
-    assert PAGES[README].count("\n") < 180
+    assert PAGES[README].count("\n") <= 120
+
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+def assert_same_sentences(printed, shown):
+    """Each word is there as it is shown; numbers to 2 %, as a processor may round otherwise."""
+    expected_lines = shown.splitlines()
+    lines = printed.splitlines()[: len(expected_lines)]
+    for line, written in zip(lines, expected_lines, strict=True):
+        assert NUMBER.sub("#", line).split() == NUMBER.sub("#", written).split()
+        numbers, expected = (
+            [float(one) for one in NUMBER.findall(each)] for each in (line, written)
+        )
+        assert numbers == pytest.approx(expected, rel=0.02, abs=0.02)
 
 
 def test_the_page_of_the_notebook_runs(tmp_path, monkeypatch, capsys):
@@ -26,8 +50,8 @@ def test_the_page_of_the_notebook_runs(tmp_path, monkeypatch, capsys):
     for snippet in found:
         exec(compile(snippet, "notebook.md", "exec"), names)
     printed = capsys.readouterr().out
-    assert printed.startswith("parameter ")
-    assert "friction is" in printed or "coulomb friction" in printed
+    (shown,) = snippets("text", PAGES[PROJECT / "doc" / "start" / "notebook.md"])
+    assert_same_sentences(printed, shown)
     low, high = names["result"].parameters["coulomb_friction"].interval
     assert low < 606.0 < high
     assert (tmp_path / "valve.png").stat().st_size > 10_000
@@ -74,7 +98,11 @@ def test_the_examples_of_the_readme_print_its_table(monkeypatch, capsys):
 def test_options_describe_a_table_as_its_valve_file_does(tmp_path, monkeypatch, capsys):
     """The numbers are equal, and the options lack nothing that the section `columns:` says."""
     monkeypatch.chdir(PROJECT)
-    (line,) = (each for each in offline_commands() if "--time-column" in each)
+    line = (
+        "identify examples/five_seconds.csv --valve examples/fv_101.yaml --delimiter ';' "
+        "--time-column Time --time-zone Europe/Berlin --position-column 'Stem position' "
+        "--position-unit percent --pressure-column 'Actuator pressure' --pressure-unit bar"
+    )
     described = PROJECT / "examples" / "fv_101.yaml"
     valve = read_yaml(described)["/**"]["ros__parameters"]
     del valve["columns"]
@@ -88,7 +116,7 @@ def test_options_describe_a_table_as_its_valve_file_does(tmp_path, monkeypatch, 
         [*options[:place], str(bare), *options[place + 1 :]],
         ["identify", "examples/five_seconds.csv", "--valve", str(described)],
     ):
-        assert run([*words, "--method", "refined", "--json"]) == 0
+        assert run([*words, "--method", "bench", "--json"]) == 0
         answers.append(capsys.readouterr().out)
     assert answers[0] == answers[1] == answers[2]
 
@@ -107,7 +135,7 @@ def test_the_offline_commands_run_as_they_are_pasted(tmp_path, monkeypatch, caps
                 stream = stack.enter_context((tmp_path / output).open("w"))
                 stack.enter_context(contextlib.redirect_stdout(stream))
             assert run(shlex.split(line, comments=True)) == 0, each
-    assert re.search(r"^coulomb_friction +400", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(r"^coulomb_friction +40[01]", capsys.readouterr().out, re.MULTILINE)
     written = {path.name for path in tmp_path.iterdir()}
     assert {
         "one_minute.png",

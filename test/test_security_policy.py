@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The policy of SROS 2 against what the nodes offer: who may say, hear, call and answer what."""
 
 import xml.etree.ElementTree as ET
@@ -70,7 +79,7 @@ def test_only_identifiers_say_what_they_found_and_people_hear_it(valve):
 @pytest.mark.parametrize("valve", VALVES)
 def test_only_operators_call_services_and_the_dashboard_those_of_its_buttons(valve):
     pytest.importorskip("nicegui", reason="run `make venv-dashboard`")
-    from valve_friction_ros.dashboard.pages.valve_actions import _ACTIONS
+    from valve_friction_ros.dashboard.pages.valve_page import _ACTIONS
 
     assert _ACTIONS.keys() <= {name.removeprefix("~/") for name in IDENTIFIER["services"]}
     for name in [*IDENTIFIER["services"], "~/set_parameters", "~/set_parameters_atomically"]:

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Friction of control valves, identified with the Karnopp model, with intervals.
 
 Everything here works without ROS; all quantities are in SI units. The names below are loaded on
@@ -30,7 +39,7 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.front_door import compare, read_recording
+    from valve_friction_ros.front_door import compare, read_recording, simulate
     from valve_friction_ros.health.baseline import Baseline
     from valve_friction_ros.identification.methods import identify
     from valve_friction_ros.identification.refusal import RefusalError
@@ -41,7 +50,6 @@ if TYPE_CHECKING:
     from valve_friction_ros.model.instruments import SensorNoise
     from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
     from valve_friction_ros.model.recording import Recording
-    from valve_friction_ros.model.simulation import simulate
     from valve_friction_ros.model.valve import Valve
     from valve_friction_ros.records.valve_file import read_valve_file
 else:

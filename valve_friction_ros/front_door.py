@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Functions of the front door that combine several rooms; the package itself offers them."""
 
 from collections.abc import Mapping
@@ -13,13 +22,13 @@ from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.valve_diagnosis import diagnose_valve
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.model.drive import Drive
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.simulation import StemState, Trajectory
+from valve_friction_ros.model.simulation import simulate as simulated
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.recordings import ReadingOptions, read_recordings
-from valve_friction_ros.streams.samples import Samples
-from valve_friction_ros.streams.uniform_grid import uniform_recording
-
-__all__ = ["compare", "read_recording"]
+from valve_friction_ros.streams.samples import Samples, uniform_recording
 
 _ANY_SENSOR = Valve()
 """The default valve: its sensors have no range, its stem has no stops."""
@@ -38,7 +47,8 @@ def read_recording(
     source : path, or mapping of str to array_like
         CSV file (may be gzipped) or bag (MCAP or SQLite3, folder or file); or a pandas frame or
         a mapping with the columns ``time_s``, ``position_m`` and ``pressure_pa``, or ``force_n``
-        for a machine without a diaphragm (`Valve()`).
+        for a machine without a diaphragm (`Valve()`). Dates may stand in ``time_s``, or be the
+        index of a frame in its place; without a zone they are UTC.
     valve : Valve, optional
         Range of the pressure sensor, and the travel for positions in percent. With a diaphragm
         it converts ``force_n`` of a file into the pressure that exerts this force.
@@ -96,17 +106,81 @@ def _column(columns: Mapping[str, Any], name: str) -> NDArray[np.float64]:
     return values
 
 
+def _stamps_of_index(columns: Mapping[str, Any]) -> NDArray[np.int64] | None:
+    """Return times that are dates, of a column or of a frame's index, ns; None of anything else."""
+    given: Any = columns["time_s"] if "time_s" in columns else getattr(columns, "index", None)
+    dtype = getattr(given, "dtype", None)
+    if isinstance(dtype, np.dtype) and dtype.kind == "M":
+        return np.asarray(given, "datetime64[ns]").astype(np.int64)
+    if getattr(dtype, "tz", None) is None:
+        return None
+    dates = given.dt if hasattr(given, "dt") else given
+    return np.asarray(dates.tz_convert("UTC").to_numpy("datetime64[ns]")).astype(np.int64)
+
+
 def _from_columns(columns: Mapping[str, Any]) -> Recording:
     is_force = "force_n" in columns and "pressure_pa" not in columns
     names = ("force_n" if is_force else "pressure_pa", "position_m")
-    time, drive, position = (_column(columns, name) for name in ("time_s", *names))
-    stamps = np.rint(time * 1e9).astype(np.int64)
+    stamps = _stamps_of_index(columns)
+    if stamps is None:
+        stamps = np.rint(_column(columns, "time_s") * 1e9).astype(np.int64)
+    drive, position = (_column(columns, name) for name in names)
     later = np.diff(stamps) > 0
     if not later.all():
         sample = int(np.argmin(later)) + 1
         raise ValueError(f"time_s does not increase at sample {sample}: sort the rows")
     driven_by = Drive.FORCE if is_force else Drive.PRESSURE
     return uniform_recording(Samples(stamps, drive), Samples(stamps, position), names, driven_by)
+
+
+def simulate(
+    valve: Valve,
+    parameters: KarnoppParameters | Result,
+    drive: NDArray[np.float64],
+    sample_period: float,
+    start: StemState | None = None,
+) -> Trajectory:
+    """Simulate the stem under a sampled drive, equations (1) and (2).
+
+    Parameters
+    ----------
+    valve : Valve
+        Geometry and travel stops.
+    parameters : KarnoppParameters or Result
+        The model, or a result with one.
+    drive : ndarray of float, shape (n,)
+        Actuator pressure, Pa, or force, N.
+    sample_period : float
+        Time between two samples, s.
+    start : StemState, optional
+        State at the first sample; by default at rest where the forces balance.
+
+    Returns
+    -------
+    Trajectory
+        Position and velocity of the stem.
+
+    Raises
+    ------
+    RefusalError
+        If a result has no model.
+    ValueError
+        If the drive or the sampling period is impossible.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import valve_friction_ros as vf
+    >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+    >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+    >>> pressure = np.linspace(1e4, 1e5, 1000)
+    >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+    >>> round(1e3 * float(stem.position[-1]), 1)
+    20.9
+    """
+    if not isinstance(parameters, Result):
+        return simulated(valve, parameters, drive, sample_period, start)
+    return simulated(valve, parameters.simulated_model(), drive, sample_period, start)
 
 
 def compare(

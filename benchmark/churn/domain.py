@@ -1,10 +1,19 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A ROS domain of this machine that nobody else uses."""
 
 import contextlib
 import os
 from collections.abc import Iterator
 
-from valve_friction_ros.commands.demo.bench_processes import free_domain
+from valve_friction_ros.commands.demo.bench import free_domain
 
 __all__ = ["quiet_domain"]
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A history of many valves, as a year of weekly identifications leaves it."""
 
 import math
@@ -16,12 +25,13 @@ from valve_friction_ros.health import (
     compared,
 )
 from valve_friction_ros.history import HistoryEntry, KeptValve
+from valve_friction_ros.history.database import writing
 from valve_friction_ros.history.entry import Fit, Span, settings_text
 from valve_friction_ros.history.rows import insert_entry, valve_id
-from valve_friction_ros.history.schema import writing
 from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.model import BENCH_VALVE
 from valve_friction_ros.streams import DAY
+from valve_friction_ros.wording import quoted
 
 __all__ = ["write_history"]
 
@@ -50,8 +60,8 @@ def _entry(
         time=stamp,
         valve=valve,
         span=Span(stamp - 60_000_000_000, stamp),
-        method="robust",
-        diagnosis=Diagnosis(Level.OK, StatusSignal.GOOD, words, found and found.ratio),
+        method="plant",
+        diagnosis=Diagnosis(Level.OK, StatusSignal.GOOD, quoted(words), found and found.ratio),
         limits=FrictionLimits(),
         baseline=baseline,
         settings=_SETTINGS,

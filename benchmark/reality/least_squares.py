@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Plain least squares: what anyone has in an hour, to stand beside the package."""
 
 import math
@@ -26,6 +35,8 @@ def sliding_friction(record: Record) -> float:
         max(stamps[0], pressure_stamps[0]), min(stamps[-1], pressure_stamps[-1]), period
     )
     window = 2 * max(round(_WINDOW / period / 2), 2) + 1
+    if time.size < window:
+        return math.nan
     stem = np.interp(time, stamps, position)
     pressure = np.interp(time, pressure_stamps, record.pressure.values)
     place = savgol_filter(stem, window, 2)

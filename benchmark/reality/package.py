@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The package behind the few functions that the benchmark calls.
 
 The only file here that knows the package.
@@ -23,10 +32,10 @@ from valve_friction_ros.identification import (
     Result,
     method_named,
 )
-from valve_friction_ros.identification.robust import method as engine
-from valve_friction_ros.identification.robust.intervals import estimated
-from valve_friction_ros.identification.robust.posterior_fit import PosteriorFit
-from valve_friction_ros.identification.robust.search import _Search, search
+from valve_friction_ros.identification.engine import method as engine
+from valve_friction_ros.identification.engine.intervals import estimated
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.engine.search import _Search, search
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
 
@@ -168,8 +177,9 @@ def is_baseline(answer: Answer) -> bool:
 def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     """Compare with the result of the healthy valve, as the monitor does.
 
-    The keys are "high" and "low" for its friction, and "other" for all else that is more than OK
-    or another status signal than good; the values are the sentences.
+    The keys are "high" and "low" for its friction, "perhaps" where that is not sure, and "other"
+    for all else that is more than OK or another status signal than good; the values are the
+    sentences.
     """
     if answer.native is None:
         return {}
@@ -177,8 +187,9 @@ def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     friction, findings = diagnose_valve(answer.native, baseline)
     found = {}
     if friction.status_signal is not StatusSignal.GOOD or friction.level is not Level.OK:
-        side = friction.state.side
-        found["other" if side is None else side.value] = _words(friction)
+        state = friction.state
+        unsure = "perhaps" if state.is_uncertain else "other"
+        found[unsure if state.side is None else state.side.value] = _words(friction)
     for finding in findings:
         if finding.status_signal is not StatusSignal.GOOD or finding.level is not Level.OK:
             found["other"] = _words(finding)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The rows as tables, and the bounds."""
 
 import math
@@ -131,8 +140,13 @@ def _is_fast(row: Row) -> bool:
     return row.rate > _FAST
 
 
+def _declaration(row: Row) -> str:
+    """Return the alarm on the friction on the side of its change; empty without one."""
+    return row.alarms.get("high" if row.change > 1.0 else "low", "")
+
+
 def _is_declared(row: Row) -> bool:
-    return ("high" if row.change > 1.0 else "low") in row.alarms
+    return bool(_declaration(row))
 
 
 def _ratios(rows: _Rows, name: str = "") -> list[float]:
@@ -266,8 +280,15 @@ def _alarms(rows: _Rows) -> Sequence[object]:
     return (
         _of(lambda row: row.has_baseline, same),
         _of(lambda row: row.alarms, same),
-        *(_of(_is_declared, some) for some in changed),
+        *(_declared(some) for some in changed),
     )
+
+
+def _declared(rows: _Rows) -> str:
+    """Say at which level a change is declared, and how often it is not sure."""
+    errors = _count(lambda row: _declaration(row).startswith("ERROR"), rows)
+    unsure = _count(lambda row: not _is_declared(row) and "perhaps" in row.alarms, rows)
+    return f"{_of(_is_declared, rows)}, {errors} as ERROR; {unsure} perhaps"
 
 
 def _least(what: str, test: Callable[[Row], object], rows: _Rows, least: float) -> Bound:

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Nodes as processes, what they cost, and what they say."""
 
 import contextlib
@@ -16,7 +25,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from benchmark.process_usage import processor_seconds, resident_megabytes
+from benchmark.process_usage import (
+    processor_seconds,
+    proportional_megabytes,
+    resident_megabytes,
+)
 
 __all__ = ["DOMAIN", "Observer", "Process"]
 
@@ -91,6 +104,10 @@ class Process:
         """Memory in use, MB."""
         return resident_megabytes(self._process.pid)
 
+    def proportional(self) -> float:
+        """Memory in use, MB, what it shares with other processes divided among them."""
+        return proportional_megabytes(self._process.pid)
+
 
 class Observer:
     """Listens to the diagnostics of the identifiers, and calls them.
@@ -121,7 +138,8 @@ class Observer:
             valve = status.hardware_id
             self.first_seen.setdefault(valve, time.time())
             values = {entry.key: entry.value for entry in status.values}
-            self.buffered[valve] = int(values["buffered_samples"])
+            if "buffered_samples" in values:  # of a valve whose process keeps up
+                self.buffered[valve] = int(values["buffered_samples"])
 
     def spin(self, seconds: float) -> None:
         """Listen for a while."""

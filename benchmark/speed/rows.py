@@ -1,5 +1,15 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One measured item beside its peer, and how to measure."""
 
+import resource
 import statistics
 import time
 from collections.abc import Callable, Mapping
@@ -67,6 +77,12 @@ class Row:
         return None if self.peer is None or self.ours == 0 else self.peer / self.ours
 
 
+def _processor_time() -> float:
+    """Return the seconds that this process and its ended children have spent."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
 def medians(functions: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
     """Return the median processor time of each function, s.
 
@@ -78,7 +94,7 @@ def medians(functions: Mapping[str, Callable[[], object]], repeats: int) -> dict
         function()
     for _ in range(repeats):
         for name, function in functions.items():
-            begin = time.process_time()
+            begin = _processor_time()
             function()
-            seconds[name].append(time.process_time() - begin)
+            seconds[name].append(_processor_time() - begin)
     return {name: statistics.median(times) for name, times in seconds.items()}

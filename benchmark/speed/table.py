@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The measured rows as a table and as JSON."""
 
 import datetime
@@ -15,10 +24,11 @@ from benchmark.speed.rows import Row
 __all__ = ["machine_shape", "rows_table", "write_json"]
 
 
-def machine_shape() -> dict[str, str | int]:
-    """Tell what of the machine and its software the numbers depend on."""
+def machine_shape() -> dict[str, str | float]:
+    """Tell what of the machine, its load and its software the numbers depend on."""
     return {
         "cores": os.cpu_count() or 1,
+        "load": round(os.getloadavg()[0], 1),
         "architecture": platform.machine(),
         "python": f"{platform.python_implementation()} {platform.python_version()}",
         "numpy": np.__version__,

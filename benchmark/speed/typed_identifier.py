@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The identifier as it is written first: typed subscriptions, and rclpy's default executor."""
 
 import sys
@@ -10,8 +19,8 @@ from sensor_msgs.msg import FluidPressure, JointState
 
 from valve_friction_ros.nodes.identifier import node as identifier
 from valve_friction_ros.nodes.identifier.workers import running_workers
-from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing.polled_subscription import InputWatch
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import RecordBuffer
@@ -20,21 +29,19 @@ from valve_friction_ros.streams import RecordBuffer
 class TypedInputs:
     """Both topics, each message deserialised by rclpy and taken for itself."""
 
-    def __init__(self, node: Node, joint: str, hand_on: Callable) -> None:
+    def __init__(self, node: Node, joint: str, hand_on: Callable, _: Callable) -> None:
         self._buffer: RecordBuffer = hand_on.__self__._monitor.buffer  # noqa: SLF001
         self._joint = joint
-        self._watches = [
-            InputWatch(
-                node,
-                node.create_subscription(
-                    kind, topic, callback, stream(), qos_overriding_options=qos_overrides()
-                ),
+        self._watches = []
+        for kind, topic, callback in (
+            (FluidPressure, "actuator_pressure", self._on_pressure),
+            (JointState, "stem_state", self._on_stem),
+        ):
+            made = node.create_subscription(
+                kind, topic, callback, stream(), qos_overriding_options=qos_overrides()
             )
-            for kind, topic, callback in (
-                (FluidPressure, "actuator_pressure", self._on_pressure),
-                (JointState, "stem_state", self._on_stem),
-            )
-        ]
+            type_name = f"sensor_msgs/msg/{kind.__name__}"
+            self._watches.append(InputWatch(node, made.topic_name, type_name))
 
     def _on_pressure(self, message: FluidPressure) -> None:
         self._watches[0].arrived()
@@ -53,7 +60,7 @@ class TypedInputs:
     def follow_publishers(self) -> None:
         """Do nothing: the publishers of the benchmark are reliable."""
 
-    def take(self) -> None:
+    def take(self, is_all: bool = False) -> None:
         """Do nothing: every message has been taken."""
 
     def values(self) -> dict[str, str]:

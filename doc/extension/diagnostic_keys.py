@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The keys of an identifier's diagnostics, found in the code that writes them."""
 
 import ast
@@ -14,19 +23,24 @@ __all__ = ["declared_keys", "entries", "is_explained", "keys_as_markdown", "patt
 _WRITERS = {
     "identifier/node.py": ("_data_values",),
     "identifier/status.py": (
-        "_result_values",
-        "_baseline_values",
-        "trend_values",
         "estimate_status",
         "friction_status",
         "stuck_status",
     ),
-    "identifier/value_texts.py": ("ratio_values",),
+    "../history/status_values.py": (
+        "ratio_values",
+        "result_values",
+        "baseline_values",
+        "trend_values",
+        "alarm_values",
+    ),
+    "identifier/baseline_in_force.py": ("values",),
     "identifier/evidence_watch.py": ("values", "_numbers"),
     "identifier/usage_watch.py": ("values",),
     "identifier/response_watch.py": ("values", "_deviation_values", "_move_values"),
     "identifier/standstill_watch.py": ("values",),
     "identifier/whole_valve.py": ("values",),
+    "identifier/alarm_board.py": ("values",),
     "identifier/alarm_recorder.py": ("values",),
     "identifier/alerts.py": ("_mark",),
     "identifier/history_writer.py": ("values",),

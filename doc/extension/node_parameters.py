@@ -1,24 +1,21 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The parameters of the nodes, as they declare them."""
 
 import math
-import re
-from importlib import import_module
 from pathlib import Path
 
 from extension.markdown import Entry, definition_list, escaped
+from valve_friction_ros.settings import NODES, Setting
 
-__all__ = ["NODES", "parameter_entries", "parameters_as_markdown"]
-
-NODES = {
-    "identifier": "identifier.parameters",
-    "identifiers": "identifiers",
-    "simulator": "simulator",
-    "pressure_source": "pressure_source",
-    "dashboard": "dashboard.parameters",
-}
-"""Module of each node that has its `PARAMETERS`, below ``valve_friction_ros.nodes``."""
-
-_UNIT = re.compile(r" \[([^\]]+)\]")
+__all__ = ["parameter_entries", "parameters_as_markdown"]
 
 
 def _number(value: float) -> str:
@@ -39,10 +36,12 @@ def _default(value: object) -> str:
     return str(value).replace(str(Path.home()), "~")
 
 
-def _facts(spec: object, unit: str) -> str:
+def _facts(spec: Setting, unit: str) -> str:
     """Say the default with its unit, the range or the choices, and when it can be set."""
-    value = _default(spec.default)
+    value = _default(spec.assumed if spec.default is None else spec.default)
     facts = [f"`{value}`{unit and ' ' + unit}" if value else "empty"]
+    if spec.default is None:
+        facts = ["not stated" if spec.assumed is None else f"not stated: {facts[0]} is assumed"]
     if spec.limits is not None:
         facts.append(f"{_number(spec.limits[0])} to {_number(spec.limits[1])}")
     if spec.choices:
@@ -54,16 +53,15 @@ def _facts(spec: object, unit: str) -> str:
 
 def parameter_entries(node: str, *names: str) -> list[Entry]:
     """Return the parameters of a node, or some of them, in the order of their declaration."""
-    module = import_module(f"valve_friction_ros.nodes.{NODES[node]}")
-    found = []
-    for spec in module.PARAMETERS:
-        match = _UNIT.search(spec.description)
-        unit = "" if match is None or match[1] == "-" else match[1]
-        description = spec.description if match is None else _UNIT.sub("", spec.description, 1)
-        meaning = escaped(description).replace("~/", "\\~/").rstrip(".") + "."
-        if not names or spec.name in names:
-            found.append(Entry(spec.name, _facts(spec, escaped(unit)), meaning))
-    return found
+    return [
+        Entry(
+            spec.name,
+            _facts(spec, escaped(spec.unit)),
+            escaped(spec.meaning).replace("~/", "\\~/").rstrip(".") + ".",
+        )
+        for spec in NODES[node]
+        if not names or spec.name in names
+    ]
 
 
 def parameters_as_markdown(node: str, *names: str) -> str:

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a client of the bench is told when things go wrong, printed as one JSON object."""
 
 import json
@@ -6,8 +15,9 @@ import sys
 
 import rclpy
 
-from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
-from valve_friction_ros.commands.demo.bench_processes import (
+from valve_friction_ros.commands.demo.bench import (
+    BenchClient,
+    BenchError,
     NodeProcess,
     quick_discovery,
     running_nodes,
@@ -41,7 +51,6 @@ def visit(client):
         ),
         "absent node": error_of(client.set_parameters, "nobody", {"mass": 1.0}, 0.1),
         "absent service": error_of(client.trigger, "dance", 0.1),
-        "sweep": error_of(client.sweep_columns, 0.1),
     }
     client.wait(lambda: client.level == Level.WARN, 30.0, "warning")
     return seen | {

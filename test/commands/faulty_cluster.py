@@ -1,12 +1,21 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `identify-folder` whose cluster does what the names of files say."""
 
 import sys
 
 from dask_workers import identify
 
-from valve_friction_ros.commands.folder import sharing
+from valve_friction_ros.commands import identify_folder
 from valve_friction_ros.commands.main import main
 
 if __name__ == "__main__":
-    sharing.identify_job_elsewhere = identify
+    identify_folder.identify_job_elsewhere = identify
     sys.exit(main())

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The client of the bench and the processes around it."""
 
 import contextlib
@@ -9,13 +18,14 @@ from pathlib import Path
 
 import pytest
 
-from valve_friction_ros.commands.demo.bench_processes import (
+from valve_friction_ros.commands.demo.bench import (
     NodeProcess,
     quick_discovery,
     running_nodes,
 )
+from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
 
-NAMES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+NAMES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", PROFILES)
 
 
 def test_what_a_client_is_told(ros_environment):
@@ -44,7 +54,6 @@ def test_what_a_client_is_told(ros_environment):
     assert told["absent service"] == (
         "/fv_7/identifier/dance is not there: start the identifier of this valve"
     )
-    assert told["sweep"] == "no sweep within 0.1 s"
     assert "actuator_pressure" in told["message"]
     assert told["estimate_valid"] == "false"
     assert told["exit codes"] == [0, 0]
@@ -57,7 +66,7 @@ class TestQuickDiscovery:
         found = quick_discovery()
         assert set(found) == set(NAMES)
         assert found["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
-        assert Path(found["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
+        assert Path(found[PROFILES]).is_file()
 
     @pytest.mark.parametrize("name", NAMES)
     def test_what_the_user_has_set_stays(self, monkeypatch, name):

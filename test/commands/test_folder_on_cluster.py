@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `identify-folder` on the workers of a Dask cluster."""
 
 import csv
@@ -15,8 +24,8 @@ from documentation import PROJECT
 from kept_rows import kept
 from local_server import certificate_pair
 
-from valve_friction_ros.commands.folder import sharing
-from valve_friction_ros.fleet.sharing import cluster
+from valve_friction_ros.commands import identify_folder
+from valve_friction_ros.fleet import cluster
 
 distributed = pytest.importorskip("distributed", reason="run `make venv-cluster`")
 dask = pytest.importorskip("dask")
@@ -42,7 +51,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def arguments(folder, tmp_path):
-    return (folder, "--output", tmp_path / "friction.csv", "--method", "refined")
+    return (folder, "--output", tmp_path / "friction.csv", "--method", "bench")
 
 
 def rows_of(path):
@@ -65,7 +74,7 @@ def test_the_rows_and_reports_of_the_local_run(address, tmp_path, command, monke
         (tmp_path / name).mkdir()
         output = tmp_path / name / "friction.csv"
         outputs = ("--output", output, "--output", output.with_suffix(".html"))
-        valve = ("--valve", "examples/fv_101.yaml", "--method", "refined")
+        valve = ("--valve", "examples/fv_101.yaml", "--method", "bench")
         code, out, err = command("identify-folder", "examples", *outputs, *valve, *how)
         assert code == 0, err
         reports = sorted((tmp_path / name / "friction_reports").iterdir())
@@ -81,13 +90,13 @@ def test_a_killed_worker_is_a_row(address, folder, arguments, command, monkeypat
         (folder / f"{name}.csv").write_text(SHORT)
     (folder / "broken.csv").write_text("nonsense")
     with monkeypatch.context() as patch:
-        patch.setattr(sharing, "identify_job_elsewhere", identify)
+        patch.setattr(identify_folder, "identify_job_elsewhere", identify)
         code, _, err = command("identify-folder", *arguments, "--scheduler", address)
     assert code == 1, err
     rows = rows_of(arguments[2])
     assert {name for name, row in rows.items() if row["error"]} == {"deadly.csv", "broken.csv"}
     assert "the process of its worker died 1 times" in rows["deadly.csv"]["error"]
-    assert rows["broken.csv"]["error"].startswith("no column ")
+    assert rows["broken.csv"]["error"].startswith("there is only one column")
     code, _, err = command("identify-folder", *arguments, "--scheduler", address)
     assert "6 recordings: 6 done before, 0 to do" in err
     code, _, err = command("identify-folder", *arguments, "--jobs", "1", "--retry-failed")
@@ -123,7 +132,7 @@ def test_interrupted_and_resumed(address, folder, arguments, command):
 
 def test_what_a_worker_does_not_see(address, folder, arguments, command, monkeypatch):
     (folder / "a.csv").write_text(SHORT)
-    found = sharing.finished
+    found = identify_folder.finished
 
     def vanished(*words):
         (folder / "a.csv").unlink()

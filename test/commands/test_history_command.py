@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `history`, as a person runs it."""
 
 import argparse
@@ -66,7 +75,7 @@ class TestTable:
         assert "LV-7 /area_2/lv_7/identifier" in lines
         assert "2026-09-21 14:13:20 150 1 identified 1.06 OK friction normal" in lines
         assert "2026-09-22 14:13:20 – refused OK too little travel: move the valve" in lines
-        assert "2026-09-21 14:13:20 80 3 weak OK friction normal" in lines
+        assert "2026-09-21 14:13:20 80 3 weak OK friction normal: so" in lines
         (drift,) = (line for line in lines if "drifts" in line)
         assert drift.startswith("trend: coulomb friction drifts by +3 ± 0.")
         assert drift.endswith("N a month, over 20 days")
@@ -89,7 +98,7 @@ class TestTable:
         """The last one's alone: here five days that lie 100 N above those before."""
         history = HistoryFile(tmp_path / "history.sqlite")
         for day in range(10):
-            method, friction = ("refined", 150.0) if day < 5 else ("signature", 250.0)
+            method, friction = ("bench", 150.0) if day < 5 else ("signature", 250.0)
             history.add(success(START + day * DAY, friction, method=method))
         (valve,) = json.loads(run("--json", path=history.path)[1])["valves"]
         assert (valve["trend"]["days"], valve["trend"]["significant"]) == (5, False)
@@ -177,7 +186,7 @@ class TestJson:
         assert entry["parameters"]["static_friction"]["value"] is None
         assert entry["diagnosis"]["ratio"] == pytest.approx(150 / 141)
         assert (entry["baseline"], entry["baseline_half_width"]) == (141.0, 1.0)
-        assert entry["limits"] == vars(FrictionLimits())
+        assert entry["limits"] == FrictionLimits().ratios
         assert entry["settings"]["valve"]["diaphragm_area"] == 0.0445
         assert entry["refusal"] == ""
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `identify-folder`: many recordings, interrupted and resumed."""
 
 import csv
@@ -19,7 +28,7 @@ from bags import messages_of, write_bag
 from kept_rows import kept
 
 from valve_friction_ros.commands.main import run as run_here
-from valve_friction_ros.identification import IdentificationSettings, identify_refined
+from valve_friction_ros.identification import IdentificationSettings, identify_bench
 from valve_friction_ros.model import (
     HIGH_FRICTION,
     Recording,
@@ -75,7 +84,7 @@ def output(tmp_path):
 @pytest.fixture
 def arguments(folder, output, bench_yaml):
     options = ["--output", str(output), "--valve", str(bench_yaml), "--jobs", "1"]
-    options += ["--method", "refined"]
+    options += ["--method", "bench"]
     return ["identify-folder", str(folder), *options]
 
 
@@ -165,12 +174,12 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
         ]
     )
     assert "skipped, no recordings: .hidden.csv, notes.txt" in err
-    assert "broken.csv: row 2, column 'position_m': 'abc' is not a number" in err
+    assert "broken.csv: row 2, column 'position_m': 'abc' is no good value" in err
     assert [line.split() for line in out.splitlines()[1:3]] == [
         ["identified", "4"],
         ["refused", "1"],
     ]
-    assert "1 refused: row …, column 'position_m': 'abc' is not a number" in out
+    assert "1 refused: row …, column '…': '…' is no good value" in out
     assert "(for example broken.csv)" in out
 
     description = read_valve_file(bench_yaml)
@@ -185,7 +194,7 @@ def test_a_folder_of_everything(folder, output, arguments, texts, noisy, bench_y
             if each.name == row["valve"]
         )
         settings = IdentificationSettings(assumed_mass=description.known["mass"])
-        result = identify_refined(recorded.recording(), description.valve, settings)
+        result = identify_bench(recorded.recording(), description.valve, settings)
         friction = result.parameters["coulomb_friction"]
         # The worker's libraries have one thread, which may change the order of a sum.
         assert float(row["coulomb_friction_n"]) == pytest.approx(friction.value, rel=1e-9)
@@ -204,7 +213,7 @@ def test_the_default_method_with_a_gap(folder, noisy, tmp_path, bench_yaml):
     assert run_here([*arguments, "--valve", str(bench_yaml)]) == 0
     rows = {row["recording"]: row for row in map(json.loads, output.open())}
     for row in rows.values():
-        assert (row["method"], row["error"]) == ("robust", None)
+        assert (row["method"], row["error"]) == ("plant", None)
         error = abs(row["coulomb_friction_n"] - HIGH_FRICTION.coulomb_friction)
         assert error < row["coulomb_friction_half_width_n"]
         assert row["sliding_friction_n"] > row["coulomb_friction_n"]
@@ -255,7 +264,7 @@ def test_a_page_against_baselines(folder, texts, tmp_path, output, arguments, ca
         report = (page.parent / link).read_text(encoding="utf-8")
         assert "times its baseline" in report
         assert "<b>" not in report
-    assert "column &#39;position_m&#39;: &#39;&lt;i&gt;&#39; is not a number" in text
+    assert "column &#39;position_m&#39;: &#39;&lt;i&gt;&#39; is no good value" in text
 
     # A report that is gone is written again, and nothing else is done.
     (page.parent / links[0]).unlink()

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The options of the sub-command `identify`."""
 
 import math
@@ -6,13 +15,13 @@ import re
 import pytest
 from answers import column, known, values
 
-from valve_friction_ros.identification import IdentificationSettings, identify_refined
+from valve_friction_ros.identification import IdentificationSettings, identify_bench
 from valve_friction_ros.model import BENCH_VALVE
 
 POSITION_BIAS = 1.13e-3
 FOUR_COLUMNS = ["--position-bias", str(POSITION_BIAS)]
 
-REFINED = ("--method", "refined")
+BENCH = ("--method", "bench")
 
 
 class TestOptions:
@@ -37,38 +46,31 @@ class TestOptions:
 
     def test_position_bias(self, printed, quick_csv, bench_options):
         answer = printed(quick_csv, *bench_options, *FOUR_COLUMNS)
-        for found in (values(answer), column(answer, "published")):
-            assert found["spring_preload"] == pytest.approx(
-                found["spring_constant"] * POSITION_BIAS, rel=1e-12
-            )
+        found = column(answer, "published")
+        assert found["spring_preload"] == pytest.approx(
+            found["spring_constant"] * POSITION_BIAS, rel=1e-12
+        )
+        assert values(answer) == values(printed(quick_csv, *bench_options))
 
-    def test_window_sets_both_and_so_does_the_order(
+    def test_window_and_order_are_those_of_the_published_estimate(
         self, printed, quick_csv, quick_record, bench_options
     ):
-        answer = printed(
-            quick_csv, *bench_options, *REFINED, "--derivative-window", 15, "--order", 4
-        )
+        answer = printed(quick_csv, *bench_options, *BENCH, "--derivative-window", 15, "--order", 4)
         settings = IdentificationSettings(derivative_window=15, order=4, assumed_mass=1.6)
-        assert answer["evidence"]["published_window"] == answer["derivative_window"] == 15
+        assert answer["evidence"]["published_window"] == 15
         assert answer["settings"]["order"] == 4
-        expected = identify_refined(quick_record, BENCH_VALVE, settings)
+        expected = identify_bench(quick_record, BENCH_VALVE, settings)
         assert column(answer, "published") == {**expected.estimate.values, "sliding_friction": None}
         assert known(answer) == {
             name: value for name, value in expected.values.items() if not math.isnan(value)
         }
 
-    def test_without_it_the_record_chooses_one(self, printed, quick_csv, bench_options):
-        """No noise, no need of 31 samples; the published estimate keeps its 31."""
-        answer = printed(quick_csv, *bench_options, *REFINED)
-        assert answer["evidence"]["published_window"] == 31
-        assert 5 <= answer["derivative_window"] < 31
-
     def test_valve(self, printed, quick_csv, bench_options, tmp_path):
         """Twice the area is twice the force, and so is every parameter; 2 rounds nothing."""
         path = tmp_path / "valve.yaml"
         path.write_text("diaphragm_area: 0.089\npressure_reference: 41740.0\n")
-        once = printed(quick_csv, *bench_options, *REFINED, "--fix", "mass=1.6")
-        twice = printed(quick_csv, "--valve", path, *REFINED, "--fix", "mass=3.2")
+        once = printed(quick_csv, *bench_options, *BENCH, "--fix", "mass=1.6")
+        twice = printed(quick_csv, "--valve", path, *BENCH, "--fix", "mass=3.2")
         doubled = {name: value and 2 * value for name, value in column(once, "published").items()}
         assert column(twice, "published") == doubled
         assert known(twice) == pytest.approx(
@@ -101,17 +103,22 @@ class TestOptions:
         columns = columns_of(quick_record)
         pressure = columns.pop("pressure_pa")
         path = write_csv(columns | {header: BENCH_VALVE.actuator_force(pressure)}, "force.csv")
-        found = printed(path, "--force-column", header, *REFINED, "--fix", "mass=1.6")
-        expected = printed(quick_csv, *bench_options, *REFINED, "--fix", "mass=1.6")
+        found = printed(path, "--force-column", header, *BENCH, "--fix", "mass=1.6")
+        expected = printed(quick_csv, *bench_options, *BENCH, "--fix", "mass=1.6")
         assert column(found, "published") == column(expected, "published")
         assert column(found, "verdict") == column(expected, "verdict")
-        assert known(found) == pytest.approx(known(expected), rel=1e-9)
+        assert known(found) == pytest.approx(known(expected), rel=1e-6)
         for answer in (found, expected):
             del answer["settings"]["assumed_mass"]  # of the valve file
+        # How a table of other headers was read is noted.
+        assert [one.partition(":")[0] for one in found.pop("warnings")] in ([], ["read as"])
+        del expected["warnings"]
         assert found["sliding_speed"] == pytest.approx(expected["sliding_speed"], rel=1e-9)
-        refined = ("parameters", "fit", "rms", "systematic_misfit", "sliding_speed")
-        assert {key: found[key] for key in found if key not in refined} == {
-            key: expected[key] for key in expected if key not in refined
+        close = ("parameters", "evidence", "fit", "rms", "systematic_misfit", "sliding_speed")
+        first_survey = ("diagnosis", "findings")  # by the travel, which the valve file tells
+        assert [expected.pop(one, None) is not None for one in first_survey] == [True, True]
+        assert {key: found[key] for key in found if key not in close} == {
+            key: expected[key] for key in expected if key not in close
         }
 
     def test_help_names_all(self, call, capsys):

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What the sub-command `identify` refuses, with one line and exit code 2."""
 
 import math
@@ -18,7 +27,10 @@ class TestBadRecords:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            (lambda c: c.update({name: [] for name in c}), "there are no rows under the header"),
+            (
+                lambda c: c.update({name: [] for name in c}),
+                "cannot tell what it holds: there are no",
+            ),
             (
                 lambda c: c.update({k: v[:309] for k, v in c.items()}),
                 "the record is too short: 309 s",
@@ -29,21 +41,16 @@ class TestBadRecords:
             ),
             (lambda c: c["position_m"].sort(), "the stem moved up only"),
             (
-                lambda c: c["position_m"].put(50, math.nan),
-                "row 52, column 'position_m': nan is not",
+                lambda c: c["position_m"].put(range(50, 150), math.nan),
+                "row 52, column 'position_m': 'nan' is no good value, and so are 100 of 1000",
             ),
-            (
-                lambda c: c["pressure_pa"].put(50, math.inf),
-                "row 52, column 'pressure_pa': inf is not",
-            ),
-            (lambda c: c["time_s"].put(50, -math.inf), "row 52, column 'time_s': -inf is not"),
             (
                 lambda c: c["time_s"].put(50, 0.49),
-                "row 52, column 'time_s' repeats (0.49 after 0.49)",
+                "row 52, column 'time_s' repeats (0.49 s after 0.49 s)",
             ),
             (
                 lambda c: c["time_s"].put(50, 0.48),
-                "row 52, column 'time_s' goes back (0.48 after 0",
+                "row 52, column 'time_s' goes back (0.48 s after 0",
             ),
             (
                 lambda c: c["time_s"].__iadd__(0.2 * (np.arange(1000) >= 50)),
@@ -53,8 +60,8 @@ class TestBadRecords:
                 lambda c: c["pressure_pa"].put(50, 250000.5),
                 "row 52, column 'pressure_pa': 250000 Pa is outside the sensor's range 0 to 250000",
             ),
-            (lambda c: c.pop("time_s"), "no column 'time_s' among position_m, pressure_pa"),
-            (lambda c: c.pop("pressure_pa"), "no column 'pressure_pa' (or 'force_n') among time_s"),
+            (lambda c: c.pop("time_s"), "cannot tell the column of the time (--time-column one of"),
+            (lambda c: c.pop("pressure_pa"), "cannot tell the column of the pressure (--press"),
         ],
         ids=[
             "empty",
@@ -62,8 +69,6 @@ class TestBadRecords:
             "never moved",
             "one way",
             "nan",
-            "inf",
-            "time inf",
             "repeated",
             "backward",
             "gap",
@@ -78,16 +83,8 @@ class TestBadRecords:
         columns = {name: np.array(column) for name, column in columns_of(quick_record).items()}
         change(columns)
         path = write_csv(columns)
-        method = ["--method", "refined"] if "gap" in message else []
+        method = ["--method", "published"] if "gap" in message else []
         assert refusal(path, *bench_options, *method).startswith(f"{path}: {message}")
-
-    def test_text_in_a_number(self, refusal, quick_csv, bench_options):
-        lines = quick_csv.read_text().splitlines()
-        lines[51] = "0.5,open,1e5"
-        quick_csv.write_text("\n".join(lines))
-        assert refusal(quick_csv, *bench_options).startswith(
-            f"{quick_csv}: row 52, column 'position_m': 'open' is not a number"
-        )
 
     def test_no_file(self, refusal, tmp_path, bench_options):
         path = tmp_path / "none.csv"

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """`identify --report`: one page, read as a browser reads it, and shown by one."""
 
 import json
@@ -36,10 +45,11 @@ WORDS = {
 }
 SECTIONS = [
     "Parameters",
+    "Uncertainty budget",
     "Friction against its baseline",
     "Record",
     "Valve signature",
-    "Sweep of the velocity threshold δv",
+    "Friction over speed",
     "Measured and simulated position",
     "Residual",
     "Notes",
@@ -91,12 +101,12 @@ def require_parameters(page, answer):
         low, high = told["interval"]
         has_interval = low is not None and low < high
         assert interval == (f"{shown(low)} to {shown(high)}" if has_interval else "–")
-        if answer["method"] == "refined":
+        if answer["method"] == "bench":
             assert published == [shown(told["published"])]
 
 
 def test_the_page_holds_all_that_was_found(reported, quick_csv):
-    page, answer = reported(quick_csv, *BASELINE, "--method", "refined")
+    page, answer = reported(quick_csv, *BASELINE, "--method", "bench")
     page.require_self_contained()
     assert page.said("h1") == ["Friction of record.csv"]
     assert page.said("h2") == [each for each in SECTIONS if each != "Notes" or answer["warnings"]]
@@ -106,7 +116,7 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     assert len(page.of("source")) == 5
     notes = [f"{re.sub(r'(?<= )-(?=[0-9])', '−', told)}." for told in answer["warnings"]]
     assert [text for text in page.said("p") if text in notes] == notes
-    assert page.table("setting")["method"] == ("refined",)
+    assert page.table("setting")["method"] == ("bench",)
     software = page.table("setting")["software"][0].split(", ")
     assert f"valve_friction_ros {valve_friction_ros.__version__}" in software
     assert {"numpy", "scipy", "Python"} < {each.split()[0] for each in software}
@@ -118,8 +128,8 @@ def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_r
     noisy = SensorNoise(position=20e-6, pressure=150.0, seed=2).applied_to(quick_record)
     page, answer = reported(write_csv(columns_of(noisy)))
     page.require_self_contained()
-    assert answer["method"] == "robust"
-    assert page.table("setting")["method"] == ("robust",)
+    assert answer["method"] == "plant"
+    assert page.table("setting")["method"] == ("plant",)
     titles = page.said("h2")
     assert titles.index("Uncertainty budget") == titles.index("Parameters") + 1
     estimated = {
@@ -145,7 +155,7 @@ def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_r
         f"{TIMING_UNCERTAINTY:g} s, by default",
     )
     words = page.text.lower()
-    assert "refined" not in words
+    assert "bench" not in words
     assert "0 samples" not in words.replace("1000 samples", "")
 
 
@@ -175,7 +185,7 @@ def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
 
 def test_without_a_baseline(reported, quick_csv):
     page, answer = reported(quick_csv)
-    assert "diagnosis" not in answer
+    assert (answer["diagnosis"]["ratio"], answer["diagnosis"]["survey"]) == (None, "good")
     assert "set a baseline, the friction of the healthy valve" in page.lead
     assert "excess friction" not in page.table("friction")
     assert page.status == ("grey", "?", "Unknown", "no baseline to compare the friction with")
@@ -187,7 +197,7 @@ def test_without_a_baseline(reported, quick_csv):
     [("150", ("green", "✓", "Friction normal")), ("30", ("red", "✗", "Excess friction"))],
 )
 def test_the_colour_of_the_status_is_that_of_the_diagnosis(reported, quick_csv, healthy, status):
-    page, _ = reported(quick_csv, "--method", "refined", "--baseline-coulomb-friction", healthy)
+    page, _ = reported(quick_csv, "--method", "bench", "--baseline-coulomb-friction", healthy)
     assert page.status[:3] == status
 
 
@@ -195,18 +205,18 @@ def test_a_record_has_its_date_or_that_of_its_file(reported, write_csv, columns_
     columns = columns_of(quick_record)
     path = write_csv(columns)
     os.utime(path, (1.7e9, 1.7e9))
-    page, _ = reported(path, "--method", "refined")
+    page, _ = reported(path, "--method", "bench")
     changed = "its file was last changed 2023-11-14 22:13 UTC."
     assert f"The record has no date; {changed}" in page.said("p")
     dated = write_csv({**columns, "time_s": 1.76e9 + np.asarray(columns["time_s"])})
     os.utime(dated, (1.7e9, 1.7e9))
-    page, _ = reported(dated, "--method", "refined")
+    page, _ = reported(dated, "--method", "bench")
     assert f"Recorded 2025-10-09 08:53 UTC; {changed}" in page.said("p")
     assert page.table("setting")["report written"][0].endswith(" UTC")
 
 
 def test_why_published_values_differ_is_told_beside_them(reported, quick_csv):
-    page, answer = reported(quick_csv, "--method", "refined")
+    page, answer = reported(quick_csv, "--method", "bench")
     (told,) = (text for text in page.said("p") if text.startswith("Published method: "))
     assert f"faster than δv = {answer['evidence']['threshold']:.3g} m/s" in told
     assert "Where the two differ, use the value." in told
@@ -223,7 +233,7 @@ def test_the_baseline_of_a_recording_with_its_signature(
     reported, call, write_csv, columns_of, quick_record, quick_csv, bench_yaml
 ):
     """The same record, as healthy valve: the ratio is 1, and both loops are one."""
-    page, answer = reported(quick_csv, "--baseline-recording", quick_csv, "--method", "refined")
+    page, answer = reported(quick_csv, "--baseline-recording", quick_csv, "--method", "bench")
     assert answer["diagnosis"]["ratio"] == pytest.approx(1.0)
     assert page.status[0] == "green"
     captions = [text for text in page.said("figcaption") if "Grey: the record of the" in text]

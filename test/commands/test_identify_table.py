@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `identify` as people use it: its table and its picture."""
 
 import dataclasses
@@ -9,13 +18,13 @@ import numpy as np
 import pytest
 from answers import KEYS, row_of
 
-from valve_friction_ros.commands.output.result_output import print_table
+from valve_friction_ros.commands.identify import print_table
 from valve_friction_ros.identification import (
     UNITS,
     IdentificationSettings,
     Parameter,
     Verdict,
-    identify_refined,
+    identify_bench,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -23,21 +32,20 @@ from valve_friction_ros.model import (
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)  # of the valve file
 PNG = b"\x89PNG\r\n\x1a\n"
-REFINED = ("--method", "refined")
+BENCH = ("--method", "bench")
 
 
 @pytest.fixture(scope="session")
 def result(quick_record):
-    return identify_refined(quick_record, BENCH_VALVE, SETTINGS)
+    return identify_bench(quick_record, BENCH_VALVE, SETTINGS)
 
 
 class TestTable:
     def test_every_parameter_with_interval_and_verdict(
         self, call, result, quick_csv, bench_options
     ):
-        code, out, err = call(quick_csv, *bench_options, *REFINED)
+        code, out, err = call(quick_csv, *bench_options, *BENCH)
         assert (code, err) == (0, "")
-        weak = "weak"  # two strokes only
         for name, unit in UNITS.items():
             one = result.parameters[name]
             published = format(result.estimate.values[name], ".6g")
@@ -46,9 +54,8 @@ class TestTable:
             else:
                 size = one.half_width
                 digits = f"{size:.0f}" if size >= 100 else f"{size:.2g}"
-                assert row_of(out, name) == f"{name} {one.value:.6g} {digits} {unit} {weak} " + (
-                    published
-                )
+                said = f"{one.value:.6g} {digits} {unit} {one.verdict.value} {published}"
+                assert row_of(out, name) == f"{name} {said}"
         assert "nan" not in out
 
     def test_fixed_values_have_no_width(self, call, quick_csv, bench_options):
@@ -59,19 +66,19 @@ class TestTable:
         assert "fixed: given" not in out
 
     def test_reasons_fit_and_notes(self, call, printed, result, quick_csv, bench_options):
-        answer = printed(quick_csv, *bench_options, *REFINED)
-        words = " ".join(call(quick_csv, *bench_options, *REFINED)[1].split())
+        answer = printed(quick_csv, *bench_options, *BENCH)
+        words = " ".join(call(quick_csv, *bench_options, *BENCH)[1].split())
         for name, entry in answer["parameters"].items():
-            assert f"{name} {entry['verdict']}: {entry['reason']}" in words
+            if entry["reason"]:
+                assert f"{name} {entry['verdict']}: {entry['reason']}" in words
         misfit = result.misfit
         share = f"{100 * misfit.rms / BENCH_VALVE.travel:.2g} % of travel"
-        assert f"fit {100 * misfit.fit:.2f} %: the refined model's stem is" in words
+        assert f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is" in words
         assert f"{misfit.rms * 1e6:.3g} µm rms from the measured stem, {share}; " in words
         assert f"; {misfit.systematic * 1e6:.3g} µm of it is not noise" in words
         sweep = answer["evidence"]
         assert f"threshold δv {sweep['threshold']:.4g} m/s, {sweep['samples']} samples" in words
-        assert f"window 31 samples; refined from {answer['derivative_window']}" in words
-        assert answer["warnings"]
+        assert "window 31 samples" in words
         for warning in answer["warnings"]:
             assert f"note: {warning}" in words
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What has changed on a valve beside its friction, where the healthy valve has a recording."""
 
 import json
@@ -26,7 +35,7 @@ def compared(call, weak_csv, quick_csv, bench_yaml):
 
     def compared(*options):
         files = (weak_csv, "--valve", bench_yaml, "--baseline-recording", quick_csv)
-        code, out, _ = call(*files, "--method", "refined", *options)
+        code, out, _ = call(*files, "--method", "bench", *options)
         return code, out
 
     return compared
@@ -53,7 +62,7 @@ def test_a_scale_of_the_sensor_qualifies_the_friction(
     read = Recording(0.01, reference + 1.5 * (pressure - reference), position)
     path = write_csv(columns_of(read), "scaled.csv")
     page = tmp_path / "page.html"
-    options = ("--valve", bench_yaml, "--baseline-recording", quick_csv, "--method", "refined")
+    options = ("--valve", bench_yaml, "--baseline-recording", quick_csv, "--method", "bench")
     code, out, _ = call(path, *options, "--json", "--report", page)
     assert code == 0
     answer = json.loads(out)
@@ -83,7 +92,7 @@ def test_text_and_report(compared, tmp_path):
 
 
 def test_a_friction_that_is_given_says_nothing_of_the_spring(call, weak_csv, bench_options):
-    options = ("--baseline-coulomb-friction", "152.7", "--method", "refined", "--json")
+    options = ("--baseline-coulomb-friction", "152.7", "--method", "bench", "--json")
     code, out, _ = call(weak_csv, *bench_options, *options)
     assert code == 0
     assert json.loads(out)["findings"] == []

@@ -1,7 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `plan-test`: what it knows, what it writes, what it refuses."""
 
 import csv
 import json
+import re
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -80,8 +91,14 @@ def test_the_text_says_that_nothing_moves_and_how_to_play_it(plan, tmp_path):
     assert "1.5 to 1.8 times as wide" in words
     assert "never that of the measured pressure" in words
     plays = [line for line in out.splitlines() if line.startswith("ros2 run")]
-    on_valve, on_bench = plays
-    for line in plays:
+    on_valve, watched, on_bench = plays
+    assert watched.startswith("ros2 run valve_friction_ros stroke_player --ros-args -r ")
+    given = dict(one.split(":=") for one in re.findall(r"-p (\S+)", watched))
+    assert Path(given["file"]) == tmp_path / "test.csv"
+    travel = 0.028575
+    low, high = (float(given[f"position_{end}"]) / travel for end in ("minimum", "maximum"))
+    assert 0.35 < low < 0.5 < high < 0.65  # within 40 to 60 % of the travel, and a margin of 5 %
+    for line in (on_valve, on_bench):
         assert line.startswith("ros2 run valve_friction_ros pressure_source --ros-args -r ")
         assert f"-p file:={tmp_path / 'test.csv'}" in line
     assert "-r actuator_pressure:=" in on_valve
@@ -153,3 +170,34 @@ def test_percentages(plan, capsys, text):
     with pytest.raises(SystemExit):
         plan(*KNOWN, f"--from={text}")
     assert "no percentage of the travel" in capsys.readouterr().err
+
+
+class TestWithoutRos:
+    """Set points for a control system, and a form for a person."""
+
+    def test_the_table_is_the_test_in_other_units(self, plan, tmp_path):
+        table, form = tmp_path / "steps.csv", tmp_path / "form.txt"
+        code, _, err = plan(*KNOWN, *QUICK, "--table", table, "--form", form)
+        assert (code, err) == (0, "")
+        with table.open() as stream:
+            rows = list(csv.DictReader(stream))
+        with (tmp_path / "test.csv").open() as stream:
+            corners = [tuple(map(float, row.values())) for row in csv.DictReader(stream)]
+        ends = [float(row["time_s"]) + float(row["within_s"]) for row in rows]
+        assert ends == pytest.approx([time for time, _ in corners], abs=0.011)
+        pressures = np.array([pressure for _, pressure in corners])
+
+        def column(name):
+            return [float(row[name]) for row in rows]
+
+        assert column("pressure_kpa") == pytest.approx(pressures / 1e3, abs=1e-3)
+        # 0 % is where the spring begins to move: P_ref + F_0/S_a; 100 % is k·travel/S_a above it.
+        low = BENCH_VALVE.pressure_reference + 231.65 / BENCH_VALVE.diaphragm_area
+        span = 205000 * BENCH_VALVE.travel / BENCH_VALVE.diaphragm_area
+        share = (pressures - low) / span
+        assert column("setpoint_percent") == pytest.approx(100 * share, abs=0.006)
+        assert column("setpoint_ma") == pytest.approx(4 + 16 * share, abs=6e-4)
+        assert any("reversal" in row["tells"] for row in rows)
+        text = form.read_text()
+        assert "ABORT" in text
+        assert f"{float(rows[0]['abort_above_mm']):.1f} mm" in text

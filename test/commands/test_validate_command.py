@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sub-command `validate`, from the estimate that `identify` wrote."""
 
 import json
@@ -90,7 +99,7 @@ def refused(call):
 
 @pytest.mark.parametrize(
     ("method", "excitation", "duration"),
-    [("refined", SineWave(period=10.0), 40.0), ("signature", TriangleWave(), 130.0)],
+    [("bench", SineWave(period=10.0), 40.0), ("signature", TriangleWave(), 130.0)],
 )
 def test_a_model_validates_on_a_record_it_has_not_seen(
     method,

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Where a dashboard listens without accounts, how often one may try, how long a session lasts."""
 
 import asyncio
@@ -9,17 +18,9 @@ import pytest
 from local_server import certificate_pair
 from quick_accounts import PASSWORD, quick_account, quick_hash
 
-from valve_friction_ros.dashboard.access import (
-    Access,
-    Account,
-    HashedPassword,
-    LogIn,
-    Refusal,
-    Role,
-    Sessions,
-)
-from valve_friction_ros.dashboard.access.attempt_limit import AttemptLimit
-from valve_friction_ros.dashboard.access.headers import host_of, is_own_origin, own_path
+from valve_friction_ros.dashboard.accounts import Access, Account, HashedPassword, Role
+from valve_friction_ros.dashboard.gate import host_of, is_own_origin, own_path
+from valve_friction_ros.dashboard.log_in import AttemptLimit, LogIn, Refusal, Sessions
 
 ANNA = quick_account()
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Accounts and the hashes of their passwords: what is read, refused and kept secret."""
 
 import hashlib
@@ -8,9 +17,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from quick_accounts import PASSWORD, quick_account, quick_hash
 
-from valve_friction_ros.dashboard.access import Account, HashedPassword, Role, accounts_from
-from valve_friction_ros.dashboard.access.accounts import VARIABLE
-from valve_friction_ros.dashboard.access.passwords import SHORTEST
+from valve_friction_ros.dashboard.accounts import (
+    SHORTEST,
+    VARIABLE,
+    Account,
+    HashedPassword,
+    Role,
+    accounts_from,
+)
 
 
 def test_a_new_hash_is_the_documented_scrypt():

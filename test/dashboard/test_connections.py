@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Connections that send no request, or only half of one, take the pages from nobody."""
 
 import asyncio
@@ -18,9 +27,9 @@ pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 import httpx
 import websockets
 
-from valve_friction_ros.dashboard.access import connections
-from valve_friction_ros.dashboard.access.accounts import VARIABLE
-from valve_friction_ros.dashboard.access.connections import (
+from valve_friction_ros.dashboard import gate
+from valve_friction_ros.dashboard.accounts import VARIABLE
+from valve_friction_ros.dashboard.gate import (
     ARRIVAL_TIME,
     MOST_OF_A_CLIENT,
     ConnectionLog,
@@ -152,7 +161,7 @@ def test_pages_that_are_open_live_on(page, opened):
 
 
 def test_the_log_has_the_first_one_and_sums(monkeypatch):
-    monkeypatch.setattr(connections, "_SUMMARY", 0.01)
+    monkeypatch.setattr(gate, "_SUMMARY", 0.01)
 
     async def crowd():
         lines = []

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The gate before a running NiceGUI page, by real HTTP requests, WebSockets and a browser."""
 
 import asyncio
@@ -15,11 +24,11 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from browser import Tab, axe_violations, chromium
 from local_server import certificate_pair, free_port
 from quick_accounts import PASSWORD, quick_account
 
-from valve_friction_ros.dashboard.access import Role
-from valve_friction_ros.dashboard.access.accounts import VARIABLE
+from valve_friction_ros.dashboard.accounts import VARIABLE, Role
 
 httpx = pytest.importorskip("httpx", reason="run `make venv-dashboard`")
 pytest.importorskip("nicegui", reason="run `make venv-dashboard`")
@@ -97,6 +106,12 @@ def operations(url):
 
 
 class TestWithoutSession:
+    def test_axe_finds_nothing_wrong_with_the_log_in(self, private):
+        with chromium() as browser, closing(Tab(browser, private, width=390)) as tab:
+            page = tab.open("/")
+            page.get_by_label("Password").wait_for()
+            assert axe_violations(page) == []
+
     def test_a_page_leads_to_the_log_in_and_back(self, private):
         answer = visitor(private).get("/valve?node=/fv_101&zone=UTC")
         assert answer.status_code == 303

@@ -1,9 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Services are called for those alone who may operate at that moment."""
 
 import asyncio
 
-from valve_friction_ros.dashboard import Answer
-from valve_friction_ros.dashboard.guarded_operator import GuardedOperator
+from valve_friction_ros.dashboard import Answer, ServiceRequest
+from valve_friction_ros.dashboard.context import GuardedOperator
 
 
 class Visit:
@@ -24,7 +33,7 @@ class Visit:
         return Answer(True, "done")
 
     def press(self):
-        return asyncio.run(self.operator.call("/fv\x1b_101/identifier", "identify"))
+        return asyncio.run(self.operator.call("/fv\x1b_101/identifier", ServiceRequest("identify")))
 
 
 def test_who_may_not_operate_calls_nothing():
@@ -41,7 +50,7 @@ def test_who_may_not_operate_calls_nothing():
 def test_who_operates_is_logged():
     visit = Visit("anna", True)
     assert visit.press() == (True, "done")
-    assert visit.called == [("/fv\x1b_101/identifier", "identify")]
+    assert visit.called == [("/fv\x1b_101/identifier", ServiceRequest("identify"))]
     assert visit.logged == ["anna calls /fv\\x1b_101/identifier/identify"]
 
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The history as the pages read it, and the charts of it."""
 
 import json
@@ -11,10 +20,9 @@ import pytest
 from histories import DAY, OTHER, START, VALVE, refused, success
 
 from valve_friction_ros.dashboard.charts import trend_chart
-from valve_friction_ros.dashboard.compared import compared, side_of_entry, side_of_view
-from valve_friction_ros.dashboard.heard.status_keys import Quantity
-from valve_friction_ros.dashboard.heard.valve_view import ValveView
-from valve_friction_ros.dashboard.kept import KeptHistory
+from valve_friction_ros.dashboard.history_cache import HistoryCache
+from valve_friction_ros.dashboard.live_state import Quantity, ValveView
+from valve_friction_ros.dashboard.plant_rows import compared, side_of_entry, side_of_view
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import (
     HistoryFile,
@@ -23,10 +31,9 @@ from valve_friction_ros.history import (
     history_mark,
     keep_usage,
 )
-from valve_friction_ros.history.copying.copied_rows import rows_of, write_rows
-from valve_friction_ros.history.copying.parts import PARTS
+from valve_friction_ros.history.copying import PARTS, rows_of, write_rows
+from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import reading, server_connection
 from valve_friction_ros.usage import Usage, UsedDay
 
 NOW = START + 40 * DAY
@@ -49,7 +56,7 @@ def file(tmp_path):
 
 
 def test_it_is_read_again_when_it_has_changed(file):
-    kept = KeptHistory(file.path)
+    kept = HistoryCache(file.path)
     assert kept.refresh()
     assert not kept.refresh()
     assert kept.valves == (VALVE,)
@@ -65,7 +72,7 @@ def test_it_is_read_again_when_it_has_changed(file):
 
 
 def test_a_server_is_asked_and_not_waited_for(file, database, postgres, monkeypatch):
-    monkeypatch.setattr("valve_friction_ros.dashboard.kept._PAUSE", 0.0)
+    monkeypatch.setattr("valve_friction_ros.dashboard.history_cache._SERVER_PAUSE", 0.0)
 
     def refreshed(condition):
         for _ in range(600):
@@ -76,7 +83,7 @@ def test_a_server_is_asked_and_not_waited_for(file, database, postgres, monkeypa
         return False
 
     copied(file.path, database)
-    kept = KeptHistory(database)
+    kept = HistoryCache(database)
     assert not kept.refresh()
     assert refreshed(lambda: kept.valves == (VALVE,))
     before = kept.spark(VALVE.name)
@@ -106,12 +113,13 @@ def test_a_row_that_is_written_before_and_arrives_after_another_is_seen(database
         file.add(success(START + k * DAY, 150.0, valve=valve, baseline=BASELINE))
         file.add(success(START + k * DAY + 1, 150.0, valve=valve, baseline=BASELINE))
     copied(files[0].path, database)
-    kept = KeptHistory(database)
+    kept = HistoryCache(database)
     kept._refresh()
-    with server_connection(database) as early, early.transaction():
+    with writing(database) as early:
         with reading(files[1].path) as source:
             (part, *_) = PARTS
-            rows = [(valve_id(early, VALVE), row) for row in rows_of(source, part, 1)]
+            of_valve = part.table.c.valve_id == 1
+            rows = [(valve_id(early, VALVE), row) for _, row in rows_of(source, part, of_valve)]
         write_rows(early, part, rows)
         copied(files[2].path, database)
         kept._refresh()
@@ -128,7 +136,7 @@ def test_a_row_that_is_written_before_and_arrives_after_another_is_seen(database
 
 
 def test_another_file_at_the_path_is_read_from_its_beginning(file, tmp_path):
-    kept = KeptHistory(file.path)
+    kept = HistoryCache(file.path)
     kept.refresh()
     other = HistoryFile(tmp_path / "other.sqlite")
     other.set_baseline(OTHER, KeptBaseline(BASELINE, START, START))
@@ -144,7 +152,7 @@ def test_another_file_at_the_path_is_read_from_its_beginning(file, tmp_path):
 
 
 def test_what_is_written_often_draws_nothing_anew(file):
-    kept = KeptHistory(file.path)
+    kept = HistoryCache(file.path)
     kept.refresh()
     mark, revision = history_mark(file), kept.revision
     keep_usage(file, VALVE, "run", [UsedDay(20_000, 0, Usage(1.0, 2, 3, (4,) * 20))])
@@ -155,7 +163,7 @@ def test_what_is_written_often_draws_nothing_anew(file):
 
 def test_a_file_that_is_missing_or_broken_is_a_problem_and_heals(tmp_path, file):
     path = tmp_path / "later.sqlite"
-    kept = KeptHistory(path)
+    kept = HistoryCache(path)
     assert kept.refresh()
     assert "no such file" in kept.problem
     path.write_bytes(b"not a database, but long enough to be looked at" * 40)
@@ -168,7 +176,7 @@ def test_a_file_that_is_missing_or_broken_is_a_problem_and_heals(tmp_path, file)
 
 
 def test_without_a_file_nothing_is_kept():
-    kept = KeptHistory(None)
+    kept = HistoryCache(None)
     assert not kept.refresh()
     assert kept.valve(VALVE.name) is None
     assert "no history_file" in kept.problem
@@ -178,7 +186,7 @@ def test_it_is_read_while_another_process_writes(file):
     with closing(sqlite3.connect(file.path, isolation_level=None)) as writer:
         writer.execute("BEGIN IMMEDIATE")
         writer.execute("UPDATE valve SET tag = 'half-way'")
-        kept = KeptHistory(file.path)
+        kept = HistoryCache(file.path)
         kept.refresh()
         assert kept.valves == (VALVE,)
         writer.execute("ROLLBACK")
@@ -189,7 +197,7 @@ def series(chart, name):
 
 
 def test_the_chart_shows_what_the_figure_shows(file):
-    kept = KeptHistory(file.path)
+    kept = HistoryCache(file.path)
     kept.refresh()
     history = kept.valve(VALVE.name)
     chart = trend_chart(history, ZoneInfo("UTC"), NOW)
@@ -210,7 +218,7 @@ def test_the_chart_shows_what_the_figure_shows(file):
 
 
 def test_the_time_axis_is_the_clock_of_the_zone(file):
-    kept = KeptHistory(file.path)
+    kept = HistoryCache(file.path)
     kept.refresh()
     chart = trend_chart(kept.valve(VALVE.name), ZoneInfo("Asia/Kolkata"), NOW)
     assert series(chart, "identified")["data"][0][0] == START // 1_000_000 + 5.5 * 3600 * 1000

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The store of a plant: filled by one thread, drained by others."""
 
 import math
@@ -7,18 +16,18 @@ import pytest
 from simulated_plant import hear, values_of_valve
 
 from valve_friction_ros.dashboard import Plant, Status, Unread
-from valve_friction_ros.dashboard.heard.plant import MOST_VALVES, Heard
-from valve_friction_ros.dashboard.heard.valve_view import Interval
+from valve_friction_ros.dashboard.history_cache import sparkline
+from valve_friction_ros.dashboard.live_state import MOST_VALVES, Heard
 from valve_friction_ros.dashboard.plant_rows import (
+    SORTS,
     RowFeed,
     interval_text,
-    number_and_width,
     quantity_texts,
     ratio_text,
     row_of,
 )
-from valve_friction_ros.dashboard.selection import SORTS
-from valve_friction_ros.dashboard.sparkline import sparkline
+from valve_friction_ros.health import Ratio
+from valve_friction_ros.wording import number_and_width
 
 DAY = 86_400_000_000_000
 
@@ -192,8 +201,8 @@ def test_a_ratio_of_any_size_is_short():
     assert [ratio_text(one) for one in (1.234, 0.0, 0.0004, 3e200)] == [
         "1.23", "0.00", "0.0004", "3e+200"
     ]  # fmt: skip
-    assert interval_text(Interval(1.05, math.nan, math.nan), " to ") == ""
-    assert interval_text(Interval(1.05, 1.0, 1.1), " to ") == "1.00 to 1.10"
+    assert interval_text(Ratio.between(1.05, math.nan, math.nan), " to ") == ""
+    assert interval_text(Ratio.between(1.05, 1.0, 1.1), " to ") == "1.00 to 1.10"
 
 
 def valve(**changes):

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What the server logs of refused log-ins, and what it compresses."""
 
 import asyncio
@@ -5,14 +14,15 @@ import asyncio
 import pytest
 from quick_accounts import quick_account
 
-from valve_friction_ros.dashboard.access import Access, Sessions
+from valve_friction_ros.dashboard.accounts import Access
+from valve_friction_ros.dashboard.log_in import Sessions
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
 
 import httpx
 from starlette.responses import PlainTextResponse
 
-from valve_friction_ros.dashboard.access.gate import Gate
+from valve_friction_ros.dashboard.gate import Gate
 from valve_friction_ros.dashboard.pages.server import LightlyPacked
 
 ANNA = quick_account()

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One assessed record, whose numbers the tests replace by their own."""
 
 from dataclasses import replace
@@ -9,7 +18,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     Parameter,
     Verdict,
-    identify_refined,
+    identify_bench,
 )
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION
 
@@ -23,7 +32,7 @@ def tight_record():
 
 @pytest.fixture(scope="session")
 def result(loose_record):
-    return identify_refined(loose_record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
+    return identify_bench(loose_record, BENCH_VALVE, IdentificationSettings(assumed_mass=1.6))
 
 
 @pytest.fixture(scope="session")

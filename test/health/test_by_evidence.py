@@ -1,7 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The diagnosis by moves in service, and the baseline that they can be."""
 
+from dataclasses import replace
+
 import pytest
-from service import VALVE, made_moves
+from service import SECOND, START, VALVE, made_moves
 
 from valve_friction_ros.evidence import evidence_of
 from valve_friction_ros.health import (
@@ -44,6 +55,19 @@ def test_limits_are_those_of_an_identification(now, level, signal, words):
     assert found.message.startswith(words)
     assert "moves in service since 2023-11-14" in found.message
     assert found.ratio.value == pytest.approx(now / 300.0, rel=0.05)
+
+
+def test_an_alarm_says_when_friction_changed():
+    """And with which doubt: the date is an interval that holds the truth."""
+    grown = evidence(lambda hour: 450.0 if hour >= 3.0 else 300.0, hours=3.7)
+    assert grown.change.earliest <= START + 3 * 3600 * SECOND <= grown.change.latest
+    first = reference_by_evidence(evidence(lambda _: 300.0))
+    for healthy, reference in ((baseline(), None), (None, first)):
+        found = diagnosis_by_evidence(grown, VALVE, healthy, LIMITS, reference)
+        assert found.level is Level.WARN
+        assert "; it changed between 2023-11-15" in found.message
+    steady = diagnosis_by_evidence(evidence(lambda _: 300.0), VALVE, baseline(), LIMITS)
+    assert "it changed" not in steady.message
 
 
 class TestReference:
@@ -91,12 +115,12 @@ class TestReference:
         found = self.found(now, healthy)
         assert found.level is Level.ERROR
         assert "the baseline cannot be compared: call ~/set_baseline" in found.message
-        assert words in why_not_compared(now, healthy)
+        assert words in str(why_not_compared(now, healthy))
 
     def test_a_baseline_that_can_be_compared_counts(self):
         now = evidence(lambda _: 450.0)
         assert self.found(now, baseline(450.0)).level is Level.OK
-        assert why_not_compared(now, baseline()) == why_not_compared(now, None) == ""
+        assert why_not_compared(now, baseline()) is why_not_compared(now, None) is None
 
     @pytest.mark.parametrize("reference", [None, FIRST], ids=["none", "of other speeds"])
     def test_a_change_is_an_alarm_where_nothing_can_be_compared(self, reference):
@@ -156,3 +180,12 @@ class TestBaseline:
         wide = evidence(lambda _: 50.0, settings=IdentificationSettings(timing_uncertainty=0.1))
         with pytest.raises(RefusalError, match=r"known to .* a baseline needs"):
             baseline_by_evidence(wide)
+
+    @pytest.mark.parametrize(("share", "serves"), [(0.13, True), (0.131, False)])
+    def test_moves_go_on_until_they_are_a_good_one(self, share, serves):
+        """Of a record 33 % would serve; more moves come by themselves."""
+        found = evidence(lambda _: 300.0)
+        one = found.parameters["sliding_friction"]
+        one = replace(one, half_width=share * one.value, uncalibrated=None)
+        found = replace(found, parameters={**found.parameters, "sliding_friction": one})
+        assert (reference_by_evidence(found) is not None) is serves

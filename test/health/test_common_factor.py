@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A factor that spring and friction share qualifies what is said of the friction."""
 
 from dataclasses import replace
@@ -8,10 +17,10 @@ from records import quick_record
 from valve_friction_ros import compare
 from valve_friction_ros.health import (
     Baseline,
-    Change,
     Diagnosis,
     FrictionMonitor,
     Level,
+    Measured,
     MonitorSettings,
     Ratio,
     StatusSignal,
@@ -20,11 +29,15 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Valve
+from valve_friction_ros.wording import quoted
 
-FACTOR = Change(2.2, 2.15, 2.25)
+FACTOR = Measured.between(2.2, 2.15, 2.25)
 VALVE = Valve(diaphragm_area=0.04, pressure_reference=1e5, travel=0.03)
 GROWN = Diagnosis(
-    Level.ERROR, StatusSignal.FAILURE, "excess friction: so much", Ratio(2.2, 2.1, 2.3)
+    Level.ERROR,
+    StatusSignal.FAILURE,
+    quoted("excess friction: so much"),
+    Ratio.between(2.2, 2.1, 2.3),
 )
 WORDS = (
     "friction and spring constant have changed by one factor, which points to the scale of the "
@@ -48,7 +61,7 @@ def test_a_force_has_no_diaphragm():
     ("diagnosis", "factor"),
     [
         (GROWN, None),
-        (GROWN, Change(1.5, 1.45, 1.55)),
+        (GROWN, Measured.between(1.5, 1.45, 1.55)),
         (replace(GROWN, level=Level.OK), FACTOR),
         (replace(GROWN, ratio=None), FACTOR),
     ],

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Verdicts at their limits, and what they say."""
 
 import dataclasses
@@ -8,22 +17,23 @@ import pytest
 from valve_friction_ros.health import (
     Baseline,
     FrictionLimits,
+    FrictionState,
     Level,
     SlidingFriction,
     StatusSignal,
     dead_band,
     dead_band_half_width,
     diagnose,
-    percentage,
 )
 from valve_friction_ros.identification import (
     IdentificationSettings,
     Parameter,
     Verdict,
-    identify_refined,
+    identify_bench,
 )
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.model import BENCH_VALVE, Valve
+from valve_friction_ros.wording import percentage
 
 BASELINE = Baseline(128.0)
 
@@ -111,8 +121,6 @@ def test_percentage(share, text):
 FAILURE = (Level.ERROR, StatusSignal.FAILURE, "excess friction")
 MAINTENANCE = (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
 NORMAL = (Level.OK, StatusSignal.GOOD, "friction normal")
-PERHAPS_GROWN = (Level.WARN, StatusSignal.CHECK_FUNCTION, "friction perhaps grown")
-PERHAPS_FALLEN = (Level.WARN, StatusSignal.CHECK_FUNCTION, "friction perhaps fallen")
 FALLEN = (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has fallen")
 COLLAPSED = (
     Level.ERROR,
@@ -147,7 +155,7 @@ class TestLevels:
         )
         level, signal, words = verdict
         assert (found.level, found.status_signal) == (level, signal)
-        assert found.ratio[:3] == (ratio, ratio, ratio)
+        assert found.ratio.interval == (ratio, ratio, ratio)
         compared = (
             f"{words}: coulomb friction is {ratio:.2f} ({ratio:.2f} to {ratio:.2f}) "
             "times its baseline; "
@@ -160,22 +168,18 @@ class TestLevels:
             (2.0 * math.exp(SHARE) * (1 + 1e-9), FAILURE),
             (2.0 * math.exp(SHARE) * (1 - 1e-9), MAINTENANCE),
             (2.0, MAINTENANCE),
-            (1.25 * math.exp(SHARE) * (1 + 1e-9), MAINTENANCE),
-            (1.25 * math.exp(SHARE) * (1 - 1e-9), PERHAPS_GROWN),
-            (1.25 * (1 + 1e-9), PERHAPS_GROWN),
-            (1.25, PERHAPS_GROWN),
+            (1.25 * (1 + 1e-9), MAINTENANCE),
+            (1.25, MAINTENANCE),
             (1.25 * (1 - 1e-9), NORMAL),
             (0.8 * (1 + 1e-9), NORMAL),
-            (0.8 * (1 - 1e-9), PERHAPS_FALLEN),
-            (0.8 * math.exp(-SHARE) * (1 + 1e-9), PERHAPS_FALLEN),
-            (0.8 * math.exp(-SHARE) * (1 - 1e-9), FALLEN),
+            (0.8 * (1 - 1e-9), FALLEN),
             (0.5, FALLEN),
             (0.5 * math.exp(-SHARE) * (1 + 1e-9), FALLEN),
             (0.5 * math.exp(-SHARE) * (1 - 1e-9), COLLAPSED),
         ],
     )
     @pytest.mark.parametrize("of_the_baseline", [False, True])
-    def test_only_a_whole_interval_passes_a_limit(
+    def test_only_a_whole_interval_passes_the_limit_of_an_error(
         self, with_values, friction, ratio, verdict, of_the_baseline
     ):
         """Doubt about the baseline holds an alarm back as doubt about the friction does."""
@@ -189,16 +193,28 @@ class TestLevels:
         assert found.ratio.low == pytest.approx(ratio * math.exp(-SHARE), rel=1e-12)
         assert found.ratio.high == pytest.approx(ratio * math.exp(SHARE), rel=1e-12)
 
-    def test_a_vague_estimate_raises_no_alarm(self, with_values, friction):
-        """±69.4 % reaches e^-0.694 = 0.4996 of the value; 2.5 times may be 1.249 times."""
-        vague = friction(2.5 * 128.0, 0.694 * 2.5 * 128.0)
+    @pytest.mark.parametrize(
+        ("ratio", "share", "state"),
+        [
+            # 2.5·e^-0.693 = 1.250 is the limit; ln 2.5 = 0.916 is 1.5 times 0.611.
+            (2.5, 0.692, FrictionState.GROWN),
+            (2.5, 0.694, FrictionState.UNCLEAR),
+            # ln 1.5 = 0.405 is 1.5 times 0.2703, and 1.5·e^-0.27 = 1.145 is not beyond the limit.
+            (1.5, 0.2702, FrictionState.GROWN),
+            (1.5, 0.2704, FrictionState.UNCLEAR),
+            (1 / 1.5, 0.2702, FrictionState.FALLEN),
+            (1 / 1.5, 0.2704, FrictionState.UNCLEAR),
+        ],
+    )
+    def test_a_vague_estimate_raises_no_alarm(self, with_values, friction, ratio, share, state):
+        vague = friction(ratio * 128.0, share * ratio * 128.0)
         found = diagnose(with_values(coulomb_friction=vague), BENCH_VALVE, BASELINE)
-        assert (found.level, found.status_signal) == PERHAPS_GROWN[:2]
-        assert found.state.side is None
-        assert found.message.endswith(
-            "identify it again from a longer record with more strokes to be sure"
-        )
-        assert "is 2.50 (1.25 to 5.00) times its baseline" in found.message
+        assert found.state is state
+        if state is FrictionState.UNCLEAR:
+            assert found.state.side is None
+            assert found.message.endswith(
+                "identify it again from a longer record with more strokes to be sure"
+            )
 
     def test_limits_of_the_user(self, with_values):
         limits = FrictionLimits(warn_ratio=1.125, error_ratio=1.25, low_ratio=0.875)
@@ -282,11 +298,11 @@ class TestUnknownFriction:
         )
 
     def test_zero_is_a_friction_without_an_interval_of_its_ratio(self, with_values):
-        """0 times the baseline; without an interval no limit counts as passed."""
+        """0 times the baseline; without an interval no error counts as passed."""
         found = diagnose(with_values(coulomb_friction=0.0), BENCH_VALVE, BASELINE)
-        assert (found.level, found.status_signal) == PERHAPS_FALLEN[:2]
+        assert (found.level, found.status_signal) == FALLEN[:2]
         assert found.ratio.value == 0.0
-        assert found.message.startswith("friction perhaps fallen: ")
+        assert found.message.startswith("friction has fallen: ")
 
 
 class TestSlidingFriction:
@@ -322,13 +338,29 @@ class TestSlidingFriction:
         assert found.to_dict()["ratio_of"] == "sliding_friction"
         assert found.to_dict()["ratio_speed"] == 8e-3
 
-    def test_at_other_speeds_it_says_so(self, slid, unknown):
-        result = slid(300.0, speed=3e-3, coulomb_friction=unknown())
+    @pytest.mark.parametrize(
+        ("value", "state"),
+        [
+            (900.0, FrictionState.EXCESS),
+            (400.0, FrictionState.GROWN),
+            (200.0, FrictionState.UNCLEAR),
+            (150.0, FrictionState.NORMAL),
+            (60.0, FrictionState.FALLEN),
+            (20.0, FrictionState.COLLAPSED),
+        ],
+    )
+    def test_at_another_speed_it_takes_more_to_be_sure(self, slid, unknown, value, state):
+        """Of an unknown F_v: at 8 mm/s 400 N would be an ERROR, as would 60 N."""
+        result = slid(value, speed=4e-3, coulomb_friction=unknown(), viscous_friction=unknown())
+        result = dataclasses.replace(result, evidence={})
+        found = diagnose(result, BENCH_VALVE, Baseline(sliding=self.SLIDING))
+        assert (found.state, found.ratio.speed) == (state, 8e-3)
+
+    def test_at_speeds_too_far_apart_it_says_so(self, slid, unknown):
+        result = slid(300.0, speed=2e-3, coulomb_friction=unknown(), viscous_friction=unknown())
         found = diagnose(result, BENCH_VALVE, Baseline(sliding=self.SLIDING))
         assert (found.level, found.ratio) == (Level.OK, None)
-        assert (
-            "the stem slides at 3 mm/s, and at 8 mm/s in the baseline: move it at" in found.message
-        )
+        assert "the stem slides at 2 mm/s, and at 8 mm/s in the baseline" in found.message
 
     def test_too_small_to_be_identified_it_has_collapsed(self, slid, unknown):
         """Half of 196 N is 98 N; at 4 mm/s, 49 N may be 98 N at twice the speed."""
@@ -443,7 +475,8 @@ class TestWords:
             None,
         )
         assert found.message == (
-            "no baseline yet; the stem ignores reversals smaller than 5.2 % of its travel"
+            "no baseline yet; the stem ignores reversals smaller than 5.2 % of its travel: good, "
+            "by the limits of a first survey"
         )
 
     def test_without_a_travel_the_friction_itself_is_told(self, with_values, friction):
@@ -488,7 +521,7 @@ class TestCalibration:
 
         def build(valve=BENCH_VALVE, **settings):
             given = IdentificationSettings(assumed_mass=1.6, **settings)
-            return [identify_refined(one, valve, given) for one in (loose_record, tight_record)]
+            return [identify_bench(one, valve, given) for one in (loose_record, tight_record)]
 
         return build
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A monitor that goes on with the estimate from before it began."""
 
 from dataclasses import replace
@@ -17,9 +26,10 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.wording import quoted
 
 HEALTHY = Baseline(100.0, 1.0)
-ALARM = Diagnosis(Level.ERROR, StatusSignal.FAILURE, "excess friction: 4 times; so", None)
+ALARM = Diagnosis(Level.ERROR, StatusSignal.FAILURE, quoted("excess friction: 4 times; so"), None)
 DOUBT = "the Karnopp model does not describe this valve (9 µm of misfit)"
 
 
@@ -51,7 +61,9 @@ def test_the_alarm_goes_on_with_its_age(age, words):
     monitor = monitor_with(earlier)
     assert monitor.diagnosis() == ALARM
     told = f"{ALARM.message} (identified {words}before the restart)"
-    assert monitor.diagnosis(START + int(age)) == replace(ALARM, message=told)
+    aged = monitor.diagnosis(START + int(age))
+    assert aged.message == told
+    assert replace(aged, statement=ALARM.statement) == ALARM
     assert (monitor.estimate, monitor.earlier) == (earlier, earlier)
     assert (monitor.result, monitor.stamp) == (None, START)
 
@@ -94,7 +106,7 @@ class TestAgain:
         assert monitor.diagnosis() == ALARM
 
     def test_a_baseline_that_was_set_since(self):
-        calm = Diagnosis(Level.OK, StatusSignal.GOOD, "no baseline yet; so", None)
+        calm = Diagnosis(Level.OK, StatusSignal.GOOD, quoted("no baseline yet; so"), None)
         monitor = monitor_with(kept(diagnosis=calm, baseline=None))
         assert monitor.diagnosis().level == Level.ERROR
         assert monitor.diagnosis().message.startswith("excess friction: coulomb friction is 4.00 (")
@@ -113,9 +125,9 @@ class TestAgain:
         assert monitor_with(earlier, Baseline(50.0)).diagnosis() == ALARM
 
     def test_a_doubt_about_the_model_stays(self):
-        doubted = replace(ALARM, message=f"{DOUBT}; {ALARM.message}", doubt=DOUBT)
+        doubted = replace(ALARM, statement=quoted(f"{DOUBT}; {ALARM.message}"), doubt=quoted(DOUBT))
         monitor = monitor_with(kept(diagnosis=doubted), Baseline(400.0, 1.0))
         diagnosis = monitor.diagnosis()
         assert diagnosis.level == Level.OK
-        assert diagnosis.doubt == DOUBT
+        assert str(diagnosis.doubt) == DOUBT
         assert diagnosis.message.startswith(f"{DOUBT}; friction normal: coulomb friction is 1.00")

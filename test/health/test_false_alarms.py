@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Noisy records of an unchanged valve and of a tightened one, against a noisy baseline."""
 
 from dataclasses import replace
@@ -5,7 +14,7 @@ from dataclasses import replace
 import pytest
 
 from valve_friction_ros.health import Baseline, FrictionLimits, Level, diagnose
-from valve_friction_ros.identification import IdentificationSettings, identify_refined
+from valve_friction_ros.identification import IdentificationSettings, identify_bench
 from valve_friction_ros.model import BENCH_VALVE, SensorNoise
 
 SETTINGS = IdentificationSettings(assumed_mass=1.6)
@@ -14,7 +23,7 @@ SEEDS = range(40)
 
 def assessed(record, seed):
     noise = SensorNoise(28.6e-6, 165.0, seed)
-    return identify_refined(noise.applied_to(record), BENCH_VALVE, SETTINGS)
+    return identify_bench(noise.applied_to(record), BENCH_VALVE, SETTINGS)
 
 
 @pytest.fixture(scope="module")

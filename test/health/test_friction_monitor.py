@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The monitor of one valve: what it remembers, and what a change of settings leaves."""
 
 import dataclasses
@@ -10,8 +19,10 @@ from records import simulated
 
 from valve_friction_ros.health import (
     Baseline,
+    BaselineLack,
     FrictionLimits,
     FrictionMonitor,
+    Lack,
     Level,
     MonitorSettings,
     RefusedRecordError,
@@ -24,8 +35,8 @@ from valve_friction_ros.health.friction_monitor import MOST_SAMPLES
 from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
-    identify_refined,
-    identify_robust,
+    identify_bench,
+    identify_plant,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -35,6 +46,7 @@ from valve_friction_ros.model import (
     converter_response,
 )
 from valve_friction_ros.streams import Samples, Snapshot
+from valve_friction_ros.wording import Code, said
 
 SETTINGS = MonitorSettings(BENCH_VALVE)
 START = 1_700_000_000_000_000_000
@@ -100,7 +112,7 @@ class TestRefusalsInARow:
     def test_three_are_a_fault(self):
         assert self.problem(self.BAD, self.BAD) is None
         told = "the latest 3 identifications were refused: why"
-        assert self.problem(self.BAD, self.BAD, self.BAD) == told
+        assert str(self.problem(self.BAD, self.BAD, self.BAD)) == told
 
     def test_too_little_motion_does_not_count(self):
         assert self.problem(*[self.STILL] * 9) is None
@@ -141,14 +153,14 @@ class TestLongRecord:
         stamps = START + 500_000 * np.arange(times.size, dtype=np.int64)
         signals = (Samples(stamps, one) for one in (record.pressure, record.position))
         snapshot = Snapshot(next(signals), next(signals), (), None)
-        result = identify_snapshot(snapshot, replaced(method="refined"))
+        result = identify_snapshot(snapshot, replaced(method="bench"))
         assert result.evidence["averaged_samples"] == 2
         assert result.findings[-1] == "the record is of means of 2 samples that follow each other"
         assert len(result.recording) == MOST_SAMPLES
         assert result.recording.sample_period == 1e-3
         # The motion takes thousands of samples, so pairs of them say what they say by themselves.
         found = coulomb_friction(result)
-        whole = coulomb_friction(identify_refined(snapshot.recording(), BENCH_VALVE))
+        whole = coulomb_friction(identify_bench(snapshot.recording(), BENCH_VALVE))
         assert abs(found.value - whole.value) < 0.25 * whole.half_width
         assert found.half_width == pytest.approx(whole.half_width, rel=0.2)
 
@@ -162,16 +174,17 @@ class TestIdentification:
         np.testing.assert_array_equal(snapshot.recording().position, loose_record.position)
 
     @pytest.mark.parametrize(
-        ("bias", "method"), [(None, identify_robust), (1.13e-3, identify_refined)]
+        ("name", "method"),
+        [("plant", identify_plant), ("best", identify_plant), ("refined", identify_bench)],
     )
-    def test_a_full_buffer_gives_what_the_record_gives(self, loose_record, bias, method):
-        """By the default: ``robust`` wherever it applies, ``refined`` with a position bias."""
-        settings = replaced(identification=IdentificationSettings(position_bias=bias))
+    def test_a_full_buffer_gives_what_the_record_gives(self, loose_record, name, method):
+        """Former names of the methods are understood, and results carry the present ones."""
+        settings = replaced(method=name)
         monitor = FrictionMonitor(settings)
         feed(monitor, loose_record)
         found = identify_snapshot(monitor.buffer.snapshot(), settings)
         expected = method(loose_record, BENCH_VALVE, settings.identification)
-        assert found.method == settings.method_used == expected.method
+        assert found.method == settings.method == expected.method
         assert str(found.parameters) == str(expected.parameters)  # nan is not nan
         if expected.estimate is not None:
             assert found.estimate.values == expected.estimate.values
@@ -181,14 +194,14 @@ class TestIdentification:
         feed(monitor, loose_record, but=range(400, 475))
         snapshot = monitor.buffer.snapshot()
         with pytest.raises(RefusalError, match=r"^gap of 0\.76 s in actuator_pressure"):
-            identify_snapshot(snapshot, replaced(method="refined"))
+            identify_snapshot(snapshot, replaced(method="published"))
         friction = identify_snapshot(snapshot, SETTINGS).parameters["coulomb_friction"]
         assert friction.interval[0] < LOW_FRICTION.coulomb_friction < friction.interval[1]
 
     def test_by_the_settings(self, loose_record):
         settings = replaced(
             identification=IdentificationSettings(fixed={"mass": 1.25}, derivative_window=21),
-            method="refined",
+            method="published",
         )
         monitor = FrictionMonitor(settings)
         feed(monitor, loose_record)
@@ -246,10 +259,11 @@ class TestMemory:
         assert monitor.refusal == "the stem did not move"
         assert monitor.diagnosis().level == Level.ERROR
         verdict = diagnose(result, BENCH_VALVE, monitor.baseline)
-        assert monitor.diagnosis() == dataclasses.replace(
-            verdict,
-            message="the latest identification was refused: the stem did not move; before: "
-            + verdict.message,
+        refused = said(Code.REFUSED, reason="the stem did not move", of=verdict.statement)
+        assert monitor.diagnosis() == dataclasses.replace(verdict, statement=refused)
+        assert monitor.diagnosis().message == (
+            "the latest identification was refused: the stem did not move; before: "
+            + verdict.message
         )
 
 
@@ -298,9 +312,8 @@ class TestInternalError:
         alarm = monitor.diagnosis()
         monitor.fail("internal error: a bug")
         assert alarm.level == Level.ERROR
-        assert monitor.diagnosis() == dataclasses.replace(
-            alarm, message=f"internal error: a bug; before: {alarm.message}"
-        )
+        failed = said(Code.FAILED, error="internal error: a bug", of=alarm.statement)
+        assert monitor.diagnosis() == dataclasses.replace(alarm, statement=failed)
 
 
 class TestBaseline:
@@ -335,6 +348,7 @@ class TestBaseline:
         text = "^the valve has no result to take as baseline: identify it first$"
         with pytest.raises(RefusalError, match=text):
             monitor.result_as_baseline()
+        assert monitor.baseline_lacks() == (BaselineLack("result", Lack.RESULT),)
         assert monitor.baseline is None
 
     def test_however_small(self, with_values, friction):
@@ -352,6 +366,7 @@ class TestBaseline:
             f"a {name.replace('_', ' ')} of -3 N cannot be a baseline: check the direction of "
             "both signals, then identify again"
         )
+        assert refusal.value.lacks == monitor.baseline_lacks() == (BaselineLack(name, Lack.SIZE),)
         assert monitor.baseline == Baseline(100.0)
 
     @pytest.mark.parametrize("before", [None, Baseline(100.0)])
@@ -390,7 +405,7 @@ class TestChangeOfSettings:
         monitor.change_settings(replaced(**changes))
         assert len(monitor.buffer) == 0
         cause = "valve or window parameters were changed"
-        assert monitor.buffer.snapshot().cleared_because == cause
+        assert str(monitor.buffer.snapshot().cleared_because) == cause
         assert monitor.result is result
 
     def test_the_new_range_holds(self, result):
@@ -398,7 +413,7 @@ class TestChangeOfSettings:
         monitor.change_settings(
             replaced(valve=dataclasses.replace(BENCH_VALVE, pressure_maximum=2e5))
         )
-        assert "0 to 200000 Pa" in monitor.buffer.add_pressure(START, 2.1e5)
+        assert "0 to 200000 Pa" in str(monitor.buffer.add_pressure(START, 2.1e5))
 
     @pytest.mark.parametrize(
         "changes",

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What was found on a valve stays until it is measured anew."""
 
 import math
@@ -18,6 +27,7 @@ from valve_friction_ros.health import (
     StatusSignal,
 )
 from valve_friction_ros.model import Valve
+from valve_friction_ros.wording import quoted
 
 DAY = 86_400_000_000_000
 TRAVEL = 0.03
@@ -98,7 +108,7 @@ class TestMonitor:
         )
         for time, numbers in ((0, LOST), (DAY, WITHIN)):
             friction = {"coulomb_friction": unknown()}
-            unclear = Diagnosis(Level.OK, StatusSignal.GOOD, "", None)
+            unclear = Diagnosis(Level.OK, StatusSignal.GOOD, quoted(""), None)
             found = SimpleNamespace(
                 numbers=numbers,
                 parameters=friction,

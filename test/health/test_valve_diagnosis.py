@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What has changed on a valve beside its friction: bounds, causes, and whole identifications."""
 
 import math
@@ -21,6 +30,7 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.identification import (
     IMPERFECTIONS_FOUND,
+    Parameter,
     RefusalError,
     Verdict,
     identify,
@@ -54,7 +64,11 @@ MAINTENANCE, FUNCTION = StatusSignal.MAINTENANCE_REQUIRED, StatusSignal.CHECK_FU
 
 def found(baseline=BASELINE, valve=VALVE, limits=None, **changes):
     """Findings where the numbers of the healthy valve are changed to these; None: not known."""
-    numbers = HEALTHY | {name: Measured(*one) for name, one in changes.items() if one is not None}
+    numbers = HEALTHY | {
+        name: one if isinstance(one, Measured) else Measured(*one)
+        for name, one in changes.items()
+        if one
+    }
     for name, one in changes.items():
         if one is None:
             del numbers[name]
@@ -137,7 +151,7 @@ def test_numbers_within_their_intervals_raise_nothing(moved):
 
 
 def scaled(factor, *names):
-    return {name: tuple(factor * one for one in HEALTHY[name]) for name in names}
+    return {name: HEALTHY[name].times(factor) for name in names}
 
 
 FORCES = ("spring_constant", "coulomb_friction", "static_friction", "viscous_friction")
@@ -362,11 +376,10 @@ class TestWholeIdentifications:
 
 @pytest.mark.parametrize("zero", [-5e3, -6e3])
 def test_a_preload_near_zero_is_judged_by_its_newtons(healthy_result, zero):
-    """A sensor that reads 5 kPa too low takes the preload of 232 N to 9 N, unknown as a ratio."""
+    """A sensor that reads 5 kPa too low takes the preload of 232 N to 9 N."""
     true = noisy_record(LOW_FRICTION, 6)
     result = identify(replace(true, drive=true.drive + zero), BENCH_VALVE)
-    is_known = result.parameters["spring_preload"].verdict is not Verdict.NOT_IDENTIFIABLE
-    assert is_known == (zero < -5e3)
+    assert result.parameters["spring_preload"].verdict is not Verdict.NOT_IDENTIFIABLE
     shift = valve_changes(valve_numbers(result), valve_numbers(healthy_result))["spring_preload"]
     assert shift.holds(BENCH_VALVE.diaphragm_area * zero)
     finding = only(diagnose_parameters(result, Baseline.of(healthy_result)))
@@ -383,7 +396,8 @@ def test_a_doubted_model_leaves_what_the_signals_and_the_force_balance_say_and_t
     numbers = valve_numbers(replace(healthy_result, misfit=doubted))
     signals = {"drive_noise", "stem_noise", "lowest_position", "highest_position"}
     balance = {"spring_constant"}  # the preload is weak here
-    assert numbers.keys() == signals | balance | {"slip_force"}
+    of_sliding = {"sliding_friction_shared", "speed_exponent"}
+    assert numbers.keys() == signals | balance | of_sliding | {"slip_force"}
 
 
 @pytest.mark.parametrize(("coulomb", "width"), [(300.0, 80.0), (50.0, 50.0), (None, 80.0)])
@@ -398,7 +412,7 @@ def test_a_slip_jump_is_known_to_half_of_itself_where_friction_is_not(
     parameters = {**healthy_result.parameters, "coulomb_friction": friction}
     evidence = {**healthy_result.evidence, IMPERFECTIONS_FOUND: found}
     numbers = valve_numbers(replace(healthy_result, parameters=parameters, evidence=evidence))
-    assert numbers["slip_force"] == (160.0, math.hypot(30.0, width))
+    assert numbers["slip_force"] == Measured(160.0, math.hypot(30.0, width))
 
 
 def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):
@@ -407,6 +421,14 @@ def test_a_spring_that_is_hardly_known_leaves_no_other_number(healthy_result):
     numbers = valve_numbers(replace(healthy_result, parameters=parameters))
     assert "spring_preload" not in numbers
     assert "stem_noise" in numbers
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_a_viscous_friction_counts_where_it_is_told_apart_from_a_lag(healthy_result, verdict):
+    viscous = Parameter("viscous_friction", 4.9e3, 100.0, 200.0, verdict)
+    parameters = {**healthy_result.parameters, "viscous_friction": viscous}
+    numbers = valve_numbers(replace(healthy_result, parameters=parameters))
+    assert ("viscous_friction" in numbers) is (verdict is Verdict.IDENTIFIED)
 
 
 def test_a_refused_baseline_is_still_refused(healthy_result):

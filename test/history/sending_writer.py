@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Processes that each write to a history, and send it to a server, until killed or done.
 
 Arguments: folder, address, rows, and FILE=NUMBER of the valve for each process.
@@ -19,12 +28,12 @@ from valve_friction_ros.history import (
     HistoryServer,
     KeptBaseline,
     keep_told_level,
+    outbox,
     sender_of,
 )
-from valve_friction_ros.history.copying import delivery, sender, unsent
 
 # So that a run of seconds has many instants of each kind.
-sender._PAUSE, delivery._MANY = 0.01, 10
+outbox._PAUSE, outbox._MANY = 0.01, 10
 
 
 def write(path, server, number, most):
@@ -39,8 +48,8 @@ def write(path, server, number, most):
             keep_told_level(history, valve, Level(k % 3))
         sys.stdout.write(f"{k}\n")
         sys.stdout.flush()
-    unsent.follow(history.path)  # before the sender has done so, nothing is counted
-    while unsent.count_unsent(history.path).waiting:
+    outbox.follow(history.path)  # before the sender has done so, nothing is counted
+    while outbox.count_unsent(history.path).waiting:
         time.sleep(0.02)
     sends.end()
 

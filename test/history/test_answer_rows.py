@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Answers of the stem to its command in the history: kept once, in order, bounded."""
 
 import math
@@ -16,16 +25,16 @@ from valve_friction_ros.history import (
     read_answers,
     valve_histories,
 )
-from valve_friction_ros.response import Move, summarised
+from valve_friction_ros.response import StepAnswer, summarised
 
 TRAVEL = 0.02
 
 
 def answer(place, dead_time=0.25, **changes):
-    flags = {one.name: True for one in fields(Move) if one.type in (bool, "bool")}
-    numbers = {one.name: 0.125 for one in fields(Move) if one.name not in flags}
+    flags = {one.name: True for one in fields(StepAnswer) if one.type in (bool, "bool")}
+    numbers = {one.name: 0.125 for one in fields(StepAnswer) if one.name not in flags}
     own = {"stamp": START + place * SECOND, "dead_time": dead_time, "at_stop": False}
-    return replace(Move(**numbers, **flags), **{**own, **changes})
+    return replace(StepAnswer(**numbers, **flags), **{**own, **changes})
 
 
 @pytest.fixture
@@ -94,6 +103,7 @@ def test_an_older_file_and_one_without_the_table(tmp_path):
 def _without_the_table(history):
     with closing(sqlite3.connect(history.path)) as connection:
         connection.execute("DROP TABLE answer")
+        connection.execute("PRAGMA user_version = 6")
 
 
 def test_a_row_that_holds_none_is_told(history):
@@ -101,5 +111,5 @@ def test_a_row_that_holds_none_is_told(history):
     with closing(sqlite3.connect(history.path)) as connection:
         connection.execute("UPDATE answer SET dead_time = 'soon'")
         connection.commit()
-    with pytest.raises(HistoryError, match="a row holds no answer"):
+    with pytest.raises(HistoryError, match="a row holds no"):
         read_answers(history, VALVE.name)

@@ -1,14 +1,23 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A valve's history belongs to one node at a time, and to none that has been killed."""
 
 import subprocess
 import sys
 
-from valve_friction_ros.history.claim import Claim
+from valve_friction_ros.history.place import Claim
 
 HOLD = """
 import sys
 from pathlib import Path
-from valve_friction_ros.history.claim import Claim
+from valve_friction_ros.history.place import Claim
 claim = Claim(Path(sys.argv[1]), "/fv_101/identifier")
 print(claim.ask(), flush=True)
 sys.stdin.read()

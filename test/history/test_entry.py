@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What an identification becomes in the history."""
 
 import json
@@ -8,13 +17,14 @@ from histories import START, VALVE, parameter, refused, success
 
 from valve_friction_ros import __version__
 from valve_friction_ros.health import (
+    DatedNumber,
     FrictionMonitor,
     Measured,
     MonitorSettings,
     RefusedRecordError,
     identify_snapshot,
 )
-from valve_friction_ros.history import FrictionPoint, entry_of
+from valve_friction_ros.history import entry_of
 from valve_friction_ros.history.entry import settings_text
 from valve_friction_ros.identification import IdentificationSettings, RefusalError, Verdict
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SineWave, Valve, simulate
@@ -53,7 +63,7 @@ def test_a_success(monitor):
     assert (entry.baseline, entry.limits) == (baseline, monitor.settings.limits)
     assert entry.warnings == result.warnings
     assert (entry.time, entry.valve, entry.refusal) == (START, VALVE, "")
-    assert entry.method == result.method == "robust"
+    assert entry.method == result.method == "plant"
     assert entry.version == __version__
 
 
@@ -77,11 +87,9 @@ def test_a_refusal_of_nothing(monitor):
     assert entry_of(monitor, VALVE, empty, monitor.settings, START, refusal).span is None
 
 
-@pytest.mark.parametrize(("bias", "method"), [(None, "robust"), (1.13e-3, "refined")])
-def test_a_refusal_has_the_method_that_would_have_identified(bias, method):
-    """A choice of a method would join in one trend what two methods found."""
-    identification = IdentificationSettings(position_bias=bias)
-    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, identification))
+@pytest.mark.parametrize(("name", "method"), [("best", "plant"), ("bench", "bench")])
+def test_a_refusal_has_the_method_that_would_have_identified(name, method):
+    monitor = FrictionMonitor(MonitorSettings(BENCH_VALVE, method=name))
     empty, refusal = monitor.buffer.snapshot(), RefusalError("no samples")
     entry = entry_of(monitor, VALVE, empty, monitor.settings, START, refusal)
     assert entry.method == method
@@ -95,7 +103,7 @@ def test_neither_a_success_nor_a_refusal_or_both():
 
 @pytest.mark.parametrize("verdict", Verdict)
 def test_only_what_was_measured_makes_a_trend(verdict):
-    expected = FrictionPoint(START, 150.0, 3.0)
+    expected = DatedNumber(START, 150.0, 3.0)
     measured = verdict in (Verdict.IDENTIFIED, Verdict.WEAK)
     assert success(verdict=verdict).point() == (expected if measured else None)
     assert refused().point() is None

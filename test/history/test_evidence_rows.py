@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Moves in the history."""
 
 import math
@@ -8,12 +17,11 @@ import pytest
 from histories import DAY, OTHER, SECOND, START, VALVE
 from test_file import write_version_2
 
-from valve_friction_ros.evidence import Change, Move
+from valve_friction_ros.evidence import FrictionChange, Move
 from valve_friction_ros.health import Reference, SlidingFriction
 from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
-    evidence_rows,
     keep_change,
     keep_moves,
     keep_reference,
@@ -21,6 +29,7 @@ from valve_friction_ros.history import (
     read_change,
     read_moves,
     read_reference,
+    service_rows,
 )
 from valve_friction_ros.model import Valve
 
@@ -60,7 +69,7 @@ def test_twice_is_once_and_nothing_is_nothing(history):
 
 
 def test_their_number_is_bounded(history, monkeypatch):
-    monkeypatch.setattr(evidence_rows, "MOST_MOVES", 5)
+    monkeypatch.setattr(service_rows, "MOST_MOVES", 5)
     keep_moves(history, OTHER, BUILT, [move(0)])
     for number in range(9):
         keep_moves(history, VALVE, BUILT, [move(number)])
@@ -122,7 +131,9 @@ class TestReference:
 
 
 class TestChange:
-    FIRST, LATER = (Change(START, START + DAY, one, 0.9 * one, 1.1 * one) for one in (1.3, 1.5))
+    FIRST, LATER = (
+        FrictionChange(START, START + DAY, one, 0.9 * one, 1.1 * one) for one in (1.3, 1.5)
+    )
 
     def kept(self, history, built=BUILT, valve=VALVE):
         return read_change(history, valve.name, built)
@@ -147,6 +158,7 @@ class TestChange:
             connection = sqlite3.connect(history.path)
             with connection:
                 connection.execute("DROP TABLE evidence_change")
+                connection.execute("PRAGMA user_version = 6")  # the last that may lack it
             connection.close()
             assert self.kept(history) is None
             change()
@@ -180,5 +192,5 @@ def test_a_row_that_holds_no_move(history):
     with connection:
         connection.execute("UPDATE move SET force = 'much'")
     connection.close()
-    with pytest.raises(HistoryError, match="a row holds no move"):
+    with pytest.raises(HistoryError, match="a row holds no"):
         read_moves(history, VALVE.name, BUILT)

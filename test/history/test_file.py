@@ -1,6 +1,14 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The history's file: what goes in comes out, and what plain SQL finds in it."""
 
-import math
 import re
 import sqlite3
 from dataclasses import replace
@@ -22,14 +30,21 @@ from histories import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from valve_friction_ros.health import Baseline, Level, Measured, MonitorSettings, SlidingFriction
+from valve_friction_ros.health import (
+    Baseline,
+    DatedNumber,
+    Level,
+    Measured,
+    MonitorSettings,
+    SlidingFriction,
+)
 from valve_friction_ros.history import (
-    FrictionPoint,
     HistoryError,
     HistoryFile,
     KeptBaseline,
     KeptValve,
-    schema,
+    database,
+    tables,
 )
 from valve_friction_ros.history.entry import settings_text
 from valve_friction_ros.identification import Verdict
@@ -100,8 +115,8 @@ def test_a_trend_leaves_the_calibration_out(history):
     kept = found.parameters[widened.name]
     assert same(kept, widened)
     assert kept.half_width == pytest.approx(20**0.5)
-    point = FrictionPoint(START, 100.0, 2.0)
-    assert history.points(VALVE.name, "refined") == (point,)
+    point = DatedNumber(START, 100.0, 2.0)
+    assert history.points(VALVE.name, "bench") == (point,)
     assert found.point() == entry.point() == point
 
 
@@ -119,7 +134,7 @@ def test_a_file_of_version_1_is_read_and_extended(history):
     new = success(START + 9 * DAY, parameters={"coulomb_friction": friction})
     history.add(new)
     assert all(map(same, history.entries(), (*old, new)))
-    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
 
 
 @pytest.mark.parametrize("driven_by", Drive)
@@ -212,7 +227,7 @@ def test_a_file_of_version_5_is_read_and_extended(history):
     assert history.last_success(VALVE.name).numbers == {}
     assert select(history, "PRAGMA user_version") == [(5,)]
     history.set_baseline(VALVE, replace(kept, time=START + 1))
-    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
     assert history.baseline(VALVE.name).baseline.numbers == NUMBERS
     assert history.baseline(VALVE.name, until=START + 1).baseline.numbers == {}
 
@@ -230,7 +245,7 @@ def test_a_file_of_version_4_is_read_and_extended(history):
     assert same(history.last_success(VALVE.name), entry)
     assert select(history, "PRAGMA user_version") == [(4,)]
     history.prepare()
-    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
     assert history.baselines(VALVE.name) == (first, replace(second, replaced=first.baseline))
     assert history.baselines(OTHER.name) == (second,)
 
@@ -246,7 +261,7 @@ def test_a_file_of_version_3_is_read_and_extended(history):
     assert history.baseline(VALVE.name) == kept
     record = Recording(0.01, np.arange(100.0), np.arange(100.0))
     history.set_baseline(VALVE, replace(kept, time=START + 1, record=record))
-    assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+    assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
     assert len(history.baseline(VALVE.name).record) == 100
 
 
@@ -264,8 +279,8 @@ class TestVersion2:
         assert all(map(same, history.entries(), self.ENTRIES))
         assert history.baseline(VALVE.name) == KeptBaseline(self.BASELINE, START + 5, START)
         assert history.baseline(OTHER.name).baseline == Baseline(600.0, 7.0)
-        points = history.points(VALVE.name, "refined", baseline=self.BASELINE)
-        assert points == (FrictionPoint(START, 150.0, 3.0), FrictionPoint(START + DAY, 210.0, 4.0))
+        points = history.points(VALVE.name, "bench", baseline=self.BASELINE)
+        assert points == (DatedNumber(START, 150.0, 3.0), DatedNumber(START + DAY, 210.0, 4.0))
         return True
 
     def test_it_is_read_as_it_is(self, history):
@@ -277,7 +292,7 @@ class TestVersion2:
         write_version_2(history)
         history.prepare()
         assert self.is_whole(history)
-        assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+        assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
         assert select(history, "PRAGMA foreign_key_check") == []
         kept = KeptBaseline(Baseline(sliding=SLIDING), START + 3 * DAY, START)
         history.set_baseline(VALVE, kept)
@@ -291,11 +306,15 @@ class TestVersion2:
         history.prepare()
         new = HistoryFile(tmp_path / "new.sqlite")
         new.prepare()
-        for table in ("identification", "parameter", "baseline"):
-            columns = f"SELECT name, type, \"notnull\" FROM pragma_table_info('{table}')"
+        for table in tables.METADATA.tables:
+            info = f"pragma_table_info('{table}') WHERE name != 'id'"
+            columns = f'SELECT name, type, "notnull" FROM {info}'
             assert sorted(select(history, columns)) == sorted(select(new, columns))
-        of = "SELECT sql FROM sqlite_master WHERE name IN ('friction', 'baseline_of_valve')"
+        of = "SELECT sql FROM sqlite_master WHERE name = 'friction'"
         assert select(history, of) == select(new, of)
+        indices = "SELECT name, sql FROM sqlite_master WHERE type = 'index' AND sql NOT NULL"
+        found, expected = (sorted(select(one, indices)) for one in (history, new))
+        assert [one for one in expected if one[0] != "settings_content"] == found
 
 
 @given(
@@ -348,12 +367,12 @@ def test_points_are_those_of_the_entries(history):
         history.add(entry)
     expected = [point for one in entries if (point := one.point()) is not None]
     assert expected
-    assert history.points(VALVE.name, "refined") == tuple(expected)
+    assert history.points(VALVE.name, "bench") == tuple(expected)
     later = expected[0].time + 1
-    assert history.points(VALVE.name, "refined", later) == tuple(
+    assert history.points(VALVE.name, "bench", later) == tuple(
         p for p in expected if p.time >= later
     )
-    assert history.points(OTHER.name, "refined") == (FrictionPoint(START, 150.0, 3.0),)
+    assert history.points(OTHER.name, "bench") == (DatedNumber(START, 150.0, 3.0),)
 
 
 def test_points_of_the_sliding_friction_are_those_of_the_entries(history):
@@ -363,17 +382,16 @@ def test_points_of_the_sliding_friction_are_those_of_the_entries(history):
         success(START, sliding=SLIDING),
         success(START + 1, sliding=replace(SLIDING, speed=8e-3)),
         success(START + 2),
-        success(START + 3, sliding=replace(SLIDING, speed=4e-3)),
+        success(START + 3, sliding=replace(SLIDING, speed=1e-3)),
     ]
     for entry in entries:
         history.add(entry)
-    points = history.points(VALVE.name, "refined", baseline=baseline)
+    points = history.points(VALVE.name, "bench", baseline=baseline)
     assert points == tuple(p for one in entries if (p := one.point(baseline)) is not None)
     assert [point.time - START for point in points] == [0, 1]
-    assert points[0] == FrictionPoint(START, SLIDING.value, SLIDING.half_width)
-    # F_v between 0 and 205.5 N over 8 mm/s, so from 205.5 N up to 9.5/8 of it.
-    assert points[1].value == pytest.approx(205.5 * (1 + 0.5 * 1.5 / 8))
-    assert points[1].half_width == pytest.approx(math.hypot(3.25, 205.5 * 0.5 * 1.5 / 8))
+    assert points[0] == DatedNumber(START, SLIDING.value, SLIDING.half_width)
+    assert 205.5 < points[1].value < 205.5 * 9.5 / 8
+    assert points[1].half_width > SLIDING.half_width
 
 
 class TestBaseline:
@@ -530,7 +548,7 @@ class TestSql:
 
     def test_versions(self, history):
         history.prepare()
-        assert select(history, "PRAGMA user_version") == [(schema.SCHEMA_VERSION,)]
+        assert select(history, "PRAGMA user_version") == [(tables.SCHEMA_VERSION,)]
         assert select(history, "PRAGMA journal_mode") == [("wal",)]
 
     def test_no_row_without_its_valve(self, history):
@@ -545,7 +563,7 @@ def test_a_file_system_without_shared_memory(history, monkeypatch):
     def elsewhere(where, **options):
         return connect(f"{where}&vfs=unix-dotfile", **options)
 
-    monkeypatch.setattr(schema.sqlite3, "connect", elsewhere)
+    monkeypatch.setattr(database.sqlite3, "connect", elsewhere)
     history.add(success())
     assert len(history.entries()) == 1
     monkeypatch.undo()
@@ -559,9 +577,12 @@ def test_parameters_come_back_in_their_order(history):
     assert [*history.entries()[0].parameters] == names
 
 
-def test_rows_of_an_earlier_version_go_on_under_the_new_name(history):
-    """The method `refined` was called sweep."""
-    history.add(success(START, method="sweep"))
-    history.add(success(START + 1, method="refined"))
-    assert [point.time for point in history.points(VALVE.name, "refined")] == [START, START + 1]
-    assert {entry.method for entry in history.entries()} == {"refined"}
+@pytest.mark.parametrize(
+    ("formers", "method"), [(("sweep", "refined"), "bench"), (("best", "robust"), "plant")]
+)
+def test_rows_of_an_earlier_version_go_on_under_the_new_name(history, formers, method):
+    for later, name in enumerate((*formers, method, "published")):
+        history.add(success(START + later, method=name))
+    times = [START, START + 1, START + 2]
+    assert [point.time for point in history.points(VALVE.name, method)] == times
+    assert [entry.method for entry in history.entries()] == [*[method] * 3, "published"]

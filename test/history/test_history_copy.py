@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Copies of a history: complete, resumed, compared, from each version of the schema."""
 
 import math
@@ -17,10 +26,10 @@ from valve_friction_ros.history import (
     HistoryError,
     HistoryFile,
     copied,
+    copying,
     keep_told_level,
     read_told_level,
 )
-from valve_friction_ros.history.copying import copy
 
 HERE = Path(__file__).parent
 
@@ -54,6 +63,7 @@ def test_there_and_back_is_the_same(history, other, tmp_path):
         "usage": 6,
         "alarm_recording": 2,
         "told_level": 2,
+        "alarm_event": 4,
         "move": 8,
         "evidence_reference": 2,
         "evidence_change": 2,
@@ -67,7 +77,7 @@ def test_there_and_back_is_the_same(history, other, tmp_path):
     assert (
         all_of(HistoryFile(tmp_path / "back.sqlite")) == all_of(History(other)) == all_of(history)
     )
-    assert [one.written for one in copied(history.path, other)] == [0] * 10
+    assert [one.written for one in copied(history.path, other)] == [0] * 11
 
 
 def test_one_valve_alone(history, other):
@@ -126,7 +136,7 @@ def test_a_file_of_an_older_version_is_copied_and_stays_as_it_is(version, other,
     old = all_of(HistoryFile(path))
     assert is_same(copied(path, other))
     assert all_of(History(other)) == old
-    assert [one.written for one in copied(path, other)] == [0] * 10
+    assert [one.written for one in copied(path, other)] == [0] * 11
     assert path.read_bytes() == content
     HistoryFile(path).add(success(START + 99))  # which changes its tables, and not its keys
     parts = copied(path, other)
@@ -146,7 +156,7 @@ class KilledError(Exception):
 
 
 def test_a_copy_that_ends_early_goes_on(history, other, monkeypatch):
-    monkeypatch.setattr(copy, "_MANY", 7)
+    monkeypatch.setattr(copying, "_MANY", 7)
     for number in range(40):
         history.add(success(START + 100 + number))
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a file sends to a server: all of it, once, whatever ends in between."""
 
 import signal
@@ -30,7 +39,7 @@ from valve_friction_ros.history import (
     read_told_level,
     sender_of,
 )
-from valve_friction_ros.history.copying.unsent import count_unsent, follow
+from valve_friction_ros.history.outbox import count_unsent, follow
 
 HERE = Path(__file__).parent
 WRITER = HERE / "sending_writer.py"
@@ -278,14 +287,14 @@ class TestFaults:
                 database_of(database),
                 "ALTER TABLE identification ADD CHECK (method != 'best')",
             )
-            for number, method in enumerate(("refined", "best", "robust"), 1):
+            for number, method in enumerate(("bench", "best", "plant"), 1):
                 history.add(success(START + number, method=method))
             wait_until_sent(sender)
             wait_until(lambda: sender.state.count.refused == 1)
         assert [one.method for one in History(database).entries()] == [
-            "refined",
-            "refined",
-            "robust",
+            "bench",
+            "bench",
+            "plant",
         ]
 
     def test_a_file_that_is_removed_begins_anew(self, history, database):

@@ -1,6 +1,14 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A history on a PostgreSQL server: read as a file is, its tables, its address."""
 
-import os
 import re
 import sqlite3
 import subprocess
@@ -9,6 +17,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
 from full_history import all_of, fill
 from histories import OTHER, START, VALVE, success
 
@@ -20,10 +29,13 @@ from valve_friction_ros.history import (
     copied,
     history_mark,
     ratios_after,
-    schema,
     server_from,
+    tables,
 )
-from valve_friction_ros.history.schema import server_connection
+from valve_friction_ros.history import (
+    database as connections,
+)
+from valve_friction_ros.history.database import server_engine, writing
 
 PROJECT = Path(__file__).resolve().parents[2]
 VERSION_7 = Path(__file__).with_name("server_of_version_7.sql")
@@ -57,7 +69,7 @@ def test_the_view_for_plain_sql_is_the_same(history, database, postgres):
         "SELECT time, valve, tag, coulomb_friction, half_width, sliding_friction, ratio, message, "
         "refusal FROM friction"
     )
-    with schema.writing(history.path) as file:
+    with closing(sqlite3.connect(history.path)) as file:
         expected = sorted(file.execute(query), key=repr)
     assert len(expected) == 6
     assert sorted(postgres.do(database_of(database), query), key=repr) == expected
@@ -78,20 +90,20 @@ def written(dump, folder):
 def test_there_is_nothing_before_the_first_row(database):
     with pytest.raises(HistoryError, match="holds no history: `valve_friction history copy`"):
         History(database).valves()
-    with server_connection(database):
+    with writing(database):
         pass
     assert History(database).valves() == ()
 
 
 def test_columns_of_both_engines_are_the_same(history, database, postgres):
-    with server_connection(database):
+    with writing(database):
         pass
     found = postgres.do(
         database_of(database),
         "SELECT table_name, column_name FROM information_schema.columns "
         "WHERE table_schema = 'public' ORDER BY table_name, ordinal_position",
     )
-    with schema.writing(history.path) as file:
+    with closing(sqlite3.connect(history.path)) as file:
         tables = sorted(
             name
             for (name,) in file.execute(
@@ -106,6 +118,18 @@ def test_columns_of_both_engines_are_the_same(history, database, postgres):
     assert found == expected
 
 
+def with_step(monkeypatch, *statements):
+    """Have a next version whose step from this one are some statements."""
+
+    def step(connection, version):
+        assert version == tables.SCHEMA_VERSION
+        for statement in statements:
+            connection.exec_driver_sql(statement)
+
+    monkeypatch.setattr(connections, "SCHEMA_VERSION", tables.SCHEMA_VERSION + 1)
+    monkeypatch.setattr(connections, "bring_up_to_date", step)
+
+
 class TestVersions:
     """Tables of an older version are changed, those of a newer one are left alone."""
 
@@ -113,8 +137,18 @@ class TestVersions:
         """It holds what the file of that version holds."""
         postgres.do(database_of(database), VERSION_7.read_text())
         file = HistoryFile(written(VERSION_7.with_name("history_of_version_7.sql"), tmp_path))
-        assert all_of(History(database)) == all_of(file)
-        assert [one.written for one in copied(file.path, database)] == [0] * 10
+        name = database_of(database)
+        rights = "GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader"
+        postgres.do(name, f"CREATE ROLE reader LOGIN PASSWORD 'one'; {rights}")
+        reader = History(HistoryServer(postgres.url(name, "reader", "one")))
+        assert all_of(reader) == all_of(History(database)) == all_of(file)
+        with writing(database):
+            pass
+        postgres.do(name, "GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader")
+        assert [one.written for one in copied(file.path, database)] == [0] * 11
+        assert all_of(reader) == all_of(file)
+        server_engine(reader.place).dispose()
+        postgres.do(name, "DROP OWNED BY reader; DROP ROLE reader")
         file.add(success(START + 9))
         assert sum(one.written for one in copied(file.path, database)) == 1
         assert all_of(History(database)) == all_of(file)
@@ -122,36 +156,23 @@ class TestVersions:
     def test_a_step_is_done_once_by_many(self, history, database, monkeypatch):
         copied(history.path, database)
         before = all_of(History(database))
-        from valve_friction_ros.history import tables
-        from valve_friction_ros.history.server import tables as of_server
-
-        version = schema.SCHEMA_VERSION + 1
-        monkeypatch.setattr(tables, "SCHEMA_VERSION", version)
-        monkeypatch.setattr(of_server, "SCHEMA_VERSION", version)
-        step = ("ALTER TABLE valve ADD COLUMN remark REAL",)
-        monkeypatch.setattr(tables, "_STEPS", {**tables._STEPS, schema.SCHEMA_VERSION: step})
+        with_step(monkeypatch, "ALTER TABLE valve ADD COLUMN remark REAL")
         for _ in range(2):
-            with server_connection(database) as connection:
-                found = connection.execute("SELECT remark FROM valve").fetchall()
+            with writing(database) as connection:
+                found = connection.exec_driver_sql("SELECT remark FROM valve").all()
         assert len(found) == 2
         assert all_of(History(database)) == before
 
     def test_a_step_that_fails_changes_nothing(self, history, database, monkeypatch):
         copied(history.path, database)
         before = all_of(History(database))
-        from valve_friction_ros.history import tables
-        from valve_friction_ros.history.server import tables as of_server
-
         with monkeypatch.context() as patch:
-            patch.setattr(tables, "SCHEMA_VERSION", schema.SCHEMA_VERSION + 1)
-            patch.setattr(of_server, "SCHEMA_VERSION", schema.SCHEMA_VERSION + 1)
-            steps = ("DROP VIEW friction", "ALTER TABLE nowhere ADD COLUMN remark REAL")
-            patch.setattr(tables, "_STEPS", {**tables._STEPS, schema.SCHEMA_VERSION: steps})
-            with pytest.raises(HistoryError, match="nowhere"), server_connection(database):
+            with_step(patch, "DROP VIEW friction", "ALTER TABLE nowhere ADD COLUMN remark REAL")
+            with pytest.raises(HistoryError, match="nowhere"), writing(database):
                 pass
         assert all_of(History(database)) == before
-        with server_connection(database) as connection:
-            assert connection.execute("SELECT count(*) FROM friction").fetchone()[0] == 6
+        with writing(database) as connection:
+            assert connection.exec_driver_sql("SELECT count(*) FROM friction").scalar() == 6
 
     def test_a_newer_one_is_refused(self, history, database, postgres):
         copied(history.path, database)
@@ -213,14 +234,16 @@ class TestTrouble:
         with pytest.raises(ValueError, match=f"{name}: no address"):
             server_from("", environment={name: "s3cret"})
 
-    def test_a_server_that_stands_still_is_left(self, history, database, postgres):
-        from valve_friction_ros.history.server.connection import ServerConnection
-
+    def test_a_server_that_stands_still_is_left(self, history, database, postgres, monkeypatch):
         copied(history.path, database)
-        connection = ServerConnection(database, patience=1.0)
-        with postgres.paused(), pytest.raises(HistoryError, match="no answer for 1 s"):  # noqa: SIM117
-            with connection.transaction():
-                pass
+        monkeypatch.setattr(connections, "_PATIENCE_WITH_SERVER", 1.0)
+        late = pytest.raises(
+            HistoryError, match="timeout: no answer for 1 s: check that the server"
+        )
+        with late, writing(database) as connection, postgres.paused():
+            connection.scalar(sa.select(1))
+        with postgres.paused(), pytest.raises(HistoryError):
+            History(database).valves()
         assert History(database).valves() == history.valves()
 
     def test_a_connection_that_has_ended_is_made_anew(self, history, database, postgres):
@@ -253,14 +276,11 @@ def test_without_a_server_its_library_is_not_loaded(tmp_path):
         text=True,
         check=True,
         timeout=60,
-        env={**os.environ, "PYTHONPATH": str(PROJECT)},
     )
     assert done.stdout == "False\n"
 
 
 def test_without_its_library_one_line_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "psycopg", None)
-    monkeypatch.delitem(sys.modules, "valve_friction_ros.history.server.connection", raising=False)
-    monkeypatch.delattr("valve_friction_ros.history.server.connection", raising=False)
     with pytest.raises(HistoryError, match=r"^postgresql://h/d: psycopg is missing: pip install"):
         History(HistoryServer("postgresql://h/d")).valves()

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A line through estimates that scatter: closed forms, and coverage."""
 
 import math
@@ -8,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import linregress
 
-from valve_friction_ros.history.scattered_line import ScatteredLine, fit_line
+from valve_friction_ros.history.trend import ScatteredLine, fit_line
 
 TIMES = np.array([0.0, 1.0, 3.0, 4.0, 7.0])
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Drift of the Coulomb friction: coverage on simulated histories, days, outliers, limits."""
 
 import math
@@ -7,8 +16,8 @@ import pytest
 from histories import DAY, SECOND, START
 from scipy.stats import binom
 
-from valve_friction_ros.health import Baseline, FrictionLimits, SlidingFriction
-from valve_friction_ros.history import MONTH, FrictionPoint, Limit, trend_of
+from valve_friction_ros.health import Baseline, DatedNumber, FrictionLimits, SlidingFriction
+from valve_friction_ros.history import MONTH, Limit, trend_of
 
 NOON = START // DAY * DAY + DAY // 2
 RUNS = 400
@@ -23,14 +32,14 @@ def points(drift=0.0, count=20, scatter=0.0, half_width=3.0, rng=None, every=7):
         width = half_width * rng.uniform(0.5, 2.0)
         friction = 150.0 + drift * day * DAY / MONTH
         friction += rng.normal(0, scatter) + rng.normal(0, width / 1.959964)
-        found.append(FrictionPoint(NOON + day * DAY, friction, width))
+        found.append(DatedNumber(NOON + day * DAY, friction, width))
     return found
 
 
 def straight(drift=3.0, count=20, every=7):
     """Frictions on a line, each ± 1 N."""
     return [
-        FrictionPoint(NOON + k * every * DAY, 150.0 + drift * k * every * DAY / MONTH, 1.0)
+        DatedNumber(NOON + k * every * DAY, 150.0 + drift * k * every * DAY / MONTH, 1.0)
         for k in range(count)
     ]
 
@@ -66,7 +75,7 @@ def test_a_stationary_valve_shows_no_drift(name):
 def test_five_exact_looking_estimates_that_scatter_give_no_confidence():
     """0.8 N a day, and 16.4 N² of residual with three degrees of freedom."""
     values = [150.0, 154.0, 151.0, 156.0, 153.0]
-    trend = trend_of([FrictionPoint(NOON + k * DAY, value, 1e-3) for k, value in enumerate(values)])
+    trend = trend_of([DatedNumber(NOON + k * DAY, value, 1e-3) for k, value in enumerate(values)])
     assert not trend.is_significant
     assert trend.drift == pytest.approx(0.8 * MONTH / DAY, rel=1e-6)
     assert trend.line.scatter == pytest.approx(math.sqrt(16.4 / 3), rel=1e-6)
@@ -92,14 +101,14 @@ class TestDays:
         some = straight(0.0, count=6)
         double = [*some, some[2]._replace(time=some[2].time + SECOND, value=156.0, half_width=2.0)]
         single = [*some]
-        single[2] = FrictionPoint(some[2].time, 151.2, math.sqrt(0.8))
+        single[2] = DatedNumber(some[2].time, 151.2, math.sqrt(0.8))
         found, expected = trend_of(double), trend_of(single)
         assert found.days == 6
         assert found.drift == pytest.approx(expected.drift, rel=1e-6)
         assert found.half_width == pytest.approx(expected.half_width, rel=1e-6)
 
     def test_many_of_three_days_are_no_trend(self):
-        some = [FrictionPoint(NOON + k * DAY // 20, 150.0 + k, 1.0) for k in range(49)]
+        some = [DatedNumber(NOON + k * DAY // 20, 150.0 + k, 1.0) for k in range(49)]
         assert trend_of(some) is None
         assert trend_of([*some, some[-1]._replace(time=some[-1].time + DAY)]).days == 4
 
@@ -191,7 +200,7 @@ def test_an_interval_that_cannot_be(half_width):
 def test_against_a_baseline_of_sliding_friction_its_limits_count():
     """200 N at 9.5 mm/s: worth maintenance at 250 N; F_c of the baseline does not matter."""
     baseline = Baseline(1.0, 0.0, SlidingFriction(200.0, 1.0, 9.5e-3))
-    rising = [FrictionPoint(NOON + k * DAY, 220.0 + k, 1.0) for k in range(20)]
+    rising = [DatedNumber(NOON + k * DAY, 220.0 + k, 1.0) for k in range(20)]
     trend = trend_of(rising, baseline)
     assert trend.what == "sliding friction at 9.5 mm/s"
     assert trend.crossing.limit is Limit.WARN

@@ -1,5 +1,15 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A history that cannot be written or read: the cause, and what to do, in one line."""
 
+import contextlib
 import sqlite3
 import subprocess
 import sys
@@ -9,7 +19,7 @@ from pathlib import Path
 import pytest
 from histories import START, success
 
-from valve_friction_ros.history import HistoryError, HistoryFile, schema
+from valve_friction_ros.history import HistoryError, HistoryFile, database, tables
 
 PROJECT = Path(__file__).resolve().parents[2]
 FOLDERS = (PROJECT / "test" / "support", PROJECT)
@@ -56,7 +66,7 @@ def fill(monkeypatch, pages):
 
     connect = sqlite3.connect
     monkeypatch.setattr(
-        schema.sqlite3, "connect", lambda *some, **more: connect(*some, factory=Full, **more)
+        database.sqlite3, "connect", lambda *some, **more: connect(*some, factory=Full, **more)
     )
 
 
@@ -161,14 +171,14 @@ def test_a_folder_in_place_of_the_file(tmp_path):
 
 
 def test_newer_schema(history):
-    change(history, f"PRAGMA user_version = {schema.SCHEMA_VERSION + 1}")
+    change(history, f"PRAGMA user_version = {tables.SCHEMA_VERSION + 1}")
     expected = (
-        f"written by a newer version of this package (schema {schema.SCHEMA_VERSION + 1}, this "
-        f"version knows {schema.SCHEMA_VERSION}): update the package, or name another history_file"
+        f"written by a newer version of this package (schema {tables.SCHEMA_VERSION + 1}, this "
+        f"version knows {tables.SCHEMA_VERSION}): update the package, or name another history_file"
     )
     for action in (HistoryFile.prepare, HistoryFile.entries):
         assert told(history, action) == expected
-    change(history, f"PRAGMA user_version = {schema.SCHEMA_VERSION}")
+    change(history, f"PRAGMA user_version = {tables.SCHEMA_VERSION}")
     assert is_whole(history)
 
 
@@ -181,6 +191,25 @@ def test_another_programs_database(tmp_path, statement):
     before = history.path.read_bytes()
     assert told(history) == "the database of another program: name another history_file"
     assert history.path.read_bytes() == before
+
+
+def test_another_process_creates_it_while_it_is_looked_at(tmp_path, monkeypatch):
+    """Its mark and its tables are of one moment, or it would seem another program's."""
+    history, refused = HistoryFile(tmp_path / "history.sqlite"), []
+
+    def creates(connection, name, pragma=database._pragma):
+        value = pragma(connection, name)
+        with contextlib.closing(sqlite3.connect(history.path, timeout=0)) as other:
+            try:
+                other.execute("CREATE TABLE theirs (a)")
+            except sqlite3.OperationalError as error:
+                refused.append(str(error))
+        return value
+
+    monkeypatch.setattr(database, "_pragma", creates)
+    history.add(success())
+    assert set(refused) == {"database is locked"}
+    assert is_whole(history)
 
 
 def test_no_database(tmp_path):
@@ -215,7 +244,7 @@ def test_an_empty_file_is_a_new_history(tmp_path):
 
 
 def test_held_by_another(history, monkeypatch):
-    monkeypatch.setattr(schema, "_PATIENCE", 0.05)
+    monkeypatch.setattr(database, "_PATIENCE", 0.05)
     holder = sqlite3.connect(history.path, isolation_level=None)
     holder.execute("BEGIN IMMEDIATE")
     assert told(history) == "database is locked: find the process that holds it, and end it"
@@ -238,15 +267,15 @@ def test_a_row_that_holds_no_result(history):
 def test_a_row_that_somebody_has_spoilt_makes_no_trend(history, half_width):
     history.add(success(START + 1))
     change(history, f"UPDATE parameter SET half_width = {half_width} WHERE identification_id = 1")
-    assert [point.time for point in history.points("/fv_101/identifier", "refined")] == [START + 1]
+    assert [point.time for point in history.points("/fv_101/identifier", "bench")] == [START + 1]
 
 
 def test_nothing_of_a_failed_change_stays(history, monkeypatch):
     """The identification is written, its forgetting fails: neither has happened."""
-    from valve_friction_ros.history import file as history_file
+    from valve_friction_ros.history import history as history_file
 
     def fail(connection, *_):
-        connection.execute("SELECT * FROM no_such_table")
+        connection.exec_driver_sql("SELECT * FROM no_such_table")
 
     monkeypatch.setattr(history_file, "_forget", fail)
     with pytest.raises(HistoryError, match="no such table"):

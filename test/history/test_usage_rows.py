@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Usage and alarm recordings in the history: kept once, in all and since the renewal."""
 
 import sqlite3
@@ -18,7 +27,7 @@ from valve_friction_ros.history import (
     keep_usage,
     read_told_level,
     read_usage,
-    schema,
+    tables,
     valve_histories,
 )
 from valve_friction_ros.usage import BINS, Usage, UsedDay
@@ -167,7 +176,7 @@ def test_a_file_of_version_5_is_read_and_extended(history):
     assert len(valve_histories(history, (VALVE,), 0, START + 1)) == 1
     assert version(history) == 5
     keep_usage(history, VALVE, "run", [UsedDay(TODAY, 0, usage(1.0))])
-    assert version(history) == schema.SCHEMA_VERSION
+    assert version(history) == tables.SCHEMA_VERSION
     assert read_usage(history, VALVE.name).total == usage(1.0)
     assert len(history.entries()) == 1
 

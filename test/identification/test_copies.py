@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What the front door offers is copied and pickled, as joblib and Dask do it."""
 
 import copy
@@ -71,13 +80,13 @@ def test_what_else_the_front_door_offers(results, copied, tmp_path):
         SensorNoise(1e-6, 10.0),
         vf.IdentificationSettings(fixed={"mass": 1.6}, stated={"spring_constant": 2e5}),
         vf.Baseline(150.0),
-        vf.Baseline.of(results["refined"]),
+        vf.Baseline.of(results["bench"]),
         vf.read_valve_file(place),
-        vf.compare(results["refined"], vf.Baseline(100.0)),
+        vf.compare(results["bench"], vf.Baseline(100.0)),
         FrictionLimits(),
     ):
         assert repr(copied(one)) == repr(one)  # nan equals itself there
-    recording = results["refined"].recording
+    recording = results["bench"].recording
     assert copied(recording).sample_period == recording.sample_period
     refusal = copied(vf.RefusalError("the stem did not move"))
     assert str(refusal) == "the stem did not move"
@@ -89,9 +98,9 @@ def test_what_else_the_front_door_offers(results, copied, tmp_path):
 
 def test_another_process_reads_it_by_pickle_alone(results, tmp_path):
     place = tmp_path / "result.pickle"
-    place.write_bytes(pickle.dumps(results["robust"]))
+    place.write_bytes(pickle.dumps(results["plant"]))
     told = "import pickle, sys; print(repr(pickle.load(open(sys.argv[1], 'rb'))))"
     found = subprocess.run(
         [sys.executable, "-c", told, str(place)], capture_output=True, text=True, check=True
     )
-    assert found.stdout.strip() == repr(results["robust"])
+    assert found.stdout.strip() == repr(results["plant"])

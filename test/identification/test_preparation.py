@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """After the preparation no record has anything compiled."""
 
 import subprocess
@@ -23,7 +32,7 @@ for parameters, period in ((LOW_FRICTION, 0.005), (HIGH_FRICTION, 0.01), (GRAPHI
     pressure = SineWave(period=7.0).sample(period * np.arange(2000))
     position = simulate(valve, parameters, pressure, period).position
     position = position + 2e-6 * np.random.default_rng(1).standard_normal(2000)
-    for method in ("robust", "refined", "published"):
+    for method in ("plant", "bench", "published"):
         METHODS[method](Recording(period, pressure, position), valve, IdentificationSettings())
 changed = {name: count for name, count in compiled().items() if before.get(name) != count}
 assert not changed, changed

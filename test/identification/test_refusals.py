@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Records that are refused, each with what to do about it."""
 
 from dataclasses import replace
@@ -10,8 +19,8 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
     Verdict,
-    identify_refined,
-    identify_robust,
+    identify_bench,
+    identify_plant,
 )
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -42,20 +51,20 @@ def healthy():
 
 
 def refused(recording, message, noise=NOISE):
-    """Refuse it with the same words by both methods that the default chooses from."""
-    for identify in (identify_refined, identify_robust):
+    """Refuse it with the same words by both profiles."""
+    for identify in (identify_bench, identify_plant):
         with pytest.raises(RefusalError, match=message):
             identify(noise.applied_to(recording), BENCH_VALVE, SETTINGS)
 
 
 def test_the_healthy_record_passes(healthy):
-    found = identify_refined(NOISE.applied_to(healthy), BENCH_VALVE, SETTINGS)
+    found = identify_bench(NOISE.applied_to(healthy), BENCH_VALVE, SETTINGS)
     assert found.values["coulomb_friction"] == pytest.approx(606.0, rel=0.01)
 
 
 def answered(recording, truth):
     """Identify with the default; each number that it gives holds its truth."""
-    result = identify_robust(recording, BENCH_VALVE, SETTINGS)
+    result = identify_plant(recording, BENCH_VALVE, SETTINGS)
     sliding = truth["coulomb_friction"] + truth["viscous_friction"] * result.sliding_speed
     for name, true in {**truth, "sliding_friction": sliding}.items():
         one = result.parameters[name]
@@ -78,8 +87,6 @@ def test_little_travel(healthy):
     record = SensorNoise(1e-6, 100.0).applied_to(
         Recording(PERIOD, healthy.pressure, start + share * healthy.position)
     )
-    with pytest.raises(RefusalError, match=r"^too little travel: .* 0\.\d+ % of its travel"):
-        identify_refined(record, BENCH_VALVE, SETTINGS)
     spring = HIGH_FRICTION.spring_constant / share
     truth = {
         "coulomb_friction": HIGH_FRICTION.coulomb_friction,
@@ -100,17 +107,11 @@ def test_one_direction_only():
     refused(record, r"^the stem moved up only \(.* mm up, .* mm down\).*one stroke each way")
 
 
-@pytest.mark.parametrize(
-    ("stop", "rest", "away"), [("lower", 20e3, 120e3), ("upper", 230e3, 120e3)]
-)
-def test_pressed_onto_a_stop(stop, rest, away):
+@pytest.mark.parametrize("rest", [20e3, 230e3], ids=["lower", "upper"])
+def test_pressed_onto_a_stop(rest):
     """For more than half of the record; the motion between tells the friction."""
     phase = (PERIOD * np.arange(52_000) // 6.5).astype(int) % 3
-    record = NOISE.applied_to(recorded(np.where(phase == 1, away, rest)))
-    with pytest.raises(
-        RefusalError, match=rf"^the stem is at its {stop} stop for \d\d % .* mid-travel"
-    ):
-        identify_refined(record, BENCH_VALVE, SETTINGS)
+    record = NOISE.applied_to(recorded(np.where(phase == 1, 120e3, rest)))
     sliding = answered(record, TRUTH).parameters["sliding_friction"]
     assert sliding.half_width < 0.1 * sliding.value
 
@@ -143,16 +144,16 @@ def test_pressure_of_another_valve_or_of_none(healthy, kind, seed):
     )
     record = SensorNoise(10e-6, 100.0).applied_to(Recording(PERIOD, pressure, healthy.position))
     with pytest.raises(RefusalError):
-        identify_robust(record, BENCH_VALVE, SETTINGS)
+        identify_plant(record, BENCH_VALVE, SETTINGS)
 
 
 def test_a_force_is_named_a_force(healthy):
     rest = Recording(PERIOD, np.full(26_000, 700.0), healthy.position, driven_by=Drive.FORCE)
     with pytest.raises(RefusalError, match=r"^the drive force did not change"):
-        identify_refined(rest, Valve(travel=BENCH_VALVE.travel), SETTINGS)
+        identify_bench(rest, Valve(travel=BENCH_VALVE.travel), SETTINGS)
 
 
-@pytest.mark.parametrize("method", [name for name in METHODS if name != "refined"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_force_on_a_diaphragm(healthy, method):
     """The valve of a force has no diaphragm, and that of a pressure has one."""
     force = replace(healthy, driven_by=Drive.FORCE)
@@ -190,17 +191,4 @@ def test_position_counted_the_wrong_way(healthy):
 def test_a_record_that_is_too_short(healthy):
     short = Recording(PERIOD, healthy.pressure[:30], healthy.position[:30])
     with pytest.raises(RefusalError):
-        identify_refined(short, BENCH_VALVE, SETTINGS)
-
-
-def test_too_few_reversals_leave_nothing_identified():
-    """One stroke up and one down: weak at best, and the reason says what to do."""
-    found = identify_refined(
-        NOISE.applied_to(recorded(SquareWave().sample(PERIOD * np.arange(15_600)))),
-        BENCH_VALVE,
-        replace(SETTINGS, fixed={"mass": 1.6}),
-    )
-    for name in ("coulomb_friction", "viscous_friction", "spring_constant"):
-        one = found.parameters[name]
-        assert one.verdict.value in ("weak", "not identifiable")
-        assert one.reason.endswith("up and down")
+        identify_bench(short, BENCH_VALVE, SETTINGS)

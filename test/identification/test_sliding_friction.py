@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sliding friction of each method: ∫|F_friction|·|dx| / ∫|dx| of the simulated valve."""
 
 import dataclasses
@@ -54,13 +63,13 @@ def tried(benches, bench_record, bench_trajectory):
 @pytest.mark.parametrize("noise", [None, NOISE], ids=["quiet", "noisy"])
 @pytest.mark.parametrize("kind", EXCITATIONS)
 @pytest.mark.parametrize("name", ["low", "graphite"])
-@pytest.mark.parametrize("method", ["refined", "robust"])
+@pytest.mark.parametrize("method", ["bench", "plant"])
 def test_along_the_simulated_stem(tried, name, kind, method, noise):
     result, truth, speed = tried(name, kind, method, noise)
     found = result.parameters["sliding_friction"]
     assert abs(found.value - truth) <= found.half_width
     assert result.sliding_speed == pytest.approx(speed, rel=5e-3)
-    if method == "refined":
+    if method == "bench":
         assert found.half_width == pytest.approx(3e-3 * found.value, rel=0.2)
 
 
@@ -94,8 +103,8 @@ def test_of_a_force_scale_it_has_one_power(benches, bench_record):
     record = bench_record("high", *EXCITATIONS["square"])
     twice = dataclasses.replace(valve, diaphragm_area=2 * valve.diaphragm_area)
     settings = dataclasses.replace(SETTINGS, assumed_mass=3.2)
-    one = identify(record, valve, SETTINGS, "refined")
-    other = identify(record, twice, settings, "refined")
+    one = identify(record, valve, SETTINGS, "bench")
+    other = identify(record, twice, settings, "bench")
     value = one.parameters["sliding_friction"].value
     assert other.parameters["sliding_friction"].value == pytest.approx(2 * value, rel=1e-5)
     assert other.sliding_speed == pytest.approx(one.sliding_speed, rel=1e-5)

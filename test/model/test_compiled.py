@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Kernels are compiled anew when they must be, and run where nothing can be cached."""
 
 import os
@@ -12,6 +21,14 @@ from valve_friction_ros.model.compiled import compiled
 @compiled
 def inner():
     return {}
+"""
+ARRAYS = """
+import numpy as np
+from valve_friction_ros.model.compiled import compiled
+
+@compiled
+def inner():
+    return int(np.ones(4).sum())
 """
 OUTER = """
 from inner import inner
@@ -55,6 +72,21 @@ def test_a_change_of_a_kernel_that_another_one_calls(kernels):
     (kernels / "inner.py").write_text(INNER.format(2))
     assert run(kernels) == (2, False)
     assert run(kernels) == (2, True)
+
+
+def test_a_kernel_out_of_the_cache_serves_one_that_is_compiled(kernels):
+    """What numba needs to compile is not loaded with the first."""
+    (kernels / "inner.py").write_text(ARRAYS)
+    assert run(kernels) == (4, False)
+    for part in (kernels / "__pycache__").glob("outer.*"):
+        part.unlink()
+    alone = "import sys, inner; print(inner.inner(), 'scipy.linalg' in sys.modules)"
+    answer = subprocess.run(
+        [sys.executable, "-B", "-c", alone], cwd=kernels, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.split() == ["4", "False"]
+    assert run(kernels) == (4, False)
+    assert run(kernels) == (4, True)
 
 
 def test_a_first_compilation_is_logged_once(kernels):

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The identifier with a fault that nobody foresaw, mended by a file, as a node to start."""
 
 import sys
@@ -10,12 +19,13 @@ MENDED = "mended"
 if __name__ == "__main__":
     from valve_friction_ros.nodes.identifier import identification, node
 
-    identify = identification.identify_snapshot
+    identify = identification.identify_with_numbers
 
     def identify_or_fail(*arguments):
         if not Path(MENDED).exists():
             raise ZeroDivisionError("nobody\nforesaw it")
         return identify(*arguments)
 
-    identification.identify_snapshot = identify_or_fail
+    identification.identify_with_numbers = identify_or_fail
+    node._PROCESSES = 0
     sys.exit(node.main())

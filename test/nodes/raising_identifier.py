@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The identifier with a bug in its loop, in a timer or at its start, as a node to start.
 
 With the name of several identifiers the bug is in that of the valve fv_102.
@@ -30,7 +39,7 @@ def break_identifiers(places=("/fv_101",)):
         return call
 
     one = node.Identifier
-    one._build = raising(BEGINNING, one._build)
+    one.configure = raising(BEGINNING, one.configure)
     one.poll = raising(LOOP, one.poll)
     one._publish_diagnostics = raising(TIMER, one._publish_diagnostics)
 
@@ -40,4 +49,5 @@ if __name__ == "__main__":
 
     break_identifiers()
     workers.compile_methods = lambda: time.sleep(BUSY)
+    node._PROCESSES = 0
     sys.exit(node.main())

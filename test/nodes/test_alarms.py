@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Alarms and baselines over DDS: they outlive a killed node, and no call hides an alarm."""
 
 import math
@@ -207,7 +216,9 @@ def test_the_baseline_is_guarded_and_restored(live, history):
         assert not refused.success
         assert refused.message.startswith("the valve is in ERROR, which another baseline may hide")
         assert "set baseline_in_alarm to true if the valve is healthy" in refused.message
-    assert client.status_values()["friction_ratio"] != "1"
+    told = client.status_values()
+    assert (told["baseline_possible"], told["baseline_lacks valve"]) == ("false", "HEALTH")
+    assert told["friction_ratio"] != "1"
     assert len(history.baselines(VALVE.name)) == 1
 
     assert client.set_together(NODE, {"baseline_in_alarm": True}).successful

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Alerts of an identifier over DDS: one a change, while a receiver is away or misbehaves."""
 
 import time
@@ -254,3 +263,22 @@ def test_an_address_of_the_environment_is_not_shown(live, monkeypatch):
         values = live.client.last_values()
         assert values["webhook"] == f"http://127.0.0.1:{receiver.port}"
     assert "/hook" not in node.errors + node.output + "".join(map(str, live.client.statuses))
+
+
+def test_one_digest_a_day_lists_the_alarms(live):
+    with Receiver() as receiver:
+        live.start_identifier({**KNOWN, "webhook_url": receiver.url, "webhook_period": 0.0})
+        client = live.client
+        client.identified(TIGHT)
+        client.wait_until(lambda: len(receiver.requests) == 1, "an alert")
+        soon = (time.time() + 5.0) % 86_400 / 3600
+        assert client.set_together(NODE, {"webhook_digest": soon}).successful
+        client.wait_until(lambda: len(receiver.requests) == 2, "the digest")
+        client.next_status(lambda one: values_of(one)["webhook delivered"] == "2", "both delivered")
+        client.next_status()
+        digest = receiver.bodies[1]
+        assert len(receiver.requests) == 2
+        assert digest["digest"]["valves"] == digest["digest"]["unanswered"] == 1
+        (alarm,) = digest["alarms"]
+        told = alarm["node"], alarm["alarm"], alarm["state"], alarm["level"]
+        assert told == (NODE, "friction_high", "unacknowledged", "ERROR")

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What neither a stranger's bytes nor a bug in one place may end."""
 
 import pytest
@@ -60,7 +69,7 @@ class TestOneOfSeveral:
     def start(self, live, tmp_path, faulty, script=None):
         config = tmp_path / "valves.yaml"
         config.write_text(
-            "/**:\n  ros__parameters:\n    input_timeout: 600.0\n    method: refined\n"
+            "/**:\n  ros__parameters:\n    input_timeout: 600.0\n    method: bench\n"
             "/identifiers:\n  ros__parameters:\n    valves: [fv_101, fv_102, fv_103]\n" + faulty
         )
         arguments = ["--params-file", str(config)]

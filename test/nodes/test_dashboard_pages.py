@@ -1,16 +1,28 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The pages of the dashboard in a real browser, against live nodes."""
 
 import contextlib
+import time
 import urllib.request
 from pathlib import Path
 from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
-from browser import Tab, chromium
+from browser import Tab, axe_violations, chromium
 from live_nodes import NAMESPACE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
 
+from valve_friction_ros.health import AlarmKind, Condition, Level, StatusSignal
+from valve_friction_ros.history import HistoryFile, KeptValve, follow_alarms
 from valve_friction_ros.model import HIGH_FRICTION
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
@@ -56,6 +68,14 @@ def query_of(page):
 
 def rows(page):
     return page.locator(".vf-row")
+
+
+def wait_for_simulated_rows(page, count):
+    """Wait for rows of the made-up valves; the level of the live one is left by other tests."""
+    page.wait_for_function(
+        "[...document.querySelectorAll('.vf-row')]"
+        f".filter(row => row.innerText.includes('/area_')).length === {count}"
+    )
 
 
 def wait_for_rows(page, count):
@@ -148,13 +168,26 @@ def test_keys_alone_lead_to_a_valve(tab):
     page.wait_for_selector(".vf-valve")
 
 
-@pytest.mark.parametrize("path", ["/", "/?view=tiles", VALVE, "/compare"])
+@pytest.mark.parametrize("path", ["/", "/?view=tiles", "/alarms", VALVE, "/compare"])
 def test_a_page_is_as_wide_as_its_window(tab, path):
     page = tab.open(path)
-    page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare")
+    page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare, .vf-alarms")
     for width in (2560, 1400, 390):
         page.set_viewport_size({"width": width, "height": 900})
         page.wait_for_function("document.documentElement.scrollWidth <= innerWidth")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(
+    "path", ["/", "/?view=tiles", "/alarms", "/alarms?view=events", VALVE, "/compare"]
+)
+def test_axe_finds_nothing_wrong(tab, path, theme):
+    join = "&" if "?" in path else "?"
+    page = tab.open(f"{path}{join}theme={theme}")
+    page.wait_for_selector(".vf-row, .vf-tile, .vf-valve, .vf-compare, .vf-alarms")
+    for width in (1400, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert axe_violations(page) == []
 
 
 # Text from outside
@@ -180,6 +213,18 @@ def test_an_address_is_text_from_outside_too(tab):
 # Valve: one after the other, as a person works with it
 
 
+def test_what_is_missing_to_a_baseline_is_explained_and_offered(tab):
+    page = tab.open(VALVE)
+    page.locator(".vf-dl").get_by_text("buffered samples").wait_for(state="attached")
+    page.get_by_role("button", name="Set baseline …").click()
+    asked = page.locator(".vf-dialog")
+    asked.get_by_text("there is no result since the start of its identifier").wait_for()
+    asked.get_by_text("Identify the valve.").wait_for()
+    assert not axe_violations(page)
+    asked.get_by_role("button", name="Identify").click()
+    page.get_by_text("Identify: ").wait_for()
+
+
 def is_full(status):
     """Whether the identifier holds a quick record; the made-up valves hold other counts."""
     return status.name.startswith(NODE) and buffered(status) == 1000
@@ -195,7 +240,7 @@ def identified(plant):
 
 def press(page, name, answer):
     page.get_by_role("button", name=name).click()
-    said = page.locator(".vf-answer")
+    said = page.locator(".vf-answer:not(.hidden)")
     page.get_by_text(answer).first.wait_for()
     return said
 
@@ -212,6 +257,40 @@ def test_a_valve_is_identified_by_a_button(tab):
     page.locator(".vf-sentence").get_by_text("no baseline").wait_for()
     page.locator(".vf-chart-trend canvas").wait_for()
     page.locator(".vf-long .vf-list tbody tr").first.wait_for()
+
+
+TREND = 'getElement(Number(document.querySelector(".vf-chart-trend").id.slice(1)))'
+
+
+@pytest.mark.usefixtures("identified")
+def test_a_drag_over_the_trend_chooses_its_time(tab):
+    page = tab.open(VALVE)
+    chart = page.locator(".vf-chart-trend")
+    chart.locator("canvas").wait_for()
+    chart.scroll_into_view_if_needed()
+    page.wait_for_function(f"{TREND}.drags")
+    shown = f"{TREND}.chart.getOption().dataZoom[0].end"
+    assert page.evaluate(shown) == 100
+    box = chart.bounding_box()
+    middle = box["y"] + 0.6 * box["height"]
+    page.mouse.move(box["x"] + 0.3 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
+    page.mouse.up()
+    page.wait_for_function(f"{shown} < 100")
+
+
+def test_keys_of_experts_are_folded_away_and_opened_by_the_keyboard(tab):
+    page = tab.open(VALVE)
+    folds = page.locator(".vf-valve details")
+    folds.nth(1).wait_for()
+    names = folds.locator("summary").all_inner_texts()
+    assert names == ["For experts: fit of the model", "For experts: node and samples"]
+    key = folds.nth(1).get_by_text("buffered samples", exact=True)
+    key.wait_for(state="hidden")
+    folds.nth(1).locator("summary").focus()
+    page.keyboard.press("Enter")
+    key.wait_for(state="visible")
 
 
 @pytest.mark.usefixtures("identified")
@@ -253,7 +332,7 @@ def test_a_refusal_is_told(tab):
     page.get_by_role("button", name="Restore baseline …").click()
     page.locator(".vf-dialog").get_by_role("button", name="Restore baseline").click()
     page.get_by_text("there is no ~/set_baseline to undo").wait_for()
-    assert "vf-answer-error" in page.locator(".vf-answer").get_attribute("class")
+    assert "vf-answer-error" in page.locator(".vf-answer:not(.hidden)").get_attribute("class")
 
 
 @pytest.mark.usefixtures("identified")
@@ -312,6 +391,71 @@ def test_two_identifications_are_compared(identified, tab):
     page.locator(".vf-compared").get_by_text("FV-103").first.wait_for()
 
 
+@pytest.mark.usefixtures("identified")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_wrong_with_what_is_known_of_a_valve(tab, theme):
+    """Parameters, trend, identifications, a dialog and a comparison."""
+    page = tab.open(f"{VALVE}&theme={theme}")
+    press(page, "Identify", "Identify: ")
+    page.locator(".vf-parameters").wait_for()
+    page.locator(".vf-long tbody tr").first.wait_for()
+    page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
+    assert axe_violations(page) == []
+    page.get_by_role("button", name="Set baseline …").click()
+    page.locator(".vf-dialog").get_by_text("in force now").wait_for()
+    assert axe_violations(page) == []
+    page.get_by_role("button", name="Cancel").click()
+    page = tab.open(f"/compare?a={quote(NODE)}&b={quote(NODE)}&theme={theme}")
+    page.locator(".vf-compared").wait_for()
+    assert axe_violations(page) == []
+
+
+def test_an_alarm_is_acknowledged_with_a_name_and_exported(identified, tab):
+    """A baseline of a quarter of the friction makes an alarm; its tag is markup, and stays text."""
+    identified.client.set_parameters(NODE, {"baseline_coulomb_friction": 40.0})
+    assert identified.client.trigger("identify").success
+    page = tab.open("/alarms")
+    row = page.locator("tr", has_text="friction high")
+    row.wait_for()
+    assert "Renew the packing" in row.inner_text()
+    row.get_by_role("button", name="Acknowledge").click()
+    page.get_by_role("button", name="Confirm").click()
+    page.get_by_text("who is empty").wait_for()
+    row.get_by_role("button", name="Acknowledge").click()
+    page.get_by_label("Your name").fill("A. Operator")
+    page.get_by_role("button", name="Confirm").click()
+    page.get_by_text("friction high: acknowledged").first.wait_for()
+    row.get_by_text("acknowledged by A. Operator").wait_for()
+    assert axe_violations(page) == []
+    row.get_by_role("button", name="More").click()
+    page.get_by_label("Your name").wait_for()
+    assert axe_violations(page) == []
+    page.get_by_role("button", name="Cancel").click()
+    export = page.get_by_role("link", name="CSV").get_attribute("href")
+    with urllib.request.urlopen(identified.address + export) as answer:
+        lines = answer.read().decode().splitlines()
+    assert "friction_high" in lines[1]
+    assert "A. Operator" in lines[1]
+    identified.client.set_parameters(NODE, {"baseline_coulomb_friction": float("nan")})
+
+
+def test_of_many_alarms_those_near_the_view_are_drawn(plant, tab):
+    """All come as the page is scrolled."""
+    history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    for number in range(400):
+        valve = KeptValve(f"/many/fv_{number}/identifier", f"MANY-{number}")
+        follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    page = tab.open("/alarms?area=/many")
+    lines = page.locator(".vf-alarm-list tbody tr")
+    page.get_by_text("more below").wait_for()
+    assert 0 < lines.count() < 400
+    while (count := lines.count()) < 400:
+        page.mouse.wheel(0, 20_000)
+        page.wait_for_function(f"document.querySelectorAll('tbody tr').length > {count}")
+    page.get_by_text("more below").wait_for(state="detached")
+
+
 def test_what_cannot_be_called_says_so(tab):
     page = tab.open(f"/valve?node={quote('/area_1/fv_103/identifier')}")
     press(page, "Identify", "is not there: start the identifier of this valve")
@@ -333,7 +477,7 @@ def test_an_identifier_that_ends_falls_silent_and_comes_back(plant, tab):
 
 def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
     page = tab.open("/?show=error&sort=tag")
-    wait_for_rows(page, 2)
+    wait_for_simulated_rows(page, 2)
     parameters = {"port": urlsplit(plant.address).port, "silence": SILENCE}
     plant.client.watched.clear()
     plant.dashboard.interrupt()
@@ -342,5 +486,5 @@ def test_ctrl_c_ends_it_and_open_pages_heal_when_it_is_back(plant, tab):
     page.get_by_role("alert").get_by_text("No connection").wait_for()
     plant.dashboard = plant.start("dashboard", parameters, namespace=None)
     page.get_by_role("alert").get_by_text("No connection").wait_for(state="detached")
-    wait_for_rows(page, 2)
+    wait_for_simulated_rows(page, 2)
     assert query_of(page) == {"show": "error", "sort": "tag"}

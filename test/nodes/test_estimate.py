@@ -1,9 +1,19 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The topic `~/estimate`: one message a valve, at each change; topics of numbers by a parameter."""
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from live_nodes import NAMESPACE, SECOND, START, values_of
+from live_nodes import NAMESPACE, SECOND, START, stamp_of, values_of
 from records import quick_record
+from sensor_msgs.msg import JointState
 
 from valve_friction_ros.health import Level
 
@@ -62,3 +72,24 @@ def test_topics_of_numbers_are_a_parameter(live, asked):
     numbers = [name for name in topics if name.startswith(f"{NAMESPACE}/identifier/friction/")]
     assert bool(numbers) is asked
     assert (f"{NAMESPACE}/identifier/sweep" in topics) is asked
+
+
+def test_the_numbers_in_one_stamped_message(live):
+    """All of an identification, by name; what nobody asks for is no topic of the graph."""
+    asked = dict.fromkeys(("estimate_topic", "number_topics"), False) | {"result_topic": True}
+    live.start_identifier(asked)
+    client = live.client
+    client.identified(quick_record())
+    result = client.latched(JointState, f"{NAMESPACE}/identifier/result")
+    shown = client.last_values()
+    found = dict(zip(result.name, zip(result.position, result.effort, strict=True), strict=True))
+    for name in ("coulomb_friction", "viscous_friction"):
+        unit = {"coulomb_friction": "N", "viscous_friction": "N·s/m"}[name]
+        value, half_width = found[name]
+        assert value == pytest.approx(float(shown[f"{name} [{unit}]"]), rel=1e-3)
+        assert half_width == pytest.approx(float(shown[f"{name} half width [{unit}]"]), rel=1e-2)
+    end = START + 10_000_000 * (len(quick_record()) - 1)
+    assert abs(stamp_of(result.header.stamp) - end) < 250  # ns: a double of seconds since 1970
+    own = f"{NAMESPACE}/identifier/"
+    topics = {name for name, _ in client.node.get_topic_names_and_types() if name.startswith(own)}
+    assert topics == {f"{own}result"}

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The evidence of an identifier: combined in a thread, watched, and shown."""
 
 import os
@@ -119,7 +128,10 @@ def test_a_thread_that_never_ends_is_overdue():
     idle = SimpleNamespace(busy_for=lambda: 0.0, is_preparing=False)
     stuck = SimpleNamespace(busy_for=lambda: 200.0)
     node = SimpleNamespace(
-        _workers=Workers(identify=idle, files=idle, evidence=stuck, alerts=None),
+        is_configured=True,
+        _workers=Workers(
+            None, identify=idle, files=idle, history=idle, evidence=stuck, alerts=None, digest=None
+        ),
         get_parameter=lambda _: SimpleNamespace(value=100.0),
     )
     problem = Identifier.overdue(node)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """``--help`` of the nodes: how to run them, and their parameters, without starting ROS."""
 
 import signal
@@ -27,6 +36,7 @@ sys.exit(getattr(start, sys.argv[1])())
         ("identifiers", "valves", [""]),
         ("simulator", "joint", "stem"),
         ("pressure_source", "excitation", "square"),
+        ("stroke_player", "silence", 1.0),
     ],
 )
 def test_help_ends_well_and_names_the_parameters(node, parameter, default, option):

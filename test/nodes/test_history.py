@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What an identifier keeps, and what it takes over when it starts again."""
 
 import math
@@ -7,11 +16,11 @@ from histories import DAY, START, VALVE, as_kept, success
 from live_nodes import NAMESPACE, values_of
 from records import quick_record
 
-from valve_friction_ros.health import Baseline, SlidingFriction
-from valve_friction_ros.history import MONTH, FrictionPoint, HistoryFile, KeptBaseline, trend_of
+from valve_friction_ros.health import Baseline, DatedNumber, SlidingFriction
+from valve_friction_ros.history import MONTH, HistoryFile, KeptBaseline, trend_of
+from valve_friction_ros.history.status_values import trend_values
 from valve_friction_ros.identification import identify
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
-from valve_friction_ros.nodes.identifier.status import trend_values
 
 NODE = f"{NAMESPACE}/identifier"
 OK, WARN = b"\x00", b"\x01"
@@ -41,7 +50,7 @@ def test_success_and_refusal_are_kept(live, history):
     assert refusal in (entries[0].refusal, entries[1].refusal)
     last = entries[-1]
     assert last.friction == EXPECTED
-    assert last.method == "robust"
+    assert last.method == "plant"
     assert (last.span.end - last.span.begin) / 1e9 == pytest.approx(4.99)
     assert last.diagnosis.message == client.statuses[-1][1].message
     assert '"window": 70.0' in last.settings
@@ -167,7 +176,7 @@ def fill(history, drift, method):
 
 
 def test_a_drift_is_told_until_a_baseline_is_set(live, history):
-    fill(history, 3.0, "robust")
+    fill(history, 3.0, "plant")
     live.start_identifier(PATIENT)
     values = live.client.status_values()
     assert float(values["friction_drift [N/month]"]) == pytest.approx(3.0)
@@ -184,11 +193,10 @@ def test_a_drift_is_told_until_a_baseline_is_set(live, history):
 
 
 def test_a_drift_is_that_of_the_method_which_the_settings_call_for(live, history):
-    """Without a position bias the default is robust, with one it is refined."""
     fill(history, 3.0, "refined")
     live.start_identifier(PATIENT)
     assert not [key for key in live.client.status_values() if "drift" in key]
-    assert live.client.set_together(NODE, {"position_bias": 1.13e-3}).successful
+    assert live.client.set_together(NODE, {"method": "bench"}).successful
     live.client.trigger("identify")
     values = live.client.status_values(lambda one: "friction_drift" in str(one), "a drift")
     assert float(values["friction_drift [N/month]"]) == pytest.approx(3.0)
@@ -196,7 +204,7 @@ def test_a_drift_is_that_of_the_method_which_the_settings_call_for(live, history
 
 def test_only_a_significant_drift_has_keys():
     scattered = [150.0, 154.0, 151.0, 156.0, 153.0]
-    points = [FrictionPoint(START + k * DAY, one, 0.1) for k, one in enumerate(scattered)]
+    points = [DatedNumber(START + k * DAY, one, 0.1) for k, one in enumerate(scattered)]
     assert trend_values(trend_of(points, Baseline(141.0))) == {}
     assert trend_values(None) == {}
     rising = [one._replace(value=150.0 + k) for k, one in enumerate(points)]

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """An identifier whose history goes to a server: there, away, and from another machine."""
 
 import subprocess
@@ -10,17 +19,19 @@ from records import quick_record
 
 from valve_friction_ros.health import Baseline
 from valve_friction_ros.history import History, HistoryFile, KeptBaseline, copied, sender_of
+from valve_friction_ros.history.outbox import count_unsent
 
 NODE = f"{NAMESPACE}/identifier"
 NAME = "VALVE_FRICTION_HISTORY_URL"
 RECORD = quick_record()
 
 
-def sent(client):
-    """Wait until the diagnostics say that nothing waits."""
+def sent(client, history):
+    """Wait until nothing waits, and the diagnostics say so: they lag by a second."""
     return client.status_values(
         lambda status: (
-            values_of(status).get("history_server waiting") == "0"
+            not count_unsent(history.path).waiting
+            and values_of(status).get("history_server waiting") == "0"
             and values_of(status)["history_server problem"] == ""
         ),
         "a history that was sent",
@@ -32,7 +43,7 @@ def test_rows_arrive_and_wait_while_the_server_is_away(live, history, database, 
     client = live.client
     client.identified(RECORD)
     assert client.trigger("set_baseline").success
-    values = sent(client)
+    values = sent(client, history)
     assert values["history_server"] == str(database)
     assert len(History(database).entries()) == len(history.entries())
     postgres.kill()
@@ -49,7 +60,7 @@ def test_rows_arrive_and_wait_while_the_server_is_away(live, history, database, 
         assert values["history_server waiting since [time]"].startswith("20")
     finally:
         postgres.start()
-    sent(client)
+    sent(client, history)
     assert all(one.is_same for one in copied(history.path, database))
     assert f"the history waits in {history.path}" in node.errors
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Bad input through the topics: each is refused with its cause, and the next record identifies."""
 
 import math
@@ -200,7 +209,7 @@ def test_a_gap_costs_the_stretch_around_it(client, name):
     assert client.identified_whole(count)
     values = client.last_values()
     assert values["estimate_valid"] == "true"
-    assert values["method"] == "robust"
+    assert values["method"] == "plant"
     friction, half_width = (
         float(values[f"coulomb_friction {which}[N]"]) for which in ("", "half width ")
     )
@@ -210,12 +219,12 @@ def test_a_gap_costs_the_stretch_around_it(client, name):
 @pytest.mark.parametrize("name", GAPS)
 def test_a_gap_is_refused_by_a_method_that_needs_an_unbroken_record(client, name):
     publish, count, words = GAPS[name]
-    assert client.set_together(NODE, {"method": "refined"}).successful
+    assert client.set_together(NODE, {"method": "published"}).successful
     try:
         publish(client)
         response = client.identify_all(count)
     finally:
-        assert client.set_together(NODE, {"method": "best"}).successful
+        assert client.set_together(NODE, {"method": "plant"}).successful
     assert not response.success, response.message
     assert words in response.message
     assert "1.490 s after" in response.message

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The parameter `method`: force balances of a valve signature, over topics."""
 
 import numpy as np
@@ -31,7 +40,7 @@ def client(shared):
 
 def test_the_choice_is_described(client):
     (descriptor,) = client.describe(NODE, ["method"])
-    assert descriptor.additional_constraints == "one of best, robust, refined, published, signature"
+    assert descriptor.additional_constraints == "one of plant, bench, published, signature"
 
 
 def test_a_signature_is_identified(client):
@@ -67,23 +76,18 @@ def test_another_record_is_refused_with_what_it_needs(client):
 
 
 def test_the_method_can_be_changed_while_the_node_runs(client):
-    assert client.set_together(NODE, {"method": "refined"}).successful
+    assert client.set_together(NODE, {"method": "bench"}).successful
     client.identified(quick_record())
     assert np.isfinite(client.friction("threshold")["threshold"])
-    assert values_of(client.next_status())["method"] == "refined"
+    assert values_of(client.next_status())["method"] == "bench"
 
 
-def test_the_best_is_robust_unless_a_position_bias_is_given(client):
-    assert client.set_together(NODE, {"method": "best"}).successful
-    for bias, used in ((np.nan, "robust"), (1.13e-3, "refined"), (np.nan, "robust")):
-        assert client.set_together(NODE, {"position_bias": bias}).successful
+def test_former_names_are_understood(client):
+    for former, used in (("robust", "plant"), ("refined", "bench"), ("best", "plant")):
+        assert client.set_together(NODE, {"method": former}).successful
         client.identified(quick_record())
         assert values_of(client.next_status())["method"] == used
-        expected = identify(
-            quick_record(),
-            BENCH_VALVE,
-            IdentificationSettings(position_bias=None if np.isnan(bias) else bias),
-        )
+        expected = identify(quick_record(), BENCH_VALVE, method=used)
         told = client.friction("coulomb_friction", "threshold")
         assert told["coulomb_friction"] == expected.values["coulomb_friction"]
         assert told["threshold"] == expected.evidence["threshold"]

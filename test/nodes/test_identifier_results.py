@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The main job over topics: samples in, friction out, to the last bit what the core computes."""
 
 import json
@@ -27,7 +36,7 @@ from valve_friction_ros.identification import (
     PARAMETER_UNITS,
     UNITS,
     IdentificationSettings,
-    identify_refined,
+    identify_bench,
     published_estimate,
 )
 from valve_friction_ros.model import (
@@ -45,14 +54,14 @@ BIAS = 1.13e-3
 @pytest.fixture(scope="module")
 def bench(shared):
     """Identify two periods of a square wave; return client, core's assessment, answers."""
-    shared.start_identifier({"position_bias": BIAS})
+    shared.start_identifier({"method": "bench", "position_bias": BIAS})
     client = shared.client
     early = client.listen(Float64, f"{NAMESPACE}/identifier/friction/coulomb_friction")
     record = bench_record()
     stamps = stamps_of(record)
     client.send_without_loss((stamps, record.pressure), (stamps, record.position))
     response = client.trigger("identify")
-    assessment = identify_refined(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
+    assessment = identify_bench(record, BENCH_VALVE, IdentificationSettings(position_bias=BIAS))
     return client, assessment, response, early
 
 
@@ -66,8 +75,8 @@ def test_bench_record_is_identified(bench):
     assert published.pop("mass") == pytest.approx(truth.pop("mass"), rel=0.1)
     assert published == pytest.approx(truth, rel=1e-3)
     for name in ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"):
-        refined = assessment.parameters[name]
-        assert abs(refined.value - truth[name]) <= 3 * refined.half_width
+        found = assessment.parameters[name]
+        assert abs(found.value - truth[name]) <= 3 * found.half_width
 
 
 def as_told(values):
@@ -156,8 +165,13 @@ def test_diagnostics(bench):
     assert float(values["threshold [m/s]"]) == pytest.approx(published.threshold, rel=1e-8)
     assert float(values["sigma [N]"]) == pytest.approx(published.sigma, rel=1e-8)
     assert float(values["r_squared"]) == pytest.approx(published.r_squared, rel=1e-8)
+    friction, spring = (
+        assessment.parameters[name] for name in ("coulomb_friction", "spring_constant")
+    )
+    band = 200.0 * friction.value / spring.value / 0.028575
+    assert float(values["dead_band [%]"]) == pytest.approx(band, rel=1e-6)
     # 2·152.7 N over 2.05e5 N/m, over 28.575 mm
-    assert float(values["dead_band [%]"]) == pytest.approx(5.213, rel=1e-3)
+    assert band == pytest.approx(5.213, rel=friction.half_width / friction.value)
     assert int(values["samples"]) == published.samples
     assert float(values["estimate_age [s]"]) > 0
     assert values["estimate_valid"] == "true"
@@ -227,7 +241,7 @@ def test_signals_of_different_rates(live):
     settings = {"mass": LOW_FRICTION.mass, "limit_velocity": 2e-3}
     wave = SineWave(period=10.0)
     fixed = {f"fixed.{name}": value for name, value in settings.items()}
-    live.start_identifier({"method": "refined", **fixed})
+    live.start_identifier({"method": "bench", **fixed})
     client = live.client
 
     milliseconds = np.arange(10_000)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Identifiers of several valves in one process."""
 
 import os
@@ -5,6 +14,7 @@ import signal
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from live_nodes import NAMESPACE, START, values_of
 from records import quick_record
 from std_srvs.srv import Trigger
@@ -59,7 +69,9 @@ def identifying_processes(pid):
         for task in Path(f"/proc/{pid}/task").iterdir()
         for child in (task / "children").read_text().split()
     ]
-    return [one for one in found if b"spawn_main" in Path(f"/proc/{one}/cmdline").read_bytes()]
+    return [
+        one for one in found if b"plumbing.processes" in Path(f"/proc/{one}/cmdline").read_bytes()
+    ]
 
 
 def test_processes_identify_and_may_die(live):
@@ -78,3 +90,43 @@ def test_processes_identify_and_may_die(live):
     assert not response.success
     assert "has ended before its answer" in response.message
     assert client.trigger("identify").success
+
+
+def endpoints(node, place):
+    """The topics that an identifier publishes and hears, and its services, of two endpoints."""
+    return [
+        {name for name, _ in asked("identifier", place)}
+        for asked in (
+            node.get_publisher_names_and_types_by_node,
+            node.get_subscriber_names_and_types_by_node,
+            node.get_service_names_and_types_by_node,
+        )
+    ]
+
+
+def test_a_valve_of_a_plant_takes_little_of_the_graph(live):
+    """Every participant learns of every endpoint; more than twenty valves have no such services."""
+    parameters = {"valves": ["fv_101"], "parameter_services": False, "number_topics": False}
+    live.start("identifiers", parameters, namespace=None)
+    client = live.client
+    client.next_status()
+    client.wait_until(lambda: len(endpoints(client.node, NAMESPACE)[2]) == 7, "its services")
+    published, heard, services = endpoints(client.node, NAMESPACE)
+    assert published == {"/diagnostics", "/rosout"}
+    assert heard == {f"{NAMESPACE}/actuator_pressure", f"{NAMESPACE}/stem_state"}
+    assert services == {
+        f"{NAMESPACE}/identifier/{name}"
+        for name in (
+            "identify",
+            "set_baseline",
+            "restore_baseline",
+            "save",
+            "report",
+            "clear",
+            "reset_usage",
+        )
+    }
+    assert len(published) + len(heard) + 2 * len(services) <= 20
+
+    told = client.listen(DiagnosticStatus, f"{NAMESPACE}/identifier/estimate")
+    client.wait_until(lambda: told, "what is asked for")

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Starting with impossible parameters, and stopping by Ctrl-C."""
 
 import failing_identifier
@@ -118,7 +127,7 @@ def test_ctrl_c_during_an_identification(live, tmp_path):
 
 def test_long_identification_loses_no_sample(live, tmp_path):
     """What arrives while an identification runs is taken at once, and identified by the next."""
-    live.start_identifier({"method": "refined"}, script=SCRIPT)
+    live.start_identifier({"method": "bench"}, script=SCRIPT)
     client = live.client
     whole = simulated(SineWave(period=5.0).sample(np.arange(1000) / 100), 0.01)
     begin, rest = slice(500), slice(500, 1000)

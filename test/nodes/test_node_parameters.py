@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Parameters through the parameter services: described, checked, and refused with a reason."""
 
 import math
@@ -19,6 +28,8 @@ CHECKED_BY_RULE = {  # floating parameters that may be infinite or not given, so
     "position_bias": math.inf,
     "timing_uncertainty": -1.0,
     "baseline_coulomb_friction": 0.0,
+    "survey_watch": -1.0,
+    "survey_bad": 0.0,
     "fixed.mass": -1.0,
     "fixed.coulomb_friction": -1.0,
     "fixed.viscous_friction": -1.0,
@@ -33,8 +44,11 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"pressure_minimum": math.nan}, "pressure_minimum (nan) must be below pressure_maximum"),
     ({"diaphragm_area": 0.0}, "diaphragm_area"),
     ({"diaphragm_area": math.nan}, "diaphragm_area"),
-    ({"diaphragm_area": 1}, "expected 'Type.DOUBLE' got 'Type.INTEGER'"),  # the words are rclpy's
+    ({"diaphragm_area": 1}, "expected 'Type.DOUBLE' got 'Type.INTEGER'"),
     ({"diaphragm_area": "large"}, "expected 'Type.DOUBLE' got 'Type.STRING'"),
+    ({"window": 1}, "expected 'Type.DOUBLE' got 'Type.INTEGER'"),  # the words are rclpy's
+    ({"spring_constant": "large"}, "spring_constant: expected 'Type.DOUBLE' got 'Type.STRING'"),
+    ({"mass": 1}, "mass: expected 'Type.DOUBLE' got 'Type.INTEGER'"),
     ({"window": -1.0}, "window"),
     ({"input_timeout": 0.0}, "input_timeout"),
     ({"derivative_window": 30}, "window must be odd"),
@@ -50,7 +64,7 @@ BAD_CHANGES = [  # changes, words of the reason
     ({"position_bias": 1e-3, "fixed.spring_preload": 200.0}, "exclude each other"),
     (
         {"method": "guess"},
-        "there is no method 'guess': choose from best, robust, refined, published, signature",
+        "there is no method 'guess': choose from plant, bench, published, signature",
     ),
     ({"joint": "arm"}, "joint"),
     ({"valve_tag": "FV-102"}, "valve_tag"),
@@ -135,7 +149,8 @@ def test_good_changes_take_effect_and_unrelated_parameters_stay_settable(client)
     client.identified(quick_record())
     results = client.friction("coulomb_friction", "static_friction", "spring_constant", "dead_band")
     assert results["coulomb_friction"] == 100.0
-    width = (100.0 + results["static_friction"]) / results["spring_constant"]
+    static = results["static_friction"]  # F_c where the record shows no slip
+    width = (100.0 + (100.0 if math.isnan(static) else static)) / results["spring_constant"]
     assert results["dead_band"] == pytest.approx(width / 0.05, rel=1e-12)
     assert "coulomb_friction" in client.last_values()["fixed"].split(", ")
     back = {"fixed.coulomb_friction": math.nan, "derivative_window": 31, "travel": 0.028575}

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The gateway of the examples, between a simulated OPC UA server and an identifier."""
 
 import asyncio
@@ -94,7 +103,7 @@ def test_a_record_of_a_server_is_identified(server, live):
     travel = described.valve.travel
     live.start_identifier(
         {"diaphragm_area": described.valve.diaphragm_area, "pressure_reference": 0.0,
-         "pressure_minimum": -1e4, "pressure_maximum": 4e5, "method": "refined"}
+         "pressure_minimum": -1e4, "pressure_maximum": 4e5, "method": "bench"}
     )  # fmt: skip
     parameters = {"url": server.url, "position_scale": travel / 100, "sampling": 0.0}
     gateway = live.start("opc_ua_gateway", parameters, script=GATEWAY)

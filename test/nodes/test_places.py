@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Where nothing can be written and no home is known: a start, or one line that says what to set."""
 
 import pytest
@@ -72,6 +81,7 @@ def test_diagnostics_say_that_it_prepares(live, tmp_path):
         "    while not Path('prepared').exists():\n"
         "        time.sleep(0.05)\n"
         "workers.compile_methods = prepare\n"
+        "node._PROCESSES = 0\n"
         "sys.exit(node.main())\n"
     )
     process = live.start("identifier", {"input_timeout": 600.0}, script=script)

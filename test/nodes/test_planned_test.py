@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A planned stroke test, played over DDS: the identifier reports what the plan promised."""
 
 import json
@@ -6,7 +15,7 @@ import pytest
 from live_nodes import NAMESPACE, SECOND, STREAM, stamp_of
 from sensor_msgs.msg import JointState
 
-from valve_friction_ros.commands.output.plan_output import player, write_test
+from valve_friction_ros.commands.plan_test import player, write_test
 from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION
 from valve_friction_ros.planning import Conditions, Limits, known_friction, plan_test

@@ -1,6 +1,14 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Streams that are polled, and the executor that runs what is ready, over real DDS."""
 
-import importlib.metadata
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -24,8 +32,6 @@ from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecut
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
-
-CHECKED = "7.1.6"
 
 
 @pytest.fixture
@@ -56,7 +62,7 @@ def wait_until(condition, what):
 
 def sender(client, polled):
     """Create a publisher that the subscription has met."""
-    publisher = client.node.create_publisher(Float64, polled.subscription.topic_name, blocks())
+    publisher = client.node.create_publisher(Float64, polled.topic, blocks())
     wait_until(publisher.get_subscription_count, "the subscription")
     return lambda *values: [publisher.publish(Float64(data=float(value))) for value in values]
 
@@ -66,20 +72,6 @@ def taken(polled, count):
     messages = []
     wait_until(lambda: messages.extend(polled.take()) or len(messages) >= count, "the messages")
     return messages
-
-
-def test_rclpy_has_what_polled_subscriptions_use(bench):
-    node, *_ = bench
-    polled = PolledSubscription(node, Float64, "numbers", blocks())
-    handle = polled.subscription.handle
-    version = importlib.metadata.version("ros-jazzy-rclpy")
-    moved = (
-        f"rclpy {version} takes messages in another way than {CHECKED}: "
-        "change nodes/plumbing/polled_subscription.py, which alone uses it"
-    )
-    assert callable(getattr(handle, "take_message", None)), moved
-    with handle:
-        assert handle.take_message(Float64, False) is None, moved
 
 
 @pytest.mark.parametrize("raw", [False, True])

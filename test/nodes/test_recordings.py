@@ -1,5 +1,15 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Recorded topics and saved buffers: the command reads out of them what the node found."""
 
+import itertools
 import json
 import math
 import re
@@ -143,7 +153,12 @@ def test_a_played_bag_gives_the_numbers_of_the_live_run(run, live):
         clock.publish(Clock(clock=time_of(time)))
 
     with Reader(run.recorded) as bag:
-        for count, (connection, received, data) in enumerate(bag.messages()):
+        messages = [*bag.messages()]
+        earlier = itertools.count(messages[0][1] - DAY - 60 * SECOND, SECOND // 10)
+        client.wait_until(  # the node's time is that of /clock before the first sample comes
+            lambda: tick(next(earlier)) or client.statuses, "a status"
+        )
+        for count, (connection, received, data) in enumerate(messages):
             if count % 100 == 0:
                 tick(received - DAY)
                 for publisher in topics.values():
@@ -166,27 +181,27 @@ def test_a_saved_buffer_gives_the_numbers_of_the_node(run):
         assert numbers_of(identified(saved, *options)) == run.numbers
 
 
-def test_the_refined_numbers_and_their_evidence_are_those_of_the_node(run):
-    assert run.client.set_together(IDENTIFIER, {"method": "refined"}).successful
+def test_the_numbers_and_their_evidence_are_those_of_the_node(run):
+    assert run.client.set_together(IDENTIFIER, {"method": "bench"}).successful
     assert run.client.trigger("identify").success
     numbers = told_by(run.client)
-    assert run.client.set_together(IDENTIFIER, {"method": "best"}).successful
+    assert run.client.set_together(IDENTIFIER, {"method": "plant"}).successful
     assert "nan" not in (numbers["threshold"], numbers["published coulomb_friction"])
     saved = Path(run.client.trigger("save").message)
-    answer = identified(saved, "--method", "refined")
+    answer = identified(saved, "--method", "bench")
     assert numbers_of(answer) == numbers
 
 
 def test_a_saved_buffer_knows_the_settings_of_the_node(run):
-    changes = {"method": "refined", "fixed.mass": 1.6, "derivative_window": 21}
+    changes = {"method": "bench", "fixed.mass": 1.6, "derivative_window": 21}
     assert run.client.set_together(IDENTIFIER, changes).successful
     assert run.client.trigger("identify").success
     numbers = told_by(run.client)
     saved = Path(run.client.trigger("save").message)
-    before = {"method": "best", "fixed.mass": math.nan, "derivative_window": 0}
+    before = {"method": "plant", "fixed.mass": math.nan, "derivative_window": 0}
     assert run.client.set_together(IDENTIFIER, before).successful
     answer = identified(saved)
-    assert answer["method"] == "refined"
+    assert answer["method"] == "bench"
     assert answer["parameters"]["mass"]["verdict"] == "fixed"
     assert numbers_of(answer) == numbers
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Commands that cannot be used: bounded memory, and the reason."""
 
 import math
@@ -22,21 +31,21 @@ class Bench:
     """A watch without a graph; `unit` and `travel` are its parameters."""
 
     def __init__(self, monkeypatch, unit="m", travel=0.02):
-        values = {"command_unit": unit, "travel": travel, "input_timeout": 3.0}
+        values = {"command_unit": unit, "input_timeout": 3.0}
         values |= {"deviation_limit": 0.0, "dead_time_limit": 0.0, "t86_limit": 0.0}
         self.queue, self.now = [], 0.0
         polled = SimpleNamespace(
-            subscription=None, take=self._taken, follow_publishers=lambda: None
+            subscription=None,
+            take=self._taken,
+            follow_publishers=lambda: None,
+            topic="stem_command",
+            watch=SimpleNamespace(silence=lambda: 0.0),
         )
-        watched = SimpleNamespace(arrived=lambda: None, silence=lambda: 0.0, topic="stem_command")
         monkeypatch.setattr(response_watch, "PolledSubscription", lambda *_, **__: polled)
-        monkeypatch.setattr(response_watch, "InputWatch", lambda *_: watched)
         monkeypatch.setattr(response_watch, "monotonic", lambda: self.now, raising=False)
         node = SimpleNamespace(get_parameter=lambda name: SimpleNamespace(value=values[name]))
-        monkeypatch.setattr(
-            response_watch, "values_of", lambda _, specs: {s.name: values[s.name] for s in specs}
-        )
-        friction = SimpleNamespace(estimate=None)
+        settings = SimpleNamespace(valve=SimpleNamespace(travel=travel))
+        friction = SimpleNamespace(estimate=None, settings=settings)
         history = SimpleNamespace(answers=lambda: (), valve=None, keep_soon=lambda *_: None)
         self.watch = response_watch.ResponseWatch(node, friction, history)
 

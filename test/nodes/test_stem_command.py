@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """`stem_command` over DDS: moves in service, their figures, limits and blame."""
 
 import math
@@ -91,7 +100,7 @@ def test_the_figures_outlive_a_kill(live, tmp_path):
     client.wait_until(lambda: len(read_answers(file, NODE)) == 6, "the moves in the history")
     live.kill(node)
 
-    live.start_identifier({**slow, "method": "refined"})
+    live.start_identifier({**slow, "method": "bench"})
     status = client.next_status(lambda one: "moves" in values_of(one), "the moves of before")
     after = values_of(status)
     assert status.level == WARN

@@ -1,8 +1,24 @@
-"""What is given up of the changes that wait for the history: identifications first, counted."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""Changes that wait for the history: which are given up, and how the thread that writes waits."""
+
+import time
 from functools import partial
+from pathlib import Path
 
+import pytest
+
+from valve_friction_ros.history import HistoryError
+from valve_friction_ros.nodes.identifier import workers
 from valve_friction_ros.nodes.identifier.waiting_changes import WaitingChanges
+from valve_friction_ros.nodes.identifier.workers import HistoryThread
 
 
 def change(name):
@@ -47,3 +63,37 @@ def test_a_change_waits_once_and_may_go_while_it_is_made():
     waiting.add(change("next"))
     waiting.remove(one)
     assert drained(waiting) == ["next"]
+
+
+class TestHistoryThread:
+    """One for all valves of a process."""
+
+    PLACE = Path("history.sqlite")
+
+    def fail(self, thread, asked, place=PLACE, lasts=0.0):
+        """Return whether a writing that fails was tried."""
+        tried = []
+
+        def locked():
+            tried.append(time.sleep(lasts))
+            raise HistoryError("locked")
+
+        with pytest.raises(HistoryError, match="locked"), thread.writing(place, asked):
+            locked()
+        return bool(tried)
+
+    def test_a_locked_file_is_waited_for_once(self, monkeypatch):
+        monkeypatch.setattr(workers, "_LONG", 0.01)
+        thread, asked = HistoryThread(), time.monotonic()
+        assert self.fail(thread, asked, lasts=0.02)
+        assert not self.fail(thread, asked)
+        assert self.fail(thread, asked, place=Path("another.sqlite"))
+        with thread.writing(self.PLACE, time.monotonic()):
+            pass  # what is asked for later is tried
+        assert self.fail(thread, time.monotonic())
+
+    def test_what_fails_at_once_holds_up_nothing(self):
+        thread, asked = HistoryThread(), time.monotonic()
+        assert self.fail(thread, asked)
+        with thread.writing(self.PLACE, asked):
+            pass

@@ -1,9 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Topics of a status, which anybody may publish, are subscribed to both or not at all."""
 
 import numpy as np
 import pytest
 
-from valve_friction_ros.dashboard.heard.valve_view import Sources
+from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.nodes.dashboard import watched_signals
 from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
 
@@ -14,9 +23,6 @@ class Node:
     def __init__(self):
         self.open = []
 
-    def destroy_subscription(self, subscription):
-        self.open.remove(subscription)
-
 
 class Subscription:
     """Refuses what rclpy refuses."""
@@ -24,8 +30,11 @@ class Subscription:
     def __init__(self, node, _kind, topic, _quality, **_):
         if " " in topic:
             raise ValueError("Invalid topic name: has a space:\n  a second line")
-        self.subscription = topic
+        self._node, self._topic = node, topic
         node.open.append(topic)
+
+    def end(self):
+        self._node.open.remove(self._topic)
 
     def take(self):
         return []

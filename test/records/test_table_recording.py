@@ -1,8 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Recordings in CSV files: what is read, and which row and column of a bad file is named."""
 
 import gzip
 import math
 import re
+from datetime import datetime, timezone
 
 import numpy as np
 import pytest
@@ -11,8 +21,8 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Drive, Valve
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.table_recording import drive_column, read_table
-from valve_friction_ros.records.tables.table import read_columns
+from valve_friction_ros.records.table import read_columns
+from valve_friction_ros.records.table_recording import holds_a_force, read_table
 
 HEADER = "time_s,position_m,pressure_pa"
 TIME = np.arange(40) / 1000
@@ -45,7 +55,8 @@ def write(tmp_path):
 
 
 def read_csv(*arguments, **options):
-    return read_table(*arguments, **options).recording()
+    (recorded,) = read_table(*arguments, **options)
+    return recorded.recording()
 
 
 def refused(path, valve=BENCH_VALVE, form=None, stretch=None):
@@ -85,6 +96,22 @@ class TestGoodFiles:
     def test_line_ends_and_mark_of_a_spreadsheet(self, write):
         assert_good(read_csv(write(["\ufeff" + HEADER, *GOOD], newline="\r\n"), BENCH_VALVE))
 
+    @pytest.mark.parametrize("factor", [1, 1_000_000])
+    def test_days_of_a_clock_are_local_where_a_zone_is_given(self, write, factor):
+        """Days since 1899-12-30, or WinCC's millionths of them; summer in Berlin is UTC + 2 h."""
+        noon = datetime(2026, 7, 1, 12, tzinfo=timezone.utc).timestamp()
+        days = (noon + np.arange(40) / 10) / 86_400 + 25_569
+        stamps = [f"{factor * day:.9f}" for day in days]
+        lines = ["Time_ms,position (m),pressure (Pa)"]
+        lines += [
+            f"{a},{b!r},{c!r}"
+            for a, b, c in zip(stamps, POSITION.tolist(), PRESSURE.tolist(), strict=True)
+        ]
+        for zone, shift in (("", 0.0), ("Europe/Berlin", -7200.0)):
+            found = read_csv(write(lines), BENCH_VALVE, Columns(time_zone=zone))
+            assert found.start_time == pytest.approx(noon + shift, abs=1e-3)
+            assert found.sample_period == pytest.approx(0.1, rel=1e-3)
+
     def test_spaces_blank_rows_and_quotes(self, write):
         lines = [" time_s , position_m,pressure_pa", *GOOD[:5], "", *GOOD[5:]]
         lines[3] = ",".join(f' "{entry}"'.strip() for entry in lines[3].split(","))
@@ -122,7 +149,7 @@ class TestGoodFiles:
 
     def test_pressure_goes_before_force(self, write):
         path = write([HEADER + ",force_n", *(row + ",1.0" for row in GOOD)])
-        assert drive_column(path, Columns()) == "pressure_pa"
+        assert not holds_a_force(path, Columns())
         assert_good(read_csv(path, BENCH_VALVE))
 
     def test_times_of_a_clock(self, write):
@@ -146,7 +173,7 @@ class TestGoodFiles:
 class TestUnitsAndLayout:
     def record(self, write, time, position, pressure, units=None, **layout):
         form = Columns(**(units or {}), **layout)
-        delimiter, decimal = form.delimiter, form.decimal
+        delimiter, decimal = form.delimiter or ",", form.decimal or "."
         lines = [
             row.replace(".", decimal).replace(";", delimiter)
             for row in (line.replace(",", ";") for line in rows(time, position, pressure))
@@ -168,13 +195,6 @@ class TestUnitsAndLayout:
     )
     def test_layout(self, write, layout):
         assert_good(self.record(write, TIME, POSITION, PRESSURE, **layout))
-
-    def test_decimal_comma_of_a_bad_entry(self, write):
-        form = Columns(delimiter=";", decimal=",")
-        path = write([HEADER.replace(",", ";"), "0,0;0,001;1e5", "0,1;0,00.2;1e5"])
-        assert refused(path, form=form) == (
-            "row 3, column 'position_m': '0,00.2' is not a number: correct it or delete the row"
-        )
 
     def test_units(self, write):
         """Whole µm and Pa: to the last bit."""
@@ -226,15 +246,17 @@ class TestUnitsAndLayout:
                 "unknown unit of pressure 'torr'; known are Pa, ",
             ),
             (
-                lambda: Columns(time_unit="h"),
-                "unknown unit of time 'h'; known are ns, us, ms, s, min",
+                lambda: Columns(time_unit="week"),
+                "unknown unit of time 'week'; known are ns, us, ms, s, min, h, d",
             ),
             (lambda: Columns(delimiter=";;"), "the delimiter must be one character"),
-            (lambda: Columns(delimiter=""), "the delimiter must be one character"),
             (lambda: Columns(delimiter="."), "the delimiter must be one character"),
             (lambda: Columns(delimiter="e"), "the delimiter must be one character"),
             (lambda: Columns(decimal=";"), "the decimal mark must be '.' or ',', got ';'"),
-            (lambda: Columns(decimal=","), "delimiter and decimal mark are both ','"),
+            (
+                lambda: Columns(delimiter=",", decimal=","),
+                "delimiter and decimal mark are both ','",
+            ),
         ],
     )
     def test_impossible(self, build, message):
@@ -259,7 +281,7 @@ class TestStretch:
         record = read_csv(path, BENCH_VALVE, stretch=stretch)
         np.testing.assert_array_equal(record.position, POSITION[first : last + 1])
 
-    @pytest.mark.parametrize("bad", ["0.01,nan,1e5", "0.01,0.003,3e5", "0.0001,0.003,1e5"])
+    @pytest.mark.parametrize("bad", ["0.01,0.003,3e5", "0.0001,0.003,1e5"])
     def test_what_is_bad_outside_does_not_matter(self, write, bad):
         path = write(with_row(12, bad))
         assert refused(path).startswith("row 12, column ")
@@ -267,9 +289,8 @@ class TestStretch:
             assert len(read_csv(path, BENCH_VALVE, stretch=stretch)) == size
 
     def test_rows_are_counted_from_the_top(self, write):
-        path = write(with_row(22, "0.02,nan,1e5"))
-        message = refused(path, stretch=Stretch(begin=0.01))
-        assert message.startswith("row 22, column 'position_m': nan is not finite")
+        message = refused(write(with_row(22, "0.02,0,3e5")), stretch=Stretch(begin=0.01))
+        assert message.startswith("row 22, column 'pressure_pa': 300000 Pa is outside")
 
     def test_nothing_in_it(self, write):
         message = refused(write([HEADER, *GOOD]), stretch=Stretch(begin=1.0))
@@ -282,120 +303,115 @@ class TestStretch:
 
 
 class TestColumns:
-    @pytest.mark.parametrize(
-        ("header", "wanted"),
-        [
-            ("t,position_m,pressure_pa", "'time_s'"),
-            ("time_s,stem,pressure_pa", "'position_m'"),
-            ("time_s,position_m,p", "'pressure_pa' (or 'force_n')"),
-        ],
-    )
-    def test_missing(self, write, header, wanted):
-        assert refused(write([header, *GOOD])) == (
-            f"no column {wanted} among {header.replace(',', ', ')}: "
-            "rename one or name the right one"
-        )
+    """What is missing or ambiguous is asked for at once, each with its option."""
 
     @pytest.mark.parametrize(
-        ("header", "remedy"),
+        ("header", "asked"),
         [
-            ("time_s,position_m,p_bar", "give --pressure-column p_bar --pressure-unit bar"),
-            ("time_s,position_m,P [kpa]", "give --pressure-column 'P [kpa]' --pressure-unit kPa"),
-            ("time_s,position_m,load_kN", "give --force-column load_kN --force-unit kN"),
-            ("time_s,travel (mm),pressure_pa", "give --position-column 'travel (mm)' --position-"),
-            ("t_ms,position_m,pressure_pa", "give --time-column t_ms --time-unit ms"),
-            ("time_s,position_m,bar", "rename one or name the right one"),
-            ("time_s,position_m,p_ba", "rename one or name the right one"),
+            ("a,position_m,pressure_pa", "the column of the time (--time-column a)"),
+            ("time_s,b,pressure_pa", "the column of the position (--position-column b)"),
+            ("time_s,position_m,c", "the column of the pressure (--pressure-column c)"),
+            (
+                "time_s,b,c",
+                "the column of the pressure (--pressure-column b or c); the column of the position "
+                "(--position-column b or c)",
+            ),
+            ("time_s,position_m,Druck", "the unit of the pressure 'Druck', values from 10"),
+            ("time_s,Hub,pressure_pa", "the unit of the position 'Hub', values from 0.001 to 0."),
         ],
     )
-    def test_a_unit_at_the_end_of_another_header(self, write, header, remedy):
-        _, _, told = refused(write([header, *GOOD])).rpartition(": ")
-        assert told.startswith(remedy)
+    def test_asked_for(self, write, header, asked):
+        assert refused(write([header, *GOOD])).startswith(f"cannot tell {asked}")
 
-    def test_another_delimiter(self, write):
-        assert refused(write(["time_s;position_m;pressure_pa", "0;0;1e5"])) == (
-            "no column 'pressure_pa' (or 'force_n'), only 'time_s;position_m;pressure_pa': "
-            "name the delimiter of the file (--delimiter ';')"
-        )
+    @pytest.mark.parametrize(
+        ("header", "size"),
+        [
+            ("time_s,position_m,p_bar", {"pressure": 1e5}),
+            ("time_s,position_m,P [kpa]", {"pressure": 1e3}),
+            ("time_s,travel (mm),Actuator pressure / Pa", {"position": 1e-3}),
+            ("time_s,Hub in mm,Druck (Pa)", {"position": 1e-3}),
+        ],
+    )
+    def test_units_of_headers(self, write, header, size):
+        record = read_csv(write([header, *GOOD]), Valve(0.0445))
+        np.testing.assert_allclose(record.position, POSITION * size.get("position", 1), rtol=1e-14)
+        np.testing.assert_allclose(record.pressure, PRESSURE * size.get("pressure", 1), rtol=1e-14)
 
-    @pytest.mark.parametrize(("step", "what"), [(0, "repeats"), (-1, "goes back")])
-    def test_times_that_do_not_rise_end_the_reading(self, tmp_path, step, what):
-        """At the first block: a row beyond it, which cannot be read, is not looked at."""
-        lines = [HEADER, *(f"{100_000 + step * row},0,1e5" for row in range(20_000)), "x,x,x"]
-        path = tmp_path / "record.csv.gz"
-        path.write_bytes(gzip.compress("\n".join(lines).encode()))
-        assert refused(path).startswith(f"row 3, column 'time_s' {what} (")
-
-    @pytest.mark.parametrize("entry", ["23,58", "-0,5", " 1,0"])
-    def test_a_decimal_comma(self, write, entry):
-        path = write(["time_s;position_m;pressure_pa", f"0;{entry};1e5", "1;0;1e5"])
-        assert refused(path, form=Columns(delimiter=";")) == (
-            f"row 2, column 'position_m': {entry!r} is not a number: name its decimal mark, "
-            '--decimal , (decimal: "," in a valve file)'
-        )
-
-    @pytest.mark.parametrize("date", ["01.07.2026 14:00:00,010", "7/1/2026 2:00 PM"])
-    def test_a_date_of_another_form(self, write, date):
-        path = write(["time_s;position_m;pressure_pa", f"{date};0;1e5"])
-        assert refused(path, form=Columns(delimiter=";")) == (
-            f"row 2, column 'time_s': {date!r} is not a number: name the form of its dates, "
-            "--time-format '%d.%m.%Y %H:%M:%S.%f'"
+    def test_a_named_column_without_a_unit_is_in_its_si_unit(self, write):
+        """As files of earlier versions mean it."""
+        path = write(["time_s,Stem,Air", *GOOD])
+        assert_good(
+            read_csv(path, BENCH_VALVE, Columns(position_column="Stem", pressure_column="Air"))
         )
 
     def test_missing_under_its_other_name(self, write):
         message = refused(write([HEADER, *GOOD]), form=Columns(time_column="t"))
-        assert message.startswith("no column 't' among time_s, ")
+        assert message.startswith("cannot tell there is no column 't' among time_s, ")
 
     def test_twice(self, write):
         path = write(["time_s,position_m,pressure_pa,position_m", *(row + ",0" for row in GOOD)])
-        assert refused(path) == "two columns are named 'position_m': rename one of them"
+        assert "(--position-column position_m or position_m)" in refused(path)
+
+    def test_times_that_repeat_end_the_reading(self, tmp_path):
+        """At the first block: a row beyond it, which cannot be read, is not looked at."""
+        lines = [HEADER, *("100000,0,1e5" for _ in range(20_000)), "x,x,x"]
+        path = tmp_path / "record.csv.gz"
+        path.write_bytes(gzip.compress("\n".join(lines).encode()))
+        assert refused(path).startswith("row 3, column 'time_s' repeats (")
+
+    def test_the_newest_first(self, write):
+        assert_good(read_csv(write([HEADER, *GOOD[::-1]]), BENCH_VALVE))
 
 
 class TestEntries:
-    @pytest.mark.parametrize(
-        ("entry", "quoted"),
-        [
-            ("closed", "'closed'"),
-            ("", "''"),
-            ("1_000", "'1_000'"),  # a number to Python
-            ("١", "'١'"),  # likewise
-            ("0x10", "'0x10'"),
-            ('"0,003"', "'0,003'"),
-            ("#N/A", "'#N/A'"),
-            ("x" * 100, f"'{'x' * 40}…'"),
-        ],
-    )
-    def test_no_number(self, write, entry, quoted):
-        path = write(with_row(12, f"0.01,{entry},1e5"))
-        assert refused(path) == (
-            f"row 12, column 'position_m': {quoted} is not a number: correct it or delete the row"
-        )
+    """Bad entries are left out and told, up to a share; beyond it the first is named."""
+
+    BAD = ("closed", "1_000", "١", "0x10", '"0,003"', "#N/A", "nan", "-inf", "1e999", "Bad Input")
+
+    @pytest.mark.parametrize("entry", BAD)
+    @pytest.mark.parametrize("column", [0, 1, 2])
+    def test_left_out(self, write, entry, column):
+        cells = ["0.01", "0.003", "1e5"]
+        cells[column] = entry
+        (recorded,) = read_table(write(with_row(12, ",".join(cells))), BENCH_VALVE)
+        kept = np.arange(40) != 10
+        stamped = recorded.recording().stamped
+        expected = kept if column in (0, 1) else np.ones(40, bool)
+        if column == 0:
+            np.testing.assert_array_equal(stamped.position.value, POSITION[kept])
+        elif column == 1:
+            np.testing.assert_array_equal(stamped.position.value, POSITION[expected])
+            assert stamped.drive.value.size == 40
+        told = [note for note in recorded.notes if "left out" in note]
+        name = HEADER.split(",")[max(column, 1)]
+        assert any(f"1 of 40 values of {name!r} are bad and were left out" in note for note in told)
+
+    def test_an_empty_entry_is_no_value(self, write):
+        """Two signals of their own rates share a table."""
+        (recorded,) = read_table(write(with_row(12, "0.01,,1e5")), BENCH_VALVE)
+        assert recorded.notes == ()
+        assert recorded.recording().stamped.position.value.size == 39
 
     def test_missing_in_a_row(self, write):
-        message = "row 12 has no entry in column 'pressure_pa': complete or delete it"
-        assert refused(write(with_row(12, "0.01,0.003"))) == message
+        (recorded,) = read_table(write(with_row(12, "0.01,0.003")), BENCH_VALVE)
+        assert recorded.recording().stamped.drive.value.size == 39
 
-    @pytest.mark.parametrize("column", ["time_s", "position_m", "pressure_pa"])
-    @pytest.mark.parametrize(
-        ("text", "value"), [("nan", "nan"), ("-inf", "-inf"), ("1e999", "inf"), ("NaN", "nan")]
-    )
-    def test_not_finite(self, write, column, text, value):
-        entries = dict(zip(HEADER.split(","), ("0.01", "0.003", "1e5"), strict=True))
-        path = write(with_row(12, ",".join((entries | {column: text}).values())))
-        assert refused(path) == (
-            f"row 12, column {column!r}: {value} is not finite: "
-            "use a stretch of the record without it"
+    def test_beyond_the_share(self, write):
+        lines = with_row(12, "0.01,closed,1e5")
+        lines[20:23] = ["0.019,open,1e5", "0.02,open,1e5", "0.021,open,1e5"]
+        path = write(lines)
+        assert refused(path).startswith(
+            "row 12, column 'position_m': 'closed' is no good value, and so are 4 of 40 of "
+            "'position_m', more than 5 %"
         )
+        assert "(--maximum-bad-share 0.11)" in refused(path)
+        assert read_csv(path, BENCH_VALVE, Columns(maximum_bad_share=0.11))
 
-    @pytest.mark.parametrize("bad", ["0.01,nan,1e5", "0.01,open,1e5", "0.01,0.003,3e5"])
+    @pytest.mark.parametrize("bad", ["0.01,0.003,3e5"])
     def test_blank_rows_are_counted(self, write, bad):
         lines = with_row(12, bad)
         lines[4:4] = ["", ""]
         assert refused(write(lines)).startswith("row 14, column ")
-
-    def test_a_quote_without_its_end(self, write):
-        path = write(with_row(12, '0.01,"0.003,1e5'))
-        assert refused(path).startswith("row 12, column 'position_m': '0.003,1e5")
 
     @pytest.mark.parametrize(
         ("pressure", "inside"),
@@ -416,12 +432,13 @@ class TestEntries:
 class TestTimes:
     def test_repeated(self, write):
         assert refused(write(with_row(12, "0.009,0.003,1e5"))) == (
-            "row 12, column 'time_s' repeats (0.009 after 0.009): delete one of the rows"
+            "row 12, column 'time_s' repeats (0.009 s after 0.009 s): export it with fractions of "
+            "a second, or delete one of the rows"
         )
 
     def test_backward(self, write):
         assert refused(write(with_row(12, "0.0,0.003,1e5"))) == (
-            "row 12, column 'time_s' goes back (0 after 0.009): "
+            "row 12, column 'time_s' goes back (0 s after 0.009 s): "
             "sort the rows, or use the record before or after it"
         )
 
@@ -451,12 +468,12 @@ class TestTimes:
         assert len(record) == 49
         assert record.gap == ""
 
-    def test_nanoseconds_taken_for_seconds(self, write):
+    def test_nanoseconds_are_known_by_their_size(self, write):
         stamps = 1_700_000_000_000_000_000 + 1e9 * TIME
-        assert refused(write([HEADER, *rows(stamps, POSITION, PRESSURE)])) == (
-            "row 41, column 'time_s': 1.7e+18 s is too large for a time: "
-            "name the unit of the column, or convert it to seconds"
+        record = read_csv(
+            write(["t,position_m,pressure_pa", *rows(stamps, POSITION, PRESSURE)]), BENCH_VALVE
         )
+        assert record.start_time == 1.7e9
 
     def test_one_sample(self, write):
         assert refused(write([HEADER, GOOD[0]])) == (
@@ -479,15 +496,19 @@ class TestUnreadableFiles:
         assert refused(path) == "the file is empty"
 
     def test_only_a_header(self, write):
-        assert refused(write([HEADER])) == "there are no rows under the header"
+        told = refused(write([HEADER]))
+        assert told == "cannot tell what it holds: there are no values under the header"
 
     def test_no_header(self, write):
-        assert refused(write(GOOD)).startswith("no column 'pressure_pa' (or 'force_n') among 0.0, ")
+        """Columns are then called by their numbers."""
+        assert "the column of the time (--time-column 1 or 2 or 3)" in refused(write(GOOD))
+        form = Columns(time_column="1", position_column="2", pressure_column="3")
+        assert_good(read_csv(write(GOOD), BENCH_VALVE, form))
 
     def test_another_encoding(self, write):
         path = write([HEADER, *GOOD])
         path.write_bytes(path.read_bytes() + b"0.04,\xff,1e5\n")
-        assert refused(path).startswith("row 42, column 'position_m': 'ÿ' is not a number")
+        assert len(read_csv(path, BENCH_VALVE)) == 40
         message = refused(path, form=Columns(encoding="utf-8"))
         assert message.startswith("cannot be read as CSV: 'utf-8' codec can't decode byte")
         assert message.endswith("name its encoding (--encoding)")
@@ -495,12 +516,11 @@ class TestUnreadableFiles:
     def test_no_table_at_all(self, tmp_path):
         path = tmp_path / "record.csv"
         path.write_bytes(b"x" * 200_000)
-        message = refused(path)
-        assert message.startswith(f"no column 'pressure_pa' (or 'force_n'), only '{'x' * 40}…'")
-        path.write_bytes(b'"' + b"x" * 200_000)
-        assert refused(path) == "cannot be read as CSV: field larger than field limit (131072)"
+        assert refused(path).startswith(f"there is only one column, '{'x' * 40}…'")
         path.write_bytes(b"x" * 2_000_000)
         assert refused(path).startswith("cannot be read as CSV: a line has more than 1048576 bytes")
+        path.write_bytes("\n".join([HEADER, *GOOD[:10], ""]).encode() + b'"' + b"x\n" * 1_000_000)
+        assert refused(path).startswith("cannot be read as CSV: a quote has no end within 1048576")
 
     def packed(self, write):
         """Enough gzipped text that its header can be read without its end."""

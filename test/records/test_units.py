@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Units by their definitions."""
 
 from fractions import Fraction
@@ -65,4 +74,8 @@ def test_si_units_change_nothing(value):
 
 
 def test_times():
-    assert NANOSECONDS == {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9}
+    short = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9}
+    assert short | {"min": 60 * 10**9, "h": 3600 * 10**9, "d": 86400 * 10**9} == {
+        name: size for name, size in NANOSECONDS.items() if name != "microdays"
+    }
+    assert NANOSECONDS["microdays"] * 10**6 == NANOSECONDS["d"]

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One short run of the whole command, for all tests of what comes of it."""
 
 import contextlib
@@ -6,11 +15,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from paper import command
+from paper.experiments import Plan
+from paper.programme import Programme
 
-from valve_friction_ros.commands import main, reproduce_paper
+from valve_friction_ros.commands import main
 from valve_friction_ros.model import IsaSteps
-from valve_friction_ros.reproduction.experiments import Plan
-from valve_friction_ros.reproduction.programme import Programme
 
 SHORT = Plan(
     square_periods=2, triangle_periods=2.5, sine_periods=1, isa=IsaSteps(sizes=(0.02, 0.2))
@@ -39,11 +49,11 @@ def reproduced(tmp_path_factory):
         return kept[0]
 
     output = tmp_path_factory.mktemp("paper") / "new" / "folder"
-    original = reproduce_paper.run_programme
+    original = command.run_programme
     printed = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
-        patch.setattr(reproduce_paper, "run_programme", run)
-        patch.setattr(reproduce_paper, "_PLAN", SHORT)
-        patch.setattr(reproduce_paper, "_SEEDS", 2)
+        patch.setattr(command, "run_programme", run)
+        patch.setattr(command, "_PLAN", SHORT)
+        patch.setattr(command, "_SEEDS", 2)
         code = main.run(["reproduce-paper", "--output", str(output), "--seed", "3"])
     return Reproduced(code, printed.getvalue().splitlines(), output, kept[0], told)

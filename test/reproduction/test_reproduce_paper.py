@@ -1,12 +1,23 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The command: what it writes, what it says last, and what it refuses."""
 
 import re
 
 import pytest
 from pages import PageReader
+from paper import command
+from paper.checks import all_checks
 
+from valve_friction_ros.commands import reproduce_paper
 from valve_friction_ros.commands.main import run
-from valve_friction_ros.reproduction.checks.checks import all_checks
 
 PICTURES = {
     "excitations",
@@ -126,15 +137,23 @@ def test_noise_that_hides_everything_is_refused_with_the_packing(tmp_path, capsy
 
 
 def test_noise_of_the_command_line_replaces_the_configured(monkeypatch, tmp_path):
-    from valve_friction_ros.commands import reproduce_paper
-
     seen = {}
 
     def refuse(benches, *_):
         seen.update({name: bench.noise for name, bench in benches.items()})
         raise ValueError("enough")
 
-    monkeypatch.setattr(reproduce_paper, "run_programme", refuse)
+    monkeypatch.setattr(command, "run_programme", refuse)
     options = ["--position-noise-um", "0", "--pressure-noise-pa", "7", "--seed", "4"]
     assert run(["reproduce-paper", "--output", str(tmp_path), *options]) == 2
     assert {(one.position, one.pressure, one.seed) for one in seen.values()} == {(0.0, 7.0, 4)}
+
+
+def test_an_installation_without_it_says_where_it_is(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(
+        reproduce_paper, "__file__", str(tmp_path / "package" / "commands" / "a.py")
+    )
+    assert run(["reproduce-paper", "--output", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("valve_friction reproduce-paper: the reproduction is no part of the")
+    assert told.endswith("where it lies in examples/paper\n")

@@ -1,10 +1,24 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The programme: exact where there is no noise, and checks that can fail."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
+from paper.bench import BENCH_NAMES, read_bench
+from paper.checks import Check, all_checks, force_terms, summary, within, written
+from paper.experiments import TRIANGLE, run
+from paper.programme import progress_steps, rounded_bias
 
 from valve_friction_ros.identification import (
     IdentificationSettings,
@@ -20,13 +34,8 @@ from valve_friction_ros.model import (
     SensorNoise,
     SquareWave,
 )
-from valve_friction_ros.reproduction.bench import BENCH_NAMES, find_bench_folder, read_bench
-from valve_friction_ros.reproduction.checks.check import Check, summary, within, written
-from valve_friction_ros.reproduction.checks.checks import all_checks
-from valve_friction_ros.reproduction.experiments import TRIANGLE, run
-from valve_friction_ros.reproduction.force_terms import force_terms
-from valve_friction_ros.reproduction.programme import progress_steps, rounded_bias
 
+CONFIG = Path(__file__).resolve().parents[2] / "config"
 KNOWN = {
     "low": (BENCH_VALVE, LOW_FRICTION),
     "high": (BENCH_VALVE, HIGH_FRICTION),
@@ -35,7 +44,7 @@ KNOWN = {
 
 
 def bench(name, noise=None):
-    found = read_bench(find_bench_folder(), name)
+    found = read_bench(CONFIG, name)
     return found if noise is None else found.with_noise(noise)
 
 
@@ -62,7 +71,7 @@ def test_configured_benches_are_those_of_the_model(name):
     ],
 )
 def test_wrong_bench_files_are_refused_in_one_line(tmp_path, change, told):
-    text = (find_bench_folder() / "bench_low.yaml").read_text(encoding="utf-8")
+    text = (CONFIG / "bench_low.yaml").read_text(encoding="utf-8")
     (tmp_path / "bench_low.yaml").write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(ValueError, match=told) as raised:
         read_bench(tmp_path, "low")

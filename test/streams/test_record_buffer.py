@@ -1,13 +1,33 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Both signals of a valve: what is taken, what is rejected, what is refused because of it."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Valve
-from valve_friction_ros.streams import Arrivals, Intake, Kind, RecordBuffer, rows_arrived
+from valve_friction_ros.streams import (
+    Arrivals,
+    Intake,
+    Kind,
+    RecordBuffer,
+    Samples,
+    Snapshot,
+    rows_arrived,
+)
 
 MILLISECOND = 1_000_000
 START = 1_700_000_000_000_000_000
@@ -76,7 +96,7 @@ class TestGoodSamples:
     def test_without_a_range_any_finite_pressure_is_one(self):
         buffer = RecordBuffer(Valve(1.0), 1.0)
         assert buffer.add_pressure(START, -1e300) is None
-        assert buffer.add_pressure(START + 1, math.inf) == "actuator_pressure is not finite"
+        assert str(buffer.add_pressure(START + 1, math.inf)) == "actuator_pressure is not finite"
 
 
 BAD = [
@@ -98,8 +118,8 @@ class TestBadSamples:
 
     def test_refuse_the_window(self, buffer, signal, value, cause):
         fill(buffer, 500)
-        assert self.add(buffer, signal, stamp(500), value) == cause
-        assert self.add(buffer, signal, stamp(501), value) == cause
+        assert str(self.add(buffer, signal, stamp(500), value)) == cause
+        assert str(self.add(buffer, signal, stamp(501), value)) == cause
         fill(buffer, 100, first=502)
         assert len(buffer) == 1200
         assert refused(buffer) == (
@@ -127,8 +147,8 @@ class TestBadSamples:
 class TestRepeatedStamps:
     def test_the_first_stays(self, buffer):
         fill(buffer, 500)
-        assert buffer.add_pressure(stamp(499), 7.0) == "actuator_pressure repeats a stamp"
-        assert buffer.add_position(stamp(499), 7.0) == "stem_state repeats a stamp"
+        assert str(buffer.add_pressure(stamp(499), 7.0)) == "actuator_pressure repeats a stamp"
+        assert str(buffer.add_position(stamp(499), 7.0)) == "stem_state repeats a stamp"
         snapshot = buffer.snapshot()
         assert snapshot.pressure.values[-1] == 1e5 + 499
         assert snapshot.position.values[-1] == 1e-6 * 499
@@ -149,11 +169,11 @@ class TestStampsThatGoBack:
         name = {"pressure": "actuator_pressure", "position": "stem_state"}[signal]
         cause = f"stamps of {name} went back by 0.25 s"
         found = getattr(buffer, f"add_{signal}")(stamp(249), 1e-3)
-        assert found == cause + ": the buffer was cleared"
+        assert str(found) == cause + ": the buffer was cleared"
         assert len(buffer) == 0
         snapshot = buffer.snapshot()
         assert snapshot.rejections == ()
-        assert snapshot.cleared_because == cause
+        assert str(snapshot.cleared_because) == cause
 
     def test_the_next_good_window_is_a_recording(self, buffer):
         fill(buffer, 500)
@@ -180,10 +200,10 @@ class TestStampsThatWereOvertaken:
         name = {"pressure": "actuator_pressure", "position": "stem_state"}[signal]
         cause = f"{name} was overtaken on its way: its stamp is a little before the last one"
         last = 199 * self.PERIOD
-        assert getattr(buffer, f"add_{signal}")(stamp(last - back), 7.0) == cause
+        assert str(getattr(buffer, f"add_{signal}")(stamp(last - back), 7.0)) == cause
         fill(buffer, 10, first=last + self.PERIOD, period=self.PERIOD)
         assert buffer.counts == (210, 210)
-        assert buffer.rejected == {cause: 1}
+        assert {str(one): n for one, n in buffer.rejected.items()} == {cause: 1}
         assert buffer.snapshot().cleared_because is None
         record = buffer.snapshot().recording()
         assert len(record) == 210
@@ -191,7 +211,7 @@ class TestStampsThatWereOvertaken:
 
     def test_further_back_the_clock_has_jumped(self, buffer):
         found = buffer.add_pressure(stamp(199 * self.PERIOD - 7), 1e5)
-        assert found.endswith("went back by 0.007 s: the buffer was cleared")
+        assert str(found).endswith("went back by 0.007 s: the buffer was cleared")
 
     def test_a_block_without_them_is_what_the_watches_take(self, buffer):
         at = 200 * self.PERIOD + np.array([0, 4, 2, 8, 12, 11, 16])
@@ -253,9 +273,134 @@ def test_each_sample_is_counted_as_taken_or_by_the_cause_of_its_rejection(buffer
         buffer.add_pressure(stamp(2500) + round(late), 1e9)
     buffer.add_arrivals(rows_arrived([[0.0, 1e5, 1e-3], [1.0, math.nan, 1e-3], [1.0, 1e5, 1e-3]]))
     assert buffer.taken == 5000 + 3
-    assert buffer.rejected == {
+    assert {str(one): number for one, number in buffer.rejected.items()} == {
         RANGE: 2,
         "actuator_pressure went back in time": 1,
         "actuator_pressure is not finite": 1,
         "stem_state repeats a stamp": 1,
     }
+
+
+BLOCK = 500
+WINDOW = 600.0
+CHUNKS = 2 * 1024 * 16  # bytes by which the two signals may vary as their chunks come and go
+
+
+def add(buffer, block):
+    seconds = (block * BLOCK + np.arange(BLOCK)) / 1000
+    buffer.add_arrivals(rows_arrived(np.column_stack([seconds, seconds + 1e5, seconds * 1e-6])))
+
+
+@pytest.fixture(scope="module")
+def sizes():
+    """Sizes of the buffer after each block since its window is full, by itself and traced."""
+    tracemalloc.start()
+    try:
+        before, _ = tracemalloc.get_traced_memory()
+        buffer = RecordBuffer(BENCH_VALVE, WINDOW)
+        full = round(WINDOW * 1000 / BLOCK) + 1
+        for block in range(full):
+            add(buffer, block)
+        own, traced = np.zeros((2, full), np.int64)
+        for number in range(full):
+            add(buffer, full + number)
+            own[number] = buffer.nbytes
+            traced[number] = tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+    assert len(buffer) == 2 * 600_001
+    return own, traced
+
+
+def test_under_20_megabytes(sizes):
+    own, traced = sizes
+    assert own.max() < traced.max() < 20e6
+
+
+def test_constant_while_running(sizes):
+    own, traced = sizes
+    assert np.ptp(own) <= CHUNKS
+    assert np.ptp(traced) <= 2 * CHUNKS  # the list and the arrays around the chunks as well
+
+
+MOST = 1000
+
+
+def signal(count, period=1000, begin=START, value=lambda time: time):
+    """A signal at even stamps, `period` ns apart; by default its value is its time since START."""
+    stamps = begin + period * np.arange(count, dtype=np.int64)
+    return Samples(stamps, value((stamps - START).astype(np.float64)))
+
+
+def thinned(pressure, position):
+    return Snapshot(pressure, position, (), None).thinned(MOST)
+
+
+def test_what_is_short_enough_stays_to_the_last_bit():
+    one = Snapshot(signal(MOST), signal(MOST, 700), (), None)
+    found, count = one.thinned(MOST)
+    assert found is one
+    assert count == 1
+
+
+@pytest.mark.parametrize(("count", "each"), [(MOST + 1, 2), (2 * MOST, 2), (9_999, 10)])
+def test_each_so_many_samples_give_their_mean_at_their_mean_time(count, each):
+    found, by = thinned(signal(count), signal(count))
+    assert by == each
+    for one in found.pressure, found.position:
+        assert one.stamps.size == count // each
+        middles = 1000 * (each * np.arange(one.stamps.size) + (each - 1) / 2)
+        np.testing.assert_array_equal(one.stamps - START, middles)
+        np.testing.assert_allclose(one.values, middles, rtol=1e-12)
+
+
+def test_noise_is_averaged():
+    noise = np.random.default_rng(1).normal(size=16 * MOST)
+    found, _ = thinned(signal(16 * MOST, value=lambda _: noise), signal(16 * MOST))
+    assert found.pressure.values.std() == pytest.approx(1 / 4, rel=0.1)
+    np.testing.assert_allclose(found.pressure.values, noise.reshape(-1, 16).mean(axis=1))
+
+
+def test_signals_with_the_same_stamps_keep_them_though_one_began_earlier():
+    found, _ = thinned(signal(5003, begin=START - 3000), signal(5000))
+    np.testing.assert_array_equal(found.pressure.stamps, found.position.stamps)
+
+
+def test_only_the_long_signal_is_thinned():
+    found, _ = thinned(signal(10 * MOST, 100), signal(MOST - 1, 1000))
+    assert found.pressure.stamps.size <= MOST
+    assert found.position.stamps.size == MOST - 1
+
+
+def test_no_mean_spans_a_pause():
+    """Of a signal that is away for a second; a value from there would be invented."""
+    before, after = signal(3005), signal(3000, begin=START + 1_000_000_000)
+    found, each = thinned(Samples.joined(before, after), Samples.joined(before, after))
+    assert each == 7
+    stamps = found.position.stamps
+    is_before = stamps <= before.stamps[-1]
+    assert (is_before | (stamps >= after.stamps[0])).all()
+    assert is_before.sum() == 3005 // 7
+    np.testing.assert_allclose(found.position.values, stamps - START, rtol=1e-12)
+
+
+@given(
+    st.lists(st.integers(1, 10_000_000), min_size=1, max_size=60),
+    st.integers(1, 200),
+    st.integers(1, 50),
+)
+def test_never_more_than_the_most_and_always_increasing(pauses, repeats, most):
+    stamps = START + np.cumsum(np.tile(np.array(pauses, np.int64), repeats))
+    one = Samples(stamps, np.zeros(stamps.size))
+    found, _ = Snapshot(one, one, (), None).thinned(most)
+    for part in found.pressure, found.position:
+        assert part.stamps.size <= most
+        assert (np.diff(part.stamps) > 0).all()
+
+
+@pytest.mark.parametrize("empty", [0, 1])
+def test_an_empty_signal_is_left_to_who_refuses_it(empty):
+    signals = [signal(2 * MOST), signal(0)]
+    found, count = thinned(signals[empty], signals[1 - empty])
+    assert count == 1
+    assert {found.pressure.stamps.size, found.position.stamps.size} == {0, 2 * MOST}

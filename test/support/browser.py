@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A real browser for the pages of the dashboard."""
 
 import contextlib
@@ -57,3 +66,25 @@ class Tab:
         assert not self.errors
         assert not self.strangers
         assert not self.dialogs
+
+
+def axe_violations(page):
+    """Return what axe-core finds wrong with a page at rest, a text for each rule; skips without it.
+
+    A page that is still being drawn has colours and places of its own. Of a page with a dialog the
+    dialog counts: what is behind it cannot be used.
+    """
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright", reason="axe is not installed"
+    )
+    found, part = [], ".q-dialog" if page.locator(".q-dialog").count() else None
+    for _ in range(5):
+        page.wait_for_function("document.getAnimations().every(one => one.playState != 'running')")
+        found = axe.Axe().run(page, part).response["violations"]
+        if not found:
+            break
+    return [
+        f"{one['id']} ({one['impact']}) ×{len(one['nodes'])}: {one['nodes'][0]['html'][:160]}: "
+        f"{one['nodes'][0]['failureSummary']}"
+        for one in found
+    ]

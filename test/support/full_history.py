@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A history with rows in each of its tables, as a plant of two valves would have them."""
 
 from dataclasses import fields
@@ -6,13 +15,26 @@ from pathlib import Path
 import numpy as np
 from histories import DAY, OTHER, SECOND, START, VALVE, refused, success
 
-from valve_friction_ros.evidence import Change
-from valve_friction_ros.evidence import Move as ServiceMove
-from valve_friction_ros.health import Baseline, Level, Measured, Reference, SlidingFriction
+from valve_friction_ros.evidence import FrictionChange, Move
+from valve_friction_ros.health import (
+    AlarmAction,
+    AlarmKind,
+    AlarmRequest,
+    Baseline,
+    Condition,
+    Level,
+    Measured,
+    Reference,
+    SlidingFriction,
+    StatusSignal,
+)
 from valve_friction_ros.history import (
+    AlarmFilter,
     AlarmRecording,
     KeptBaseline,
+    alarm_events,
     alarm_recordings,
+    follow_alarms,
     keep_alarm_recording,
     keep_answers,
     keep_change,
@@ -21,16 +43,18 @@ from valve_friction_ros.history import (
     keep_renewal,
     keep_told_level,
     keep_usage,
+    read_alarms,
     read_answers,
     read_change,
     read_moves,
     read_reference,
     read_told_level,
     read_usage,
+    request_alarms,
     valve_histories,
 )
 from valve_friction_ros.model import BENCH_VALVE, Recording, Valve
-from valve_friction_ros.response import Move
+from valve_friction_ros.response import StepAnswer
 from valve_friction_ros.usage import BINS, Usage, UsedDay
 
 BUILT = Valve(diaphragm_area=0.0445, pressure_reference=41_740.0, travel=0.03)
@@ -39,16 +63,16 @@ NUMBERS = {"spring_constant": Measured(2.05e5, 40.0), "lag": Measured(-0.002, 0.
 
 
 def answer(place, dead_time=0.25):
-    flags = {one.name: True for one in fields(Move) if one.type in (bool, "bool")}
-    numbers = {one.name: 0.125 for one in fields(Move) if one.name not in flags}
+    flags = {one.name: True for one in fields(StepAnswer) if one.type in (bool, "bool")}
+    numbers = {one.name: 0.125 for one in fields(StepAnswer) if one.name not in flags}
     numbers |= {"stamp": START + place * SECOND, "dead_time": dead_time}
-    return Move(**numbers, **flags)
+    return StepAnswer(**numbers, **flags)
 
 
 def service_move(number):
     begin = START + 12 * SECOND * number
     onset = (500.0, 1e-3, 20.0) if number % 2 else ()
-    return ServiceMove(begin, begin + SECOND, 1e-3, 2e-3, 500.0 + number, 10.0, 1e-3, *onset)
+    return Move(begin, begin + SECOND, 1e-3, 2e-3, 500.0 + number, 10.0, 1e-3, *onset)
 
 
 def usage(distance):
@@ -79,7 +103,11 @@ def fill(history, valve=VALVE):
     keep_told_level(history, valve, Level.ERROR)
     keep_moves(history, valve, BUILT, [*map(service_move, range(4))])
     keep_reference(history, valve, BUILT, Reference(SLIDING, START))
-    keep_change(history, valve, BUILT, Change(START, START + DAY, 1.5, 1.4, 1.6))
+    keep_change(history, valve, BUILT, FrictionChange(START, START + DAY, 1.5, 1.4, 1.6))
+    grown = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+    follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: grown}, START)
+    shelving = AlarmRequest(AlarmAction.SHELVE, "A. Operator", "repack on Monday", 3600.0)
+    request_alarms(history, valve, None, shelving, START + SECOND)
     keep_answers(history, valve, 0.02, [answer(1), answer(2, float("nan")), answer(0)])
 
 
@@ -93,10 +121,12 @@ def all_of(history):
             history.baselines(name),
             history.last_success(name) if history.entries([name]) else None,
             history.known_numbers(name, BENCH_VALVE, 0),
-            history.points(name, "refined"),
+            history.points(name, "bench"),
             read_usage(history, name),
             alarm_recordings(history, name),
             read_told_level(history, name),
+            read_alarms(history, name),
+            alarm_events(history, AlarmFilter(valve=name)),
             read_moves(history, name, BUILT),
             read_reference(history, name, BUILT),
             read_change(history, name, BUILT),

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Entries of a history, made up."""
 
 import math
@@ -16,10 +25,11 @@ from valve_friction_ros.health import (
 )
 from valve_friction_ros.health.diagnosis import friction_state
 from valve_friction_ros.history import HistoryEntry, KeptValve
-from valve_friction_ros.history.diagnosis_rows import state_columns
 from valve_friction_ros.history.entry import Fit, Span, settings_text
+from valve_friction_ros.history.rows import state_columns
 from valve_friction_ros.identification import Parameter, Verdict
 from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.wording import quoted
 
 SECOND = 1_000_000_000
 DAY = 86_400 * SECOND
@@ -59,11 +69,11 @@ def success(time=START, friction=150.0, half_width=3.0, valve=VALVE, **changes):
             "time": time,
             "valve": valve,
             "span": Span(time - 60 * SECOND, time),
-            "method": "refined",
+            "method": "bench",
             "diagnosis": Diagnosis(
                 Level.OK,
                 StatusSignal.GOOD,
-                "friction normal: so",
+                quoted("friction normal: so"),
                 found and found.ratio,
                 friction_state(found.ratio, FrictionLimits()) if found else FrictionState.UNKNOWN,
             ),
@@ -90,8 +100,10 @@ def refused(time=START, reason="the stem does not move: move the valve", valve=V
             "time": time,
             "valve": valve,
             "span": None,
-            "method": "refined",
-            "diagnosis": Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None),
+            "method": "bench",
+            "diagnosis": Diagnosis(
+                Level.OK, StatusSignal.GOOD, quoted(f"no estimate: {reason}"), None
+            ),
             "limits": FrictionLimits(),
             "baseline": None,
             "settings": _SETTINGS,
@@ -114,7 +126,7 @@ _OF_VERSION_5 = {
 def make_version_5(history):
     """Take away what later versions know: the valve in service, other files, typed states."""
     with closing(sqlite3.connect(history.path)) as connection:
-        for column in state_columns(Diagnosis(Level.OK, StatusSignal.GOOD, "", None)):
+        for column in state_columns(Diagnosis(Level.OK, StatusSignal.GOOD, quoted(""), None)):
             connection.execute(f"ALTER TABLE identification DROP COLUMN {column}")
         for table in ("identification", "baseline"):
             connection.execute(f"DROP INDEX {table}_uid")

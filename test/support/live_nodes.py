@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Nodes as processes of their own, and a client that talks to them over DDS."""
 
 import os
@@ -185,9 +194,9 @@ class Client:
             self._executor.spin_once(timeout_sec=0.02)
         return met
 
-    def drain(self):
+    def drain(self, seconds=0.5):
         """Take what nodes that have ended have left under way."""
-        end = time.monotonic() + 0.5
+        end = time.monotonic() + seconds
         while time.monotonic() < end:
             self._executor.spin_once(timeout_sec=0.02)
 
@@ -354,6 +363,12 @@ class Client:
             ),
             "subscriptions of the node",
         )
+
+    def disconnect(self):
+        """Destroy the publishers of pressure and stem."""
+        for publisher in (self._pressure, self._stem):
+            self.node.destroy_publisher(publisher)
+        self._pressure = self._stem = None
 
     def connect_pressure(self):
         """Create the publisher of the pressure alone, and wait until a node takes it."""

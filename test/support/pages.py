@@ -1,6 +1,16 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Report pages, read as a browser reads them."""
 
 import base64
+import re
 from html.parser import HTMLParser
 
 _VOID = {"meta", "img", "source"}
@@ -107,8 +117,9 @@ class PageReader(HTMLParser):
 
     def require_self_contained(self):
         """Nothing is fetched, and every picture is a PNG that says what it shows."""
-        assert "http" not in self.text
-        assert "<script" not in self.text
+        written = re.sub(r"base64,[\w+/=]+", "", self.text)  # pixels may spell anything
+        assert "http" not in written
+        assert "<script" not in written
         assert all(
             address.startswith(("#", "data:image/png;base64,")) for address in self.addresses
         )

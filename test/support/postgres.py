@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A PostgreSQL server for tests."""
 
 import pytest
@@ -23,12 +32,11 @@ def postgres():
 @pytest.fixture
 def database(postgres):
     """The address of a new, empty database."""
-    from valve_friction_ros.history.server.address import HistoryServer
+    from valve_friction_ros.history.place import HistoryServer
 
     postgres.start()
     name = postgres.database()
     yield HistoryServer(postgres.url(name))
-    from valve_friction_ros.history.server import connection
+    from valve_friction_ros.history.database import server_engine
 
-    for one in connection._idle.pop(HistoryServer(postgres.url(name)), []):
-        one.close()
+    server_engine(HistoryServer(postgres.url(name))).dispose()

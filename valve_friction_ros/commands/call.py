@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `call`: a service of a running identifier, without the command `ros2`."""
 
 import argparse
@@ -7,12 +16,9 @@ import sys
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from valve_friction_ros.commands.arguments.fail_on import has_failed
-from valve_friction_ros.commands.folder.stop_signals import StopSignals
-from valve_friction_ros.commands.output.errors import ExitCode, complain
-from valve_friction_ros.commands.output.formatting import OutputConsole
+from valve_friction_ros.commands.console import OutputConsole
+from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.identification import RefusalError
-
-__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (RefusalError,)
 _DISCOVERY = 5.0

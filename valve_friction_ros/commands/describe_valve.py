@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `describe-valve`: ask for the data of an actuator, and write its valve file."""
 
 import argparse
@@ -7,19 +16,17 @@ from typing import Any
 
 import yaml
 
-from valve_friction_ros.commands.arguments.actuator_questions import QUESTIONS, Question
+from valve_friction_ros.commands.arguments.actuator_questions import QUESTIONS, ActuatorQuestion
 from valve_friction_ros.commands.arguments.recording import given_columns
-from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.records.valve_description import ActuatorData
 from valve_friction_ros.records.valve_file import valve_file_of
 from valve_friction_ros.records.whole_file import write_whole
 
-__all__ = ["REFUSALS", "run"]
-
 REFUSALS = ()
 
 
-def _asked(question: Question) -> Any:
+def _asked(question: ActuatorQuestion) -> Any:
     """Ask until there is an answer that can be read."""
     default = f" [{question.default or 'none'}]" if question.default is not None else ""
     wrong: ValueError | None = None

@@ -1,31 +1,408 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `history`: list, export and draw what the identifiers have kept."""
 
 import argparse
+import csv
+import io
 import json
 import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
 
 from valve_friction_ros.commands.arguments.declared import EARLIEST, LATEST
 from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
-from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.commands.output.history_output import as_json, print_table, write_csv
-from valve_friction_ros.commands.output.usage_output import (
-    print_usage,
-    usage_as_json,
-    write_usage,
-)
+from valve_friction_ros.commands.console import plain_console
+from valve_friction_ros.commands.process import ExitCode
+from valve_friction_ros.health import FrictionState
 from valve_friction_ros.history import (
+    AlarmRecording,
     History,
+    HistoryEntry,
     HistoryError,
+    KeptBaseline,
     KeptValve,
+    Trend,
     ValveHistory,
     read_usage,
     valve_histories,
 )
-from valve_friction_ros.streams import DAY, nanoseconds
-from valve_friction_ros.usage import ValveUsage
+from valve_friction_ros.identification import (
+    parameter_cells,
+    parameter_columns,
+    parameter_mapping,
+    plain,
+    two_digits,
+)
+from valve_friction_ros.outside_text import harmless, printable
+from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.response import ResponseSummary
+from valve_friction_ros.streams import DAY, nanoseconds, utc, utc_day, utc_second
+from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
+from valve_friction_ros.wording import Code, headline, member_words, percentage
 
-__all__ = ["REFUSALS", "run"]
+
+def _valve_table(valve: KeptValve, *columns: str) -> Table:
+    """Return an empty table with these columns, titled by tag and name of the valve."""
+    tag = f"{valve.tag} " if valve.tag else ""
+    return Table(
+        *columns,
+        box=None,
+        header_style="bold",
+        title=printable(f"{tag}{valve.name}"),
+        title_justify="left",
+    )
+
+
+_HOUR = 3600e9
+
+
+def _usage_as_json(usage: ValveUsage) -> dict[str, Any] | None:
+    """Return the usage as a mapping, with its times as text; None where nothing was counted."""
+    if not usage.days and not usage.renewal:
+        return None
+    shown = usage.to_dict()
+    shown["renewal"] = utc_second(usage.renewal) if usage.renewal else None
+    for one in shown["days"]:
+        one["day"] = utc_day(one["day"])
+        one["renewal"] = utc_second(one["renewal"]) if one["renewal"] else None
+    return shown
+
+
+def alarms_as_json(alarms: Sequence[AlarmRecording]) -> list[dict[str, Any]]:
+    """Return the recordings of alarms as mappings, with their times as text."""
+    return [{**one.to_dict(), "time": utc_second(one.time)} for one in alarms]
+
+
+def service_lines(
+    usage: ValveUsage,
+    alarms: Sequence[AlarmRecording] = (),
+    response: ResponseSummary | None = None,
+) -> list[str]:
+    """Return what stands below the list of a valve: its usage, its answers, its latest alarm."""
+    lines = []
+    if usage.days:
+        since = f"since {utc_day(usage.renewal)} (packing renewed)" if usage.renewal else "in all"
+        lines.append(f"usage: {_words(usage.since_renewal)}, {since}")
+        if usage.renewal:
+            lines.append(f"usage: {_words(usage.total)}, in all")
+    if response is not None and response.moves:
+        lines.append(f"stem_command: {_answers(response)}")
+    if alarms:
+        last = alarms[-1]
+        lines.append(
+            f"alarm recordings: {len(alarms)}, the latest {utc_second(last.time)} "
+            f"{last.level.name}: {printable(str(last.path))}"
+        )
+    return lines
+
+
+def _answers(response: ResponseSummary) -> str:
+    """Return the medians of the answers."""
+    seconds = (("dead time", "dead_time"), ("T63", "t63"), ("T86", "t86"))
+    shares = (("overshoot", "overshoot"), ("steady error", "steady_error"))
+    figures = [
+        *(f"{word} {getattr(response, name).median:.3g} s" for word, name in seconds),
+        *(f"{word} {percentage(getattr(response, name).median)}" for word, name in shares),
+    ]
+    return (
+        f"{len(response.moves)} steps, {len(response.ignored)} ignored; medians: "
+        f"{', '.join(figures)}"
+    )
+
+
+def _words(usage: Usage) -> str:
+    return (
+        f"{usage.distance:.5g} m of travel, {usage.reversals} reversals, {usage.breakaways} "
+        f"breakaways in {usage.time_watched / _HOUR:.4g} h of watching"
+    )
+
+
+def _print_usage_table(
+    valves: Sequence[tuple[KeptValve, ValveUsage]], is_chosen: bool = False
+) -> None:
+    """Print a table of days a valve, and the sums and the pace below it.
+
+    Of chosen days the sum names the first and the last.
+    """
+    console = plain_console()
+    for valve, usage in valves:
+        table = _valve_table(
+            valve,
+            "day [UTC]",
+            "travel [m]",
+            "reversals",
+            "breakaways",
+            "watched [h]",
+            "near 0 % [h]",
+            "near 100 % [h]",
+            "packing of",
+        )
+        for column in table.columns[1:-1]:
+            column.justify = "right"
+        for one in usage.days:
+            table.add_row(
+                utc_day(one.day * DAY),
+                f"{one.usage.distance:.5g}",
+                str(one.usage.reversals),
+                str(one.usage.breakaways),
+                f"{one.usage.time_watched / _HOUR:.4g}",
+                f"{one.usage.time_near_seat() / _HOUR:.4g}",
+                f"{one.usage.time_near_seat(True) / _HOUR:.4g}",
+                utc_day(one.renewal) if one.renewal else "not known",
+            )
+        console.print(table)
+        if is_chosen:
+            first, last = (utc_day(usage.days[place].day * DAY) for place in (0, -1))
+            console.print(f"usage: {_words(usage.total)}, from {first} to {last}")
+        else:
+            for line in service_lines(usage):
+                console.print(line)
+        if (pace := usage.pace()) is not None:
+            console.print(
+                f"pace of the last days: {pace.distance:.4g} m and {pace.reversals:.4g} reversals "
+                "in a day of watching"
+            )
+        console.print()
+
+
+def _write_usage(path: Path, valves: Sequence[tuple[KeptValve, ValveUsage]]) -> None:
+    """Write a row for each day of each valve, oldest first.
+
+    Raises OSError if it cannot be written; it names `path`, and no part of the table stays.
+    """
+    rows = [_usage_row(valve, one) for valve, usage in valves for one in usage.days]
+    text = io.StringIO()
+    writer = csv.DictWriter(
+        text, _usage_row(KeptValve("", ""), UsedDay(0, 0, Usage())), lineterminator="\n"
+    )
+    writer.writeheader()
+    writer.writerows({name: harmless(value) for name, value in row.items()} for row in rows)
+    write_whole(path, text.getvalue().encode())
+
+
+def _usage_row(valve: KeptValve, one: UsedDay) -> dict[str, object]:
+    width = 100 // BINS
+    times = {
+        f"time_at_{n * width}_to_{(n + 1) * width}_percent_s": time / 1e9
+        for n, time in enumerate(one.usage.histogram)
+    }
+    return {
+        "day": utc_day(one.day * DAY),
+        "valve": valve.name,
+        "tag": valve.tag,
+        "packing_renewed": utc_second(one.renewal) if one.renewal else None,
+        "distance_m": one.usage.distance,
+        "reversals": one.usage.reversals,
+        "breakaways": one.usage.breakaways,
+        "time_watched_s": one.usage.time_watched / 1e9,
+        **times,
+    }
+
+
+def time_text(time: float, timespec: str = "milliseconds") -> str:
+    """Write a time in ns since 1970 by ISO 8601, in UTC."""
+    when = utc(time)
+    return when.isoformat(timespec=timespec).replace("+00:00", "Z")
+
+
+def _trend_as_json(trend: Trend | None) -> dict[str, Any] | None:
+    """Return the trend; the numbers only where the drift is significant."""
+    if trend is None:
+        return None
+    told: dict[str, Any] = {
+        "begin": time_text(trend.begin),
+        "end": time_text(trend.end),
+        "days": trend.days,
+        "outliers": trend.outliers,
+        "of": trend.of,
+        "speed": plain(trend.speed),
+        "significant": trend.is_significant,
+        "drift_n_per_month": None,
+        "half_width_n_per_month": None,
+        "crossing": None,
+    }
+    if trend.is_significant:
+        told |= {
+            "drift_n_per_month": trend.drift,
+            "half_width_n_per_month": trend.half_width,
+        }
+    if trend.crossing is not None:
+        told["crossing"] = {
+            "limit": trend.crossing.limit.value,
+            "level_n": trend.crossing.level,
+            "expected": time_text(trend.crossing.time),
+            "earliest": time_text(trend.crossing.earliest),
+            "latest": time_text(trend.crossing.latest),
+        }
+    return told
+
+
+def _shown(entry: HistoryEntry | KeptBaseline) -> dict[str, Any]:
+    """Return an entry, or a baseline, as a mapping, with its times as text."""
+    shown = entry.to_dict()
+    for name in {"time", "begin", "end", "since"} & {*shown}:
+        shown[name] = None if shown[name] is None else time_text(shown[name])
+    return shown
+
+
+def _as_json(histories: Sequence[ValveHistory]) -> dict[str, Any]:
+    """Build the object that JSON shows: valves, each with what was kept of it."""
+    return {
+        "valves": [
+            {
+                "name": history.valve.name,
+                "tag": history.valve.tag,
+                "trend": _trend_as_json(history.trend),
+                "baselines": [_shown(kept) for kept in history.baselines],
+                "usage": _usage_as_json(history.usage),
+                "alarm_recordings": alarms_as_json(history.alarms),
+                "response": history.response.to_dict(),
+                "entries": [_shown(entry) for entry in history.entries],
+            }
+            for history in histories
+        ]
+    }
+
+
+def _row(entry: HistoryEntry) -> dict[str, object]:
+    shown = _shown(entry)
+    diagnosis = shown["diagnosis"]
+    low, high = diagnosis["ratio_interval"] or (None, None)
+    row = {
+        "time": shown["time"],
+        "valve": entry.valve.name,
+        "tag": entry.valve.tag,
+        **{name: shown[name] for name in ("begin", "end", "method")},
+        "level": diagnosis["level"],
+        "refusal": shown["refusal"],
+        "ratio": diagnosis["ratio"],
+        "ratio_low": low,
+        "ratio_high": high,
+        "ratio_of": diagnosis["ratio_of"],
+        "ratio_speed_m_per_s": diagnosis["ratio_speed"],
+        "baseline_n": shown["baseline"],
+        "baseline_sliding_n": (shown["baseline_sliding"] or {}).get("value"),
+        "sliding_speed_m_per_s": shown["sliding_speed"],
+        "fit": shown["fit"],
+        "rms_m": shown["rms"],
+    }
+    for name, parameter in shown["parameters"].items():
+        row |= parameter_columns(name, parameter)
+    return row | {"message": diagnosis["message"], "software_version": shown["software_version"]}
+
+
+def _write_csv(path: Path, histories: Sequence[ValveHistory]) -> None:
+    """Write a row for each identification, oldest first; a cell without a value is empty.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; it names `path`, and no part of the table stays.
+    """
+    entries = sorted(
+        (entry for history in histories for entry in history.entries), key=lambda one: one.time
+    )
+    rows = [_row(entry) for entry in entries]
+    widest = max(rows, key=len)
+    header = [*dict.fromkeys([*widest, *(name for row in rows for name in row)])]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, header, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: harmless(value) for name, value in row.items()} for row in rows)
+    write_whole(path, text.getvalue().encode())
+
+
+def _told(entry: HistoryEntry) -> str:
+    """Return the reason of a refusal, or the verdict without its figures."""
+    found = entry.diagnosis
+    if found.statement.code is Code.QUOTED and found.state is not FrictionState.UNKNOWN:
+        return entry.refusal or member_words(found.state, "state")  # of a former version
+    return entry.refusal or headline(found.statement)
+
+
+def _cells(row: HistoryEntry | KeptBaseline) -> tuple[str, ...]:
+    """Return what the table shows of an identification or a baseline, after its time."""
+    if isinstance(row, KeptBaseline):
+        level = "" if row.level is None else row.level.name
+        change = f"{row.by}: {row.in_force or 'none'}; before: {row.replaced or 'none'}"
+        return ("", "", "baseline", "", level, change)
+    one, ratio = row.friction, row.diagnosis.ratio
+    cells: tuple[str, ...] = ("", "–", "", "", "refused")
+    if one is not None:
+        cells = parameter_cells(one.name, parameter_mapping(one))
+    return (
+        *(cells[place] for place in (1, 2, 4)),
+        "" if ratio is None or row.refusal else f"{ratio.value:.2f}",
+        row.diagnosis.level.name,
+        _told(row),
+    )
+
+
+def _print_table(histories: Sequence[ValveHistory]) -> None:
+    """Print a table a valve, with its baselines, and the trend below it."""
+    console = plain_console()
+    for history in histories:
+        table = _valve_table(
+            history.valve,
+            "time [UTC]",
+            "F_c [N]",
+            "± 95 %",
+            "verdict",
+            "ratio",
+            "level",
+            "diagnosis",
+        )
+        for column in (1, 2, 4):
+            table.columns[column].justify = "right"
+        for column in range(6):
+            table.columns[column].no_wrap = True
+        rows: list[HistoryEntry | KeptBaseline] = [*history.entries, *history.baselines]
+        for row in sorted(rows, key=lambda one: one.time):
+            time = time_text(row.time, "seconds")[:-1].replace("T", " ")
+            table.add_row(time, *_cells(row))
+        console.print(table)
+        for line in _trend_lines(history.trend):
+            console.print(line)
+        for line in service_lines(history.usage, history.alarms, history.response):
+            console.print(line)
+        console.print()
+
+
+def _trend_lines(trend: Trend | None) -> list[str]:
+    if trend is None:
+        return []
+    days = f"{trend.days} days"
+    if trend.outliers:
+        days += f" ({trend.outliers} left out as outliers)"
+    if not trend.is_significant:
+        return [f"trend: no significant drift of {trend.what} over {days}"]
+    lines = [
+        f"trend: {trend.what} drifts by {trend.drift:+.3g} ± {two_digits(trend.half_width)} N "
+        f"a month, over {days}"
+    ]
+    if trend.crossing is not None:
+        expected, earliest, latest = (
+            time_text(time)[:10]
+            for time in (trend.crossing.time, trend.crossing.earliest, trend.crossing.latest)
+        )
+        lines.append(
+            f"trend: {trend.crossing.limit.value} ({trend.crossing.level:.4g} N) expected on "
+            f"{expected} (95 %: {earliest} to {latest})"
+        )
+    return lines
+
 
 REFUSALS = (HistoryError,)
 
@@ -61,15 +438,15 @@ def _print_usages(options: argparse.Namespace) -> int:
     try:
         if options.json:
             valves = [
-                {"name": valve.name, "tag": valve.tag, "usage": usage_as_json(usage)}
+                {"name": valve.name, "tag": valve.tag, "usage": _usage_as_json(usage)}
                 for valve, usage in usages
             ]
             print(json.dumps({"valves": valves}, ensure_ascii=False, allow_nan=False))
         else:
-            print_usage(usages, (options.since, options.until) != (EARLIEST, LATEST))
+            _print_usage_table(usages, (options.since, options.until) != (EARLIEST, LATEST))
     finally:
         if options.csv is not None:
-            write_usage(options.csv, usages)
+            _write_usage(options.csv, usages)
     return ExitCode.DONE
 
 
@@ -107,12 +484,12 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"--plot: {error} by --valve") from None
     try:
         if options.json:
-            print(json.dumps(as_json(histories), ensure_ascii=False, allow_nan=False))
+            print(json.dumps(_as_json(histories), ensure_ascii=False, allow_nan=False))
         else:
-            print_table(histories)
+            _print_table(histories)
     finally:  # a closed output costs no file, and a full disk no list
         if options.csv is not None:
-            write_csv(options.csv, histories)
+            _write_csv(options.csv, histories)
         if figure is not None:
             figures.save_picture(figure, options.plot)
     levels = (history.entries[-1].diagnosis.level for history in histories)

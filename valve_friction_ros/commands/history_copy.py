@@ -1,13 +1,20 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `history copy`: copy a history to another file or server, and compare the two."""
 
 import argparse
 import json
 
 from valve_friction_ros.commands.arguments.kept_valves import chosen_valves
-from valve_friction_ros.commands.output.errors import ExitCode
+from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.history import CopiedPart, History, HistoryError, copied
-
-__all__ = ["REFUSALS", "run"]
 
 REFUSALS = (HistoryError,)
 

@@ -1,42 +1,193 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `identify`: identify the valves of a recorded CSV file or bag."""
 
 import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
     identification_settings,
     method_name,
+    survey_limits,
 )
 from valve_friction_ros.commands.arguments.recording import (
     described,
     read_one,
+    reading_progress,
     require_one,
+    save_columns,
 )
-from valve_friction_ros.commands.output.errors import ExitCode, complain
-from valve_friction_ros.commands.output.identification_files import (
-    baseline_from,
-    identification_files,
+from valve_friction_ros.commands.process import ExitCode, complain
+from valve_friction_ros.health import (
+    Baseline,
+    Diagnosis,
+    Finding,
+    FrictionLimits,
+    Level,
+    Survey,
+    diagnose_valve,
 )
-from valve_friction_ros.commands.output.result_output import as_json, print_table
-from valve_friction_ros.health import Diagnosis, Finding, Level, diagnose_valve
 from valve_friction_ros.identification import (
-    METHODS,
     IdentificationSettings,
     Method,
     RefusalError,
     Result,
+    method_named,
 )
-from valve_friction_ros.model import Valve
+from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.stretch import Stretch
 
-__all__ = ["REFUSALS", "run"]
+
+def as_json(
+    result: Result,
+    notes: Sequence[str] = (),
+    diagnosis: Diagnosis | None = None,
+    findings: Sequence[Finding] = (),
+) -> dict[str, Any]:
+    """Build the object that JSON shows of a result.
+
+    `notes` join its warnings; `diagnosis` is there when there is one, and with it the `findings`
+    beside the friction.
+    """
+    shown = result.to_dict()
+    shown["warnings"] = [*notes, *shown["warnings"]]
+    if diagnosis is None:
+        return shown
+    found = [one.to_dict() for one in findings]
+    return shown | {"diagnosis": diagnosis.to_dict(), "findings": found}
+
+
+def print_table(
+    result: Result,
+    notes: Sequence[str] = (),
+    diagnosis: Diagnosis | None = None,
+    findings: Sequence[Finding] = (),
+) -> None:
+    """Print a result for people; `notes` join its warnings, `diagnosis` and `findings` end it."""
+    print(result.summary())
+    for note in notes:
+        print(f"note: {printable(note)}")
+    if diagnosis is not None:
+        print(diagnosis)
+    for finding in findings:
+        print(finding)
+
+
+def baseline_from(options: argparse.Namespace) -> Baseline | None:
+    """Build the baseline from the parsed arguments.
+
+    Raises ValueError if it is impossible, or its interval is given without it.
+    """
+    friction, width = options.baseline_coulomb_friction, options.baseline_half_width
+    if options.baseline_recording is not None and (friction, width) != (None, None):
+        raise ValueError("--baseline-recording: its friction is the baseline: give no other one")
+    if friction is None:
+        if width is not None:
+            raise ValueError(
+                "--baseline-half-width: give the baseline itself by --baseline-coulomb-friction"
+            )
+        return None
+    return Baseline(friction, 0.0 if width is None else width)
+
+
+class IdentificationFiles(NamedTuple):
+    """The files to write."""
+
+    plot: Path | None
+    report: Path | None
+    healthy: Recording | None = None
+
+    def compared_with(
+        self, recorded: RecordedValve, outcome: Result | RefusalError
+    ) -> tuple[Baseline, "IdentificationFiles"]:
+        """Return the frictions of the healthy valve, and the files with its record in them.
+
+        Raises RefusalError, which names its file, where it cannot be a baseline.
+        """
+        if isinstance(outcome, RefusalError):
+            raise outcome
+        try:
+            return Baseline.of(outcome), self._replace(healthy=outcome.recording)
+        except RefusalError as refusal:
+            raise recorded.refused(refusal) from None
+
+    def require_one_valve(self, recorded: Sequence[RecordedValve]) -> None:
+        """Refuse several valves; raises ValueError, which names them."""
+        if self.plot is not None:
+            require_one(recorded, "--plot draws")
+        if self.report is not None:
+            require_one(recorded, "--report is of")
+
+    def write(
+        self,
+        recorded: RecordedValve,
+        result: Result,
+        baseline: Baseline | None,
+        limits: FrictionLimits,
+    ) -> None:
+        """Write them; raises OSError, which names the file, where that fails."""
+        if self.plot is None and self.report is None:
+            return
+
+        from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
+
+        if self.plot is not None:
+            figures.save_picture(figures.identification_figure(result), self.plot)
+        if self.report is not None:
+            from valve_friction_ros import reports  # noqa: PLC0415 - slow to import
+
+            record = reports.IdentifiedRecord(
+                name=recorded.name.strip("/") or recorded.path.name,
+                source=recorded.label,
+                result=result,
+                baseline=baseline,
+                notes=recorded.notes,
+                limits=limits,
+                dated=_dated(recorded.path),
+                healthy=self.healthy,
+            )
+            reports.write_report(reports.identification_report(record), self.report)
+
+
+def _dated(path: Path) -> str:
+    """Return when a file was last changed, in words; empty where it has no such time."""
+    if not path.is_file():
+        return ""
+    changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
+    return f"its file was last changed {changed:%Y-%m-%d %H:%M} UTC"
+
+
+def identification_files(options: argparse.Namespace) -> IdentificationFiles:
+    """Return the files that were asked for.
+
+    Raises ValueError, which names the file and the cause, for a file that cannot be written.
+    """
+    if options.plot is not None:
+        from valve_friction_ros.figures import require_picture_file  # noqa: PLC0415 - slow to import
+
+        require_picture_file(options.plot)
+    if options.report is not None:
+        from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
+
+        require_report_file(options.report)
+    return IdentificationFiles(options.plot, options.report)
+
 
 REFUSALS = (RefusalError,)
 
@@ -115,7 +266,8 @@ def run(options: argparse.Namespace) -> int:
     description, reading = described(options.file, options.valve, options)
     valve = description.valve
     settings = identification_settings(options, description)
-    method = METHODS[method_name(options, description.settings)]
+    limits = survey_limits(options, description)
+    method = method_named(method_name(options, description.settings))
     baseline, files = baseline_from(options), identification_files(options)
     if options.baseline_recording is not None:
         whole = replace(reading, stretch=Stretch())
@@ -123,7 +275,9 @@ def run(options: argparse.Namespace) -> int:
         baseline, files = files.compared_with(
             healthy, _identified(healthy, valve, method, settings)
         )
-    recorded = read_recordings(options.file, valve, reading)
+    with reading_progress():
+        recorded = read_recordings(options.file, valve, reading)
+    save_columns(options, reading)
     files.require_one_valve(recorded)
     if baseline is not None:
         name = "coulomb-friction" if options.baseline_recording is None else "recording"
@@ -133,15 +287,18 @@ def run(options: argparse.Namespace) -> int:
         outcome = _identified(each, valve, method, settings)
         diagnosis: Diagnosis | None = None
         findings: tuple[Finding, ...] = ()
-        if isinstance(outcome, Result) and (baseline is not None or options.fail_on is not None):
-            diagnosis, findings = diagnose_valve(outcome, baseline)
+        if isinstance(outcome, Result):
+            diagnosis, findings = diagnose_valve(outcome, baseline, limits)
+            tells = baseline is not None or diagnosis.survey is not Survey.UNKNOWN
+            if not tells and options.fail_on is None:
+                diagnosis = None
         results.append(_Answer(each, outcome, diagnosis, findings))
     try:
         code = _print(results, options.command, options.json)
     finally:  # a closed output costs no picture, and a full disk no numbers
         for each, outcome, _, _ in results:
             if isinstance(outcome, Result):
-                files.write(each, outcome, baseline)
+                files.write(each, outcome, baseline, limits)
     if options.fail_on is not None and baseline is None:
         complain(
             options.command,

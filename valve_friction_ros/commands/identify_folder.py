@@ -1,50 +1,331 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `identify-folder`: identify all recordings of a folder, on all cores."""
 
 import argparse
+import contextlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
 
 from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
     identification_settings,
+    method_name,
+    survey_limits,
 )
-from valve_friction_ros.commands.arguments.recording import reading_options
-from valve_friction_ros.commands.folder.plan import Plan, forget_stale, make_plan
-from valve_friction_ros.commands.folder.sharing import (
-    ShareOut,
-    finished,
-    workers,
-)
-from valve_friction_ros.commands.folder.stop_signals import StopSignals
-from valve_friction_ros.commands.folder.summary import print_alarms, print_tally
-from valve_friction_ros.commands.output.errors import ExitCode, complain
-from valve_friction_ros.commands.output.formatting import OutputConsole
+from valve_friction_ros.commands.arguments.recording import described, reading_options
+from valve_friction_ros.commands.console import OutputConsole
+from valve_friction_ros.commands.process import ExitCode, StopSignals, complain
 from valve_friction_ros.fleet import (
+    FILING,
     REFUSED,
     Baselines,
+    DeadWorker,
+    Filing,
+    Findings,
+    FoundRecording,
     Job,
+    Options,
+    RecordingRows,
     ResultsFile,
+    Tally,
+    baseline_kept,
+    cluster_at,
     database_of,
+    error_cells,
+    file_results,
+    filed_before,
     find_recordings,
+    identify_job,
+    identify_job_elsewhere,
+    in_cluster,
+    in_processes,
     is_page,
     key_cells,
+    ranked,
+    reaches,
     read_baselines,
+    read_plant,
+    reason_of,
     reports_of,
     tally,
+    usable_cores,
+    valves_of,
+    with_reports_written,
     writer_of,
 )
-from valve_friction_ros.health import Level
+from valve_friction_ros.fleet.rows import Cell
+from valve_friction_ros.health import Baseline, Level
+from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import Valve
 from valve_friction_ros.model.frozen import frozen
-from valve_friction_ros.records.stores import place
+from valve_friction_ros.records.bags.storage import is_bag
+from valve_friction_ros.records.recordings import ReadingOptions
+from valve_friction_ros.records.stores import explained, on_disk, place
 from valve_friction_ros.records.valve_file import ValveFile, read_valve_file
+from valve_friction_ros.streams import utc_second
 
-__all__ = ["REFUSALS", "run"]
+_VALVE_FILE = "valve.yaml"
 
-REFUSALS = ()
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be done with a recording: the job, or why it cannot be done.
+
+    `content` and `settings` are fingerprints of its files and of its options.
+    """
+
+    name: str
+    content: str
+    settings: str
+    job: Job | str
+
+
+def _valve_file(found: FoundRecording, common: Path | None) -> Path | None:
+    """Choose the description that is nearest to a recording."""
+    beside = found.path.parent
+    places = [beside / f"{found.stem}.{_VALVE_FILE}", beside / _VALVE_FILE]
+    if found.path.is_dir():
+        places.insert(1, found.path / _VALVE_FILE)
+    return next((place for place in places if place.exists()), common)
+
+
+def _kept_baselines(history: Path | None) -> Callable[[str], Baseline | None]:
+    """Return what reads the baseline of a tag from a history, once each."""
+    return cache(lambda tag: None if history is None else baseline_kept(history, tag))
+
+
+def make_plan(
+    findings: Findings,
+    options: argparse.Namespace,
+    baselines: Baselines,
+    reports: Path | None,
+) -> Iterator[Plan]:
+    """Plan each recording, in the order of their names; `reports` is the folder of the reports.
+
+    A table with several valves of the plant is as many recordings.
+    """
+    plant = {} if options.plant is None else read_plant(options.plant)
+    kept_baseline = _kept_baselines(options.history)
+
+    @cache
+    def described_by(valve_file: Path) -> tuple[ValveFile, ReadingOptions]:
+        with on_disk(valve_file) as file:
+            return described(file, file, options)
+
+    def valves(found: FoundRecording) -> Iterator[tuple[str, str, ValveFile, ReadingOptions]]:
+        """Yield label, tag, description and options of each valve of a recording."""
+        own = _valve_file(found, None if plant else options.valve)
+        if own is not None:
+            yield "", "", *described_by(own)
+        elif not plant:
+            yield "", "", *described(found.path, None, options)
+        else:
+            with on_disk(found.path) as path:
+                is_table = not is_bag(path)
+                chosen = valves_of(path, found.name, plant, is_table)
+            for label, tag, description in chosen:
+                reading = reading_options(options, description.columns)
+                topics = replace(reading.topics, valve=label or reading.topics.valve)
+                yield label, tag, description, replace(reading, topics=topics)
+
+    def plans(found: FoundRecording) -> Iterator[Plan]:
+        content = ""
+        try:
+            with explained(found.path):
+                content = found.content()
+                chosen = list(valves(found))
+            for label, tag, description, reading in chosen:
+                name = f"{found.name}, {label}" if label else found.name
+                wanted = Options(
+                    description.valve,
+                    reading,
+                    method_name(options, description.settings),
+                    identification_settings(options, description),
+                    baselines.of(found.name),
+                    tag,
+                    survey_limits(options, description),
+                )
+                job = Job(
+                    found.path,
+                    name,
+                    wanted,
+                    reports,
+                    options.history is not None,
+                    kept_baseline(tag),
+                )
+                yield Plan(name, content, wanted.fingerprint(), job)
+        except (ValueError, OSError) as error:
+            yield Plan(found.name, content, "", str(error).removeprefix(f"{found.path}: "))
+
+    for found in findings.recordings:
+        yield from plans(found)
+
+
+def _is_current(entry: RecordingRows, plan: Plan) -> bool:
+    return (entry.content, entry.settings) == (plan.content, plan.settings)
+
+
+def _has_reports(entry: RecordingRows, plan: Plan) -> bool:
+    """Return whether the reports of an entry are there, if they are wanted."""
+    if not isinstance(plan.job, Job) or plan.job.reports is None:
+        return True
+    beside = plan.job.reports.parent
+    return all(
+        row["error"] or (row["report"] and (beside / str(row["report"])).is_file())
+        for row in entry.rows
+    )
+
+
+def _filed(plans: Mapping[str, Plan], options: argparse.Namespace) -> set[tuple[str, str]] | None:
+    """Return tag and time of what the history holds; None without a history."""
+    if options.history is None:
+        return None
+    tags = {plan.job.options.tag for plan in plans.values() if isinstance(plan.job, Job)}
+    return {
+        (tag, utc_second(second * 1e9))
+        for tag, second in filed_before(options.history, tags - {""})
+    }
+
+
+def _is_filed(entry: RecordingRows, filed: set[tuple[str, str]] | None) -> bool:
+    """Return whether all results of an entry that have a tag and a date are in the history."""
+    return filed is None or all(
+        row["error"] or not row["began"] or (str(row["valve"]), str(row["began"])) in filed
+        for row in entry.rows
+    )
+
+
+def forget_stale(
+    results: ResultsFile, plans: Mapping[str, Plan], options: argparse.Namespace
+) -> tuple[list[Plan], int]:
+    """Drop the rows that do not hold any more; return what is left, and how many were dropped.
+
+    With ``redo`` good rows of other options may go; with ``retry_failed`` refused recordings are
+    tried again, and so are those whose reports are missing.
+
+    Raises ValueError if good rows were made with other options and may not go.
+    """
+    done, others = set(), 0
+    filed = _filed(plans, options)
+    for entry in results.entries():
+        plan = plans.get(entry.recording)
+        if plan is None:
+            continue
+        if _is_current(entry, plan):
+            is_whole = _has_reports(entry, plan) and _is_filed(entry, filed)
+            if is_whole and not (options.retry_failed and entry.failed):
+                done.add(entry.recording)
+        elif entry.content == plan.content and entry.settings != plan.settings:
+            others += not entry.refused
+    if others and not options.redo:
+        raise ValueError(
+            f"{results.path}: {others} recordings in it were identified with other options, "
+            "another valve file, baseline or version: give another --output, or --redo to replace "
+            "them"
+        )
+    dropped = results.keep(lambda entry: entry.recording not in plans or entry.recording in done)
+    return [plan for plan in plans.values() if plan.name not in done], dropped
+
+
+Rows = list[Mapping[str, Cell]]
+"""The cells of all valves of a recording."""
+
+ShareOut = Callable[[Iterable[Job], Callable[[], bool]], Iterator[tuple[Job, Rows | DeadWorker]]]
+"""Identifies recordings until it is to stop: yields each with its rows as it finishes."""
+
+
+@contextlib.contextmanager
+def workers(options: argparse.Namespace) -> Iterator[ShareOut]:
+    """Have those at hand that identify.
+
+    Raises ValueError if a cluster was asked for that is not there, or cannot do the work.
+    """
+    if options.scheduler is None:
+        processes = usable_cores() if options.jobs is None else options.jobs
+        yield lambda jobs, stopped: in_processes(identify_job, jobs, processes, stopped)
+        return
+    with cluster_at(options.scheduler) as cluster:
+        for note in cluster.compare():
+            print(note, file=sys.stderr)
+        yield partial(in_cluster, cluster, identify_job_elsewhere)
+
+
+def finished(
+    plans: Sequence[Plan], share_out: ShareOut, stop: StopSignals
+) -> Iterator[tuple[Plan, Rows]]:
+    """Yield each recording with its rows as it finishes; their reports are written."""
+    by_job: dict[str, Plan] = {}
+    possible: list[Job] = []
+    for plan in plans:
+        if isinstance(plan.job, Job):
+            by_job[plan.job.name] = plan
+            possible.append(plan.job)
+        else:
+            yield plan, [error_cells("", plan.job, Path(plan.name))]
+    for job, answer in share_out(possible, stop.wanted):
+        if isinstance(answer, DeadWorker):
+            yield by_job[job.name], [error_cells(job.options.tag, str(answer), job.path)]
+        elif job.reports is None:
+            yield by_job[job.name], answer
+        else:
+            yield by_job[job.name], with_reports_written(answer, job.reports.parent)
+
+
+_SHOWN_REASONS = 10
+_SHOWN_ALARMS = 10
+_BAD = ("bad", "watch")
+"""What a first survey says of valves that need attention."""
+
+
+def print_tally(counted: Tally) -> None:
+    """Print how many valves were identified or refused, and why."""
+    console = OutputConsole(highlight=False, markup=False)
+    table = Table("Coulomb friction", "valves", box=None, header_style="bold")
+    table.columns[1].justify = "right"
+    for outcome, count in sorted(counted.outcomes.items(), key=lambda one: one[0] == REFUSED):
+        table.add_row(outcome, str(count))
+    console.print(table)
+    reasons = counted.reasons()
+    for reason in reasons[:_SHOWN_REASONS]:
+        console.print(
+            f"{reason.count:>6} refused: {reason.text} (for example {reason.example})",
+            soft_wrap=True,
+        )
+    if len(reasons) > _SHOWN_REASONS:
+        console.print(f"       and for {len(reasons) - _SHOWN_REASONS} more reasons")
+
+
+def print_alarms(rows: Iterable[Mapping[str, Cell]]) -> None:
+    """Print the valves that need attention, the first of them first, and what to do."""
+    console = OutputConsole(highlight=False, markup=False)
+    alarms = [row for row in ranked(rows) if reaches(row, Level.WARN) or row.get("survey") in _BAD]
+    for row in alarms[:_SHOWN_ALARMS]:
+        name = " ".join(filter(None, (str(row["recording"]), str(row["valve"]))))
+        level = row["level"] if reaches(row, Level.WARN) else row["survey"]
+        console.print(f"{level:>6} {name}: {row['message']}", soft_wrap=True)
+        if row.get("what_to_do"):
+            console.print(f"       {row['what_to_do']}", soft_wrap=True)
+    if len(alarms) > _SHOWN_ALARMS:
+        console.print(f"       and {len(alarms) - _SHOWN_ALARMS} more")
+
+
+REFUSALS = (HistoryError,)
 _SHOWN_SKIPPED = 10
 
 
@@ -61,9 +342,17 @@ def _require_sense(options: argparse.Namespace) -> None:
         if output.resolve().parent != options.output[0].resolve().parent:
             raise ValueError(f"{output}: all outputs must lie in the folder of the first")
     reading_options(options)
-    identification_settings(options, ValveFile(Valve(), frozen(dict.fromkeys(FIXABLE, 1.0))))
+    anything = ValveFile(Valve(), frozen(dict.fromkeys(FIXABLE, 1.0)))
+    identification_settings(options, anything)
+    survey_limits(options, anything)
     if options.valve is not None:
         read_valve_file(options.valve)
+    if options.plant is not None and options.valve is not None:
+        raise ValueError("--plant: its table describes the valves: give no --valve")
+    if options.history is not None and options.plant is None:
+        raise ValueError("--history files by tag: give the table of the tags by --plant")
+    if options.first_is_baseline and options.history is None:
+        raise ValueError("--first-is-baseline: the baseline is kept in a history: give --history")
 
 
 def _baselines(options: argparse.Namespace, names: Sequence[str]) -> Baselines:
@@ -86,7 +375,8 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
     folder = place(options.folder)
     if options.scheduler is not None:
         folder = folder.absolute()
-    findings = find_recordings(folder, *options.output, database, reports)
+    others = [one for one in (options.plant, options.history) if one is not None]
+    findings = find_recordings(folder, *options.output, database, reports, *others)
     if findings.skipped:
         shown = ", ".join(findings.skipped[:_SHOWN_SKIPPED])
         more = len(findings.skipped) - _SHOWN_SKIPPED
@@ -104,8 +394,13 @@ def _planned(options: argparse.Namespace) -> dict[str, Plan]:
 
 def _identify(
     plans: Sequence[Plan], results: ResultsFile, share_out: ShareOut, stop: StopSignals
-) -> None:
-    """Identify the recordings, write their rows, and show the progress."""
+) -> list[Filing]:
+    """Identify the recordings, write their rows, and show the progress; return what is filed.
+
+    A reason of refusals is shown once; the tally counts them.
+    """
+    filings: list[Filing] = []
+    shown: set[str] = set()
     console = OutputConsole(stderr=True, highlight=False, markup=False, soft_wrap=True)
     columns = (
         TextColumn("identifying"),
@@ -122,9 +417,30 @@ def _identify(
             results.append([{**row, **keys} for row in rows])
             progress.advance(task)
             for row in rows:
-                if row.get("error"):
+                filing: Any = row.get(FILING)
+                filings += [filing] if isinstance(filing, Filing) else []
+                if (error := row.get("error")) and reason_of(str(error)) not in shown:
+                    shown.add(reason_of(str(error)))
                     label = ", ".join(filter(None, (plan.name, str(row["valve"]))))
-                    console.print(f"{label}: {row['error']}")
+                    console.print(f"{label}: {error}")
+    return filings
+
+
+def _file(filings: Sequence[Filing], results: ResultsFile, options: argparse.Namespace) -> None:
+    """File results in the history, and compare each with the baseline that is in force there."""
+    filed = file_results(options.history, filings, options.first_is_baseline)
+    changed = {recording for recording, _ in filed.cells}
+    stale = [entry for entry in results.entries() if entry.recording in changed]
+    results.keep(lambda entry: entry.recording not in changed)
+    for entry in stale:
+        rows = [{**row, **filed.cells.get((entry.recording, str(row["valve"])), {})}
+                for row in entry.rows]  # fmt: skip
+        results.append(rows)
+    told = [f"{filed.filed} results filed in {options.history}"]
+    told += [f"{filed.known} were there before"] if filed.known else []
+    if filed.baselines:
+        told.append(f"baseline of {len(filed.baselines)} valves: their first result")
+    print("; ".join(told), file=sys.stderr)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -135,7 +451,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: ShareOut) -> int:
-    with StopSignals() as stop, ResultsFile(*options.output) as results:
+    with (
+        StopSignals() as stop,
+        ResultsFile(*options.output, zone=options.time_zone or "") as results,
+    ):
         left, dropped = forget_stale(results, plans, options)
         print(
             f"{len(plans)} recordings: {len(plans) - len(left)} done before, {len(left)} to do"
@@ -145,7 +464,9 @@ def _run(options: argparse.Namespace, plans: Mapping[str, Plan], share_out: Shar
         for plan in left[:1]:
             if isinstance(plan.job, Job) and plan.job.reports is not None:
                 plan.job.reports.mkdir(exist_ok=True)
-        _identify(left, results, share_out, stop)
+        filings = _identify(left, results, share_out, stop)
+        if options.history is not None:
+            _file(filings, results, options)
         mine = [entry for entry in results.entries() if entry.recording in plans]
         if stop.wanted():
             complain(

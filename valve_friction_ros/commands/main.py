@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The command `valve_friction`: it finds the sub-command, and reports how it ended."""
 
 import argparse
@@ -13,20 +22,20 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from valve_friction_ros import __version__
-from valve_friction_ros.commands.ctrl_c import has_been_interrupted, interrupt_raises
-from valve_friction_ros.commands.output.errors import (
+from valve_friction_ros.commands.process import (
     PROGRAM,
     ExitCode,
     OneLineParser,
     complain,
     flush_output,
+    has_been_interrupted,
+    interrupt_raises,
 )
 from valve_friction_ros.commands.start import end_at_once
 
-__all__ = ["SUB_COMMANDS", "SubCommand", "main", "run"]
-
 SUB_COMMANDS = {
     "identify": "identify the friction of a valve from a CSV file or a bag",
+    "inspect": "show what would be read of a table: columns, units, rates, gaps, quality",
     "identify-folder": "identify all recordings of a folder, on all cores",
     "describe-valve": "ask for an actuator's data and write its valve file",
     "plan-test": "plan the stroke test that tells the friction best, as a file to play",
@@ -34,6 +43,7 @@ SUB_COMMANDS = {
     "call": "have a running identifier identify, set its baseline, save, report or clear",
     "history": "list, export and draw what the nodes have identified",
     "history copy": "copy a history to another file, or to or from a server",
+    "dashboard": "serve plant, valves, alarms and comparison of a history, without ROS",
     "dashboard-account": "make an account of the dashboard, with the hash of a password",
     "reproduce-paper": "run the paper's programme and write a report",
     "demo": "tighten the packing of a simulated valve that is monitored",

@@ -1,11 +1,25 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `plan-test`: the stroke test that tells the friction of a valve best, as a file."""
 
 import argparse
+import io
 import json
+import math
+import shlex
 import sys
 from pathlib import Path
+from typing import Any
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from valve_friction_ros.commands.arguments.planning import (
     frictions_from,
@@ -13,15 +27,196 @@ from valve_friction_ros.commands.arguments.planning import (
     planned_limits,
     planned_settings,
 )
-from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.commands.output.formatting import OutputConsole
-from valve_friction_ros.commands.output.plan_output import as_json, print_plan, write_test
+from valve_friction_ros.commands.console import OutputConsole, plain_console
+from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.history import HistoryError
-from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.planning import StrokePlan, plan_test
+from valve_friction_ros.identification import SLIDING, UNITS, RefusalError, percentage, plain
+from valve_friction_ros.planning import StrokePlan, plan_remarks, plan_test, set_points
+from valve_friction_ros.planning.search import Forecast
+from valve_friction_ros.planning.steps import form_of, table_of
+from valve_friction_ros.records.units import PRESSURE, span
 from valve_friction_ros.records.valve_file import read_valve_file
+from valve_friction_ros.records.whole_file import write_whole
 
-__all__ = ["REFUSALS", "run"]
+_NAMES = (
+    "coulomb_friction",
+    "viscous_friction",
+    "static_friction",
+    SLIDING,
+    "spring_constant",
+    "spring_preload",
+)
+_PLAY = "ros2 run valve_friction_ros pressure_source --ros-args"
+_WATCHED = (
+    "ros2 run valve_friction_ros stroke_player --ros-args -r __ns:=/YOUR_VALVE "
+    "-r pressure_set_point:=/YOUR/CONVERTER/COMMAND"
+)
+_ROUND = 10.0
+"""Pa to which limits for the player are rounded outwards."""
+
+
+def write_test(path: Path, plan: StrokePlan) -> None:
+    """Write the corners of the pressure, time_s and pressure_pa, linear between them.
+
+    Raises OSError, which names `path`; no part of the file stays.
+    """
+    text = io.StringIO()
+    text.write("time_s,pressure_pa\n")
+    for time, pressure in zip(plan.test.times, plan.test.pressures, strict=True):
+        text.write(f"{time:.6f},{pressure:.2f}\n")
+    write_whole(path, text.getvalue().encode())
+
+
+def player(plan: StrokePlan, path: Path, on_bench: bool = False) -> dict[str, Any]:
+    """Return the parameters of `pressure_source` that play the file and hold its limits.
+
+    The converter of a valve has a lag of its own; on the simulated bench the player has it.
+    """
+    return {
+        "excitation": "file",
+        "file": str(path.resolve()),
+        "file_minimum": math.floor(plan.band.low / _ROUND) * _ROUND,
+        "file_maximum": math.ceil(plan.band.high / _ROUND) * _ROUND,
+        "file_rate": math.ceil(1.001 * plan.test.largest_rate / _ROUND) * _ROUND,
+        "converter_lag": plan.conditions.converter_lag if on_bench else 0.0,
+    }
+
+
+def _forecast_json(name: str, one: Forecast, travel: float) -> dict[str, Any]:
+    return {
+        "friction": name,
+        "parameters": {
+            each: {
+                "value": value,
+                "half_width": one.half_widths.get(each),
+                "unit": UNITS.get(each, "N"),
+            }
+            for each, value in one.values.items()
+            if each in _NAMES
+        },
+        "position_range": [*one.reach],
+        "travel_range": [reach / travel for reach in one.reach],
+        "top_speed": one.top_speed,
+        "breakaways": one.breakaways,
+        "refusal": one.refusal or None,
+    }
+
+
+def as_json(plan: StrokePlan, path: Path) -> dict[str, Any]:
+    """Build the object that JSON shows; SI units."""
+    pattern = plan.test.pattern
+    return {
+        "file": str(path),
+        "aim": plan.aim,
+        "duration": plan.test.duration,
+        "cycles": plan.test.cycles,
+        "pattern": {
+            "shapes": [*pattern.shapes],
+            "speeds": [*pattern.speeds],
+            "hold": pattern.hold,
+        },
+        "start_pressure": float(plan.test.pressures[0]),
+        "pressure_range": [plan.band.low, plan.band.high],
+        "pressure_rate": plan.test.largest_rate,
+        "likely": plan.frictions.names[plan.frictions.middle],
+        "forecasts": [
+            _forecast_json(name, one, plan.valve.travel)
+            for name, one in zip(plan.frictions.names, plan.forecasts, strict=True)
+        ],
+        "tried": plan.tried,
+        "warnings": [*plan_remarks(plan)],
+        "play": _plain(player(plan, path)),
+        "play_on_bench": _plain(player(plan, path, on_bench=True)),
+    }
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: plain(one) if isinstance(one, float) else one for name, one in values.items()}
+
+
+def _cell(one: Forecast, name: str) -> str:
+    share = one.relative(name)
+    if one.refusal:
+        return "–"
+    return f"{one.values[name]:.4g} ± {percentage(share)}" if share < 1 else "unknown"
+
+
+def print_plan(plan: StrokePlan, path: Path) -> None:
+    """Print what to expect, what to watch and how to play it."""
+    test, travel = plan.test, plan.valve.travel
+    console = plain_console()
+    speeds = " and ".join(f"{100 * one:.0f} %" for one in test.pattern.speeds)
+    shapes = ", ".join(test.pattern.shapes)
+    console.print(
+        f"{test.duration:.4g} s, {test.cycles} times up and down ({shapes}) between "
+        f"{plan.band.low / 1e3:.4g} and {plan.band.high / 1e3:.4g} kPa, at {speeds} of "
+        f"{plan.band.rate / 1e3:.3g} kPa/s; the best of {plan.tried} tests for {plan.aim}"
+    )
+    table = Table("predicted", *(f"friction {name}" for name in plan.frictions.names), box=None)
+    for name in _NAMES:
+        table.add_row(
+            f"{name} [{UNITS.get(name, 'N')}]", *(_cell(one, name) for one in plan.forecasts)
+        )
+    table.add_row(
+        "position [% of travel]",
+        *(
+            f"{100 * one.reach[0] / travel:.0f} to {100 * one.reach[1] / travel:.0f}"
+            for one in plan.forecasts
+        ),
+    )
+    table.add_row("top speed [mm/s]", *(f"{one.top_speed * 1e3:.2g}" for one in plan.forecasts))
+    console.print(table)
+    console.print(
+        "On simulated valves of other physics the reported intervals were 1.5 to 1.8 times as wide "
+        "(median), and that of F_c up to 16 times where friction varies along the travel or "
+        "gradually with speed."
+    )
+    for remark in plan_remarks(plan):
+        console.print(f"note: {remark}")
+    low, high = plan.limits.lowest, plan.limits.highest
+    console.print(
+        "Nothing has been moved. Before: agree with operations, put the loop in manual, keep "
+        f"people off the stem, and bring the pressure slowly to {test.pressures[0] / 1e3:.4g} kPa. "
+        f"Meanwhile: watch that the stem stays between {100 * low:g} and {100 * high:g} % of the "
+        "travel; if it does not, or the process moves too far, stop the player, which leaves the "
+        "pressure where it is, and restore it by hand. After: identify the record before the loop "
+        "goes back to automatic."
+    )
+    console.print(
+        "Without ROS: --table writes the set points in %, mA and kPa for a control system, and "
+        "--form a sheet for a person, with the limits at which to abort."
+    )
+    console.print(
+        "On a valve, the topic is that of your converter's command, never that of the measured "
+        "pressure: invented pressure would enter the identifier, and nothing would move. The "
+        "converter has a lag of its own, so the player has none:"
+    )
+    topic = "-r actuator_pressure:=/YOUR/CONVERTER/COMMAND"
+    print(f"{_PLAY} {topic} {_parameters(player(plan, path))}")
+    console.print(
+        "The same by a node that begins when its ~/start is called, watches stem and pressure, and "
+        "goes back at once:"
+    )
+    print(f"{_WATCHED} {_parameters(_watched(plan, path))}")
+    console.print("On the simulated bench, with the bench's lag:")
+    print(f"{_PLAY} -r __ns:=/YOUR_BENCH {_parameters(player(plan, path, on_bench=True))}")
+
+
+def _watched(plan: StrokePlan, path: Path) -> dict[str, Any]:
+    """Return the parameters of the node that watches the test."""
+    given, travel = player(plan, path), plan.valve.travel
+    stems = [step.stem for step in set_points(plan, None)]
+    lowest, highest = min(low for low, _ in stems), max(high for _, high in stems)
+    return {
+        **{name: given[name] for name in ("file", "file_minimum", "file_maximum", "file_rate")},
+        "position_minimum": round(lowest * travel, 6),
+        "position_maximum": round(highest * travel, 6),
+    }
+
+
+def _parameters(values: dict[str, Any]) -> str:
+    return " ".join(f"-p {name}:={shlex.quote(str(value))}" for name, value in values.items())
+
 
 REFUSALS = (RefusalError, HistoryError)
 
@@ -29,10 +224,11 @@ REFUSALS = (RefusalError, HistoryError)
 def _require_files(options: argparse.Namespace) -> None:
     """Refuse files that cannot be written, before the work begins."""
     output: Path = options.output
-    if output.exists() and not options.replace:
-        raise ValueError(f"{output}: it is there: give another name, or --replace")
-    if not output.parent.is_dir():
-        raise ValueError(f"{output}: there is no folder {output.parent}")
+    for path in filter(None, (output, options.table, options.form)):
+        if path.exists() and not options.replace:
+            raise ValueError(f"{path}: it is there: give another name, or --replace")
+        if not path.parent.is_dir():
+            raise ValueError(f"{path}: there is no folder {path.parent}")
     if options.figure is not None:
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 
@@ -68,7 +264,18 @@ def run(options: argparse.Namespace) -> int:
     """Plan, write the files, and print what to expect."""
     _require_files(options)
     plan = _planned(options)
+    signal = span(options.signal_range, PRESSURE) if options.signal_range else None
+    texts = {}
+    if options.table is not None or options.form is not None:
+        steps = set_points(plan, signal)
+        texts = {
+            options.table: table_of(steps, plan),
+            options.form: form_of(steps, plan, options.valve_name or ""),
+        }
     write_test(options.output, plan)
+    for path, text in texts.items():
+        if path is not None:
+            write_whole(path, text.encode())
     if options.figure is not None:
         from valve_friction_ros import figures  # noqa: PLC0415 - slow to import
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Entry point of the command `valve_friction`, light enough to be interrupted at once."""
 
 import importlib
@@ -5,8 +14,6 @@ import os
 import signal
 import sys
 from types import FrameType
-
-__all__ = ["end_at_once", "main"]
 
 _INTERRUPTED = 128 + signal.SIGINT
 
@@ -25,5 +32,7 @@ def main() -> int:
     # An exception in the midst of an import may be lost there.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)
+    # A second thread costs more than it gives with matrices as small as these.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     code: int = importlib.import_module("valve_friction_ros.commands.main").main()
     return code

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `validate`: simulate a recording with an identified model."""
 
 import argparse
@@ -11,8 +20,7 @@ from valve_friction_ros.commands.arguments.recording import (
     described,
     read_one,
 )
-from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.health import percentage
+from valve_friction_ros.commands.process import ExitCode
 from valve_friction_ros.identification import (
     IdentifiedModel,
     RefusalError,
@@ -24,8 +32,7 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.identification.trust.misfit import LEAST_FIT
 from valve_friction_ros.model import Valve
 from valve_friction_ros.outside_text import printable
-
-__all__ = ["REFUSALS", "run"]
+from valve_friction_ros.wording import percentage
 
 REFUSALS = (RefusalError,)
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The dashboard: a plant's valves in a browser; no ROS.
 
 The files here hold what is shown, and import no library of pages; ``pages/`` draws it by NiceGUI.
@@ -8,12 +17,23 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.dashboard.graph import Answer, Operator, Signals, Visitors
-    from valve_friction_ros.dashboard.heard.plant import Plant
-    from valve_friction_ros.dashboard.heard.status_reading import ESSENTIAL_KEYS, view_of
-    from valve_friction_ros.dashboard.heard.valve_view import Status, Unread, ValveView
-    from valve_friction_ros.dashboard.options import DashboardOptions
-    from valve_friction_ros.dashboard.selection import Selection, selected
+    from valve_friction_ros.dashboard.context import (
+        Answer,
+        DashboardOptions,
+        Operator,
+        ServiceRequest,
+        Signals,
+        Visitors,
+    )
+    from valve_friction_ros.dashboard.live_state import (
+        ESSENTIAL_KEYS,
+        Plant,
+        Status,
+        Unread,
+        ValveView,
+        view_of,
+    )
+    from valve_friction_ros.dashboard.plant_rows import Selection, selected
 else:
     __getattr__ = names_on_demand(__name__)
 
@@ -24,6 +44,7 @@ __all__ = [
     "Operator",
     "Plant",
     "Selection",
+    "ServiceRequest",
     "Signals",
     "Status",
     "Unread",

@@ -1,28 +1,214 @@
-"""Rows of the plant's table: texts and numbers ready for the browser, and what has changed."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Valves in words: which are shown and in which order, their rows, two side by side."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
 from typing import Any
+from urllib.parse import parse_qsl, urlencode, urlsplit
+from zoneinfo import ZoneInfo
 
-from valve_friction_ros.dashboard.heard.plant import Heard
-from valve_friction_ros.dashboard.heard.status_keys import Quantity
-from valve_friction_ros.dashboard.heard.valve_view import Drift, Interval, ValveView
-from valve_friction_ros.dashboard.selection import STATES, state_of
-from valve_friction_ros.dashboard.sparkline import Sparkline
+from valve_friction_ros.dashboard.context import zone_of
+from valve_friction_ros.dashboard.history_cache import Sparkline
+from valve_friction_ros.dashboard.live_state import Drift, Heard, Quantity, ValveView
+from valve_friction_ros.health import Level, Ratio, StatusSignal
+from valve_friction_ros.history import HistoryEntry
+from valve_friction_ros.identification import SLIDING, UNITS
+from valve_friction_ros.outside_text import printable
+from valve_friction_ros.streams import utc
+from valve_friction_ros.wording import number_and_width
 
-__all__ = [
-    "SIGNAL_WORDS",
-    "STATE_WORDS",
-    "RowFeed",
-    "drift_number",
-    "interval_text",
-    "number_and_width",
-    "quantity_texts",
-    "ratio_text",
-    "row_of",
-    "state_words",
-    "summary",
-]
+
+def zone_asked(query: Mapping[str, str], usual: str) -> ZoneInfo:
+    """Return the zone that an address asks for by ``tz``; the usual one for an unknown name."""
+    try:
+        return zone_of(query.get("tz", usual))
+    except ValueError:
+        return zone_of(usual)
+
+
+def moment(stamp: int | None, zone: ZoneInfo) -> str:
+    """Write a time, ns since 1970, in a zone, with the zone's short name."""
+    if stamp is None:
+        return "–"
+    local: datetime = utc(stamp).astimezone(zone)
+    return f"{local:%Y-%m-%d %H:%M:%S} {local.tzname()}"
+
+
+def ago(seconds: float) -> str:
+    """Write how long ago something was, in its largest unit."""
+    for size, unit in ((86_400 * 365.25, "y"), (86_400, "d"), (3600, "h"), (60, "min")):
+        if seconds >= size:
+            return f"{seconds // size:.0f} {unit}"
+    return f"{max(0.0, seconds):.0f} s"
+
+
+STATES = ("error", "silent", "warn", "unknown", "ok", "unheard")
+"""States of a valve, the worst first; ``unheard``: only the history knows it.
+
+A silent valve may be anything, and comes after an error."""
+
+SIGNALS = tuple(one.value for one in StatusSignal if one.value)
+_LONGEST_SEARCH = 200
+
+
+def state_of(valve: Heard) -> str:
+    """Return the state of a valve: its level in small letters, or that it is silent.
+
+    A valve is ``ok`` only where a comparison with a baseline found nothing.
+    """
+    if valve.is_silent:
+        return "unheard" if valve.silent_for is None else "silent"
+    level = valve.view.level
+    if level is None or (level is Level.OK and valve.view.ratio is None):
+        return "unknown"
+    return level.name.lower()
+
+
+def _said_last(valve: Heard) -> int:
+    """Return the level that a silent valve has said last: it orders these."""
+    return (valve.view.level or 0) if state_of(valve) == "silent" else 0
+
+
+def _change(valve: Heard) -> float:
+    """Return the change of friction: one that has halved has changed as much as one doubled."""
+    ratio = valve.view.ratio
+    return abs(math.log(ratio.value)) if ratio is not None and ratio.value > 0 else -1.0
+
+
+def _or(value: float | None, missing: float = -math.inf) -> float:
+    return missing if value is None or math.isnan(value) else value
+
+
+def worst_first(valve: Heard) -> tuple[Any, ...]:
+    """Return the key by which the valve that needs attention most comes first."""
+    return (
+        STATES.index(state_of(valve)),
+        -_said_last(valve),
+        -_change(valve),
+        -_or(valve.view.dead_band.if_determined.value),
+        valve.view.tag,
+    )
+
+
+def _by_number(value: Callable[[Heard], float | None]) -> Callable[[Heard], tuple[Any, ...]]:
+    return lambda valve: (-_or(value(valve)), valve.view.tag)
+
+
+SORTS: dict[str, Callable[[Heard], tuple[Any, ...]]] = {
+    "worst": worst_first,
+    "tag": lambda valve: (valve.view.tag, valve.view.node),
+    "ratio": _by_number(lambda valve: None if valve.view.ratio is None else valve.view.ratio.value),
+    "dead_band": _by_number(lambda valve: valve.view.dead_band.if_determined.value),
+    "friction": _by_number(lambda valve: valve.view.friction.value),
+    "drift": _by_number(lambda valve: valve.view.drift and abs(valve.view.drift.value)),
+    "age": lambda valve: (valve.view.identified or 0, valve.view.tag),
+}
+"""Orders by name: the key of each puts the most urgent or the largest first."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What a page of the plant shows.
+
+    Attributes
+    ----------
+    search : str
+        Words; each must be in tag, name or diagnosis.
+    states, signals : frozenset of str
+        States and letters of NE 107 that are shown; empty: all.
+    sort : str
+        Name of the order (`SORTS`).
+    is_reversed : bool
+        Whether the order is turned round.
+    is_tiled : bool
+        Whether valves are tiles, and not rows.
+    """
+
+    search: str = ""
+    states: frozenset[str] = frozenset()
+    signals: frozenset[str] = frozenset()
+    sort: str = "worst"
+    is_reversed: bool = False
+    is_tiled: bool = False
+
+    @classmethod
+    def from_query(cls, query: Mapping[str, str]) -> "Selection":
+        """Read an address; what is unknown in it is left out."""
+        order = query.get("sort", "worst")
+        name = order.removeprefix("-")
+        return cls(
+            search=query.get("q", "")[:_LONGEST_SEARCH],
+            states=frozenset(query.get("show", "").split(",")) & frozenset(STATES),
+            signals=frozenset(query.get("ne", "").split(",")) & frozenset(SIGNALS),
+            sort=name if name in SORTS else "worst",
+            is_reversed=order.startswith("-"),
+            is_tiled=query.get("view") == "tiles",
+        )
+
+    @classmethod
+    def from_address(cls, address: str) -> "Selection":
+        """Read the address of a page of the plant; what shows all for that of another page."""
+        try:
+            parts = urlsplit(address)
+            return cls.from_query(dict(parse_qsl(parts.query)) if parts.path == "/" else {})
+        except ValueError:
+            return cls()
+
+    def to_query(self) -> dict[str, str]:
+        """Return what an address has to hold; nothing that is usual."""
+        sign = "-" if self.is_reversed else ""
+        parts = {
+            "q": self.search,
+            "show": ",".join(one for one in STATES if one in self.states),
+            "ne": ",".join(one for one in SIGNALS if one in self.signals),
+            "sort": "" if (self.sort, sign) == ("worst", "") else sign + self.sort,
+            "view": "tiles" if self.is_tiled else "",
+        }
+        return {key: text for key, text in parts.items() if text}
+
+    def address(self, more: Mapping[str, str]) -> str:
+        """Return the address of this page, with further parts."""
+        query = urlencode({**self.to_query(), **more})
+        return f"/?{query}" if query else "/"
+
+    def sorted_by(self, name: str) -> "Selection":
+        """Sort by a column; a second time turns it round."""
+        return replace(self, sort=name, is_reversed=self.sort == name and not self.is_reversed)
+
+    def shows(self, valve: Heard) -> bool:
+        """Return whether a valve is shown."""
+        if self.states and state_of(valve) not in self.states:
+            return False
+        if self.signals and valve.view.signal.value not in self.signals:
+            return False
+        view = valve.view
+        text = f"{view.tag} {view.node} {view.sentence}".casefold()
+        return all(word in text for word in self.search.casefold().split())
+
+
+def selected(valves: Iterable[Heard], selection: Selection) -> list[Heard]:
+    """Return the valves that are shown, in order."""
+    shown = filter(selection.shows, valves)
+    return sorted(shown, key=SORTS[selection.sort], reverse=selection.is_reversed)
+
+
+def levels_in(valves: Iterable[Heard]) -> dict[str, int]:
+    """Count the valves of each state."""
+    counts = dict.fromkeys(STATES, 0)
+    for valve in valves:
+        counts[state_of(valve)] += 1
+    return counts
+
 
 _SAY = 240
 _LOWEST, _HIGHEST = 0.25, 4.0
@@ -50,7 +236,8 @@ def state_words(valve: Heard) -> str:
     if state == "unknown":
         view = valve.view
         is_new = view.level is not None and view.friction.is_known and not view.baseline
-        return "no baseline" if is_new else "unknown"
+        words = f"no baseline, {view.survey}" if view.survey else "no baseline"
+        return words if is_new else "unknown"
     if valve.is_silent or not valve.view.signal.value:
         return STATE_WORDS[state]
     return _SHORT[valve.view.signal.value]
@@ -70,35 +257,15 @@ def summary(counts: Mapping[str, int]) -> str:
     return f"{valves}: {', '.join(others)}" if others else f"{valves}, all good"
 
 
-def number_and_width(value: float, half_width: float) -> tuple[str, str]:
-    """Write a number and half the width of its interval, to four digits at most."""
-    if not math.isfinite(value):
-        return "–", ""
-    is_plain = value == 0 or 1e-4 <= abs(value) < 1e6
-    if not math.isfinite(half_width) or half_width <= 0:
-        digits = f"{value:.3g}" if abs(value) < 1000 or not is_plain else f"{value:.0f}"
-        return _minus(digits), ""
-    if not is_plain or not 1e-6 <= half_width < 1e6:
-        return _minus(f"{value:.4g}"), f"± {half_width:.2g}"
-    of_width = 1 - math.floor(math.log10(half_width))
-    of_value = 3 - math.floor(math.log10(abs(value))) if value else 3
-    places = min(max(0, min(of_width, of_value)), 7)
-    return _minus(f"{value:.{places}f}"), f"± {half_width:.{max(0, min(of_width, 7))}f}"
-
-
 def ratio_text(ratio: float) -> str:
     """Write a ratio with two decimals, or with two digits where these would not show it."""
     return f"{ratio:.2f}" if ratio == 0 or 0.01 <= abs(ratio) < 1e4 else f"{ratio:.2g}"
 
 
-def interval_text(ratio: Interval, between: str) -> str:
+def interval_text(ratio: Ratio, between: str) -> str:
     """Write the interval of a ratio; empty where it has none."""
     ends = (ratio.low, ratio.high)
     return between.join(map(ratio_text, ends)) if all(map(math.isfinite, ends)) else ""
-
-
-def _minus(number: str) -> str:
-    return f"−{number[1:]}" if number.startswith("-") else number
 
 
 def quantity_texts(one: Quantity) -> tuple[str, str]:
@@ -113,10 +280,10 @@ def _place(ratio: float) -> float:
     return round(100 * math.log(bounded / _LOWEST) / span, 1)
 
 
-def _ratio(ratio: Interval | None) -> Row:
+def _ratio(ratio: Ratio | None) -> Row:
     if ratio is None:
         return {"ratio": "–", "between": "", "bar": None}
-    bar = [_place(one) if math.isfinite(one) else _place(ratio.value) for one in ratio[:3]]
+    bar = [_place(one) if math.isfinite(one) else _place(ratio.value) for one in ratio.interval]
     return {"ratio": ratio_text(ratio.value), "between": interval_text(ratio, "–"), "bar": bar}
 
 
@@ -200,3 +367,100 @@ class RowFeed:
         if order != self._order:
             news["order"] = self._order = order
         return news
+
+
+@dataclass(frozen=True)
+class ComparedIdentification:
+    """One identification: of which valve, when (ns since 1970), how, and what it found."""
+
+    tag: str
+    time: int | None
+    method: str
+    sentence: str
+    parameters: tuple[Quantity, ...]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A parameter on both sides.
+
+    Attributes
+    ----------
+    name : str
+        The parameter.
+    one, other : Quantity
+        It on either side, without a value where it is not there.
+    ratio, half_width : float
+        The other over the one, and half the width of its 95 % interval; nan where unknown.
+    """
+
+    name: str
+    one: Quantity
+    other: Quantity
+    ratio: float
+    half_width: float
+
+    @property
+    def verdict(self) -> str:
+        """Whether the two differ by more than their intervals; empty where that is unknown."""
+        if not math.isfinite(self.half_width):
+            return ""
+        change = self.other.value - self.one.value
+        width = math.hypot(self.one.half_width, self.other.half_width)
+        return "differs" if abs(change) > width else "no difference seen"
+
+    @property
+    def ratio_words(self) -> str:
+        """The ratio with its interval."""
+        if not math.isfinite(self.ratio):
+            return "–"
+        if not math.isfinite(self.half_width) or not 0.01 <= abs(self.ratio) < 1e4:
+            return ratio_text(self.ratio)
+        return f"{self.ratio:.2f} ± {self.half_width:.2f}"
+
+
+def side_of_view(view: ValveView) -> ComparedIdentification:
+    """Return what is known of a valve now."""
+    method = printable(view.values.get("method", "–"), 80)
+    return ComparedIdentification(view.tag, view.identified, method, view.sentence, view.parameters)
+
+
+def side_of_entry(entry: HistoryEntry) -> ComparedIdentification:
+    """Return what the history keeps of an identification."""
+    units = {**UNITS, SLIDING: "N"}
+    parameters = tuple(
+        Quantity(
+            name, one.value, one.half_width, units.get(name, ""), one.verdict.value, one.reason
+        )
+        for name, one in entry.parameters.items()
+    )
+    tag = printable(entry.valve.tag or entry.valve.name, 80)
+    return ComparedIdentification(
+        tag, entry.time, entry.method, printable(entry.diagnosis.message, 2000), parameters
+    )
+
+
+def compared(one: ComparedIdentification, other: ComparedIdentification) -> tuple[Difference, ...]:
+    """Compare all parameters of either side, in the order of the first.
+
+    The interval of a ratio adds the relative half widths of both sides as independent.
+    """
+    left = {each.name: each for each in one.parameters}
+    right = {each.name: each for each in other.parameters}
+    return tuple(
+        _difference(
+            name,
+            left.get(name, Quantity(name, math.nan)),
+            right.get(name, Quantity(name, math.nan)),
+        )
+        for name in dict.fromkeys((*left, *right))
+    )
+
+
+def _difference(name: str, one: Quantity, other: Quantity) -> Difference:
+    is_open = any(each.verdict in ("fixed", "not identifiable") for each in (one, other))
+    known, value = one.if_determined.value, other.if_determined.value
+    ratio = value / known if known else math.nan
+    shares = [each.half_width / each.value if each.value else math.nan for each in (one, other)]
+    width = math.nan if is_open else abs(ratio) * math.hypot(*shares)
+    return Difference(name, one, other, ratio, width)

@@ -1,18 +1,25 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Evidence that adds up: moves of a valve in service, and what they say together; no ROS."""
 
-from valve_friction_ros.evidence.estimate import MOST_MOVES, Change, Evidence, evidence_of
-from valve_friction_ros.evidence.moves import Move, Moves
-from valve_friction_ros.evidence.stamps import lies_behind_those_ahead, stamp_problem
-from valve_friction_ros.evidence.stream import MoveStream
+from valve_friction_ros.evidence.estimate import MOST_MOVES, Evidence, FrictionChange, evidence_of
+from valve_friction_ros.evidence.moves import Move, Moves, MoveStream, is_clock_reset, stamp_problem
 
 __all__ = [
     "MOST_MOVES",
-    "Change",
     "Evidence",
+    "FrictionChange",
     "Move",
     "MoveStream",
     "Moves",
     "evidence_of",
-    "lies_behind_those_ahead",
+    "is_clock_reset",
     "stamp_problem",
 ]

@@ -1,28 +1,409 @@
-"""Moves combined: one estimate of friction and spring, with its covariance."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Force balances of moves as linear equations: their robust solution, and its covariance.
+
+Moves of one block of time have correlated errors, so the scatter of blocks gives the interval.
+"""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from valve_friction_ros.evidence.blocks import blocks_of
-from valve_friction_ros.evidence.design import (
-    SLIDING,
-    SPRING,
-    STATIC,
-    Design,
-    design_of,
-    priors,
-    robust,
-    scales_of,
-    solution,
-    with_onsets,
-)
 from valve_friction_ros.evidence.moves import Moves
 from valve_friction_ros.identification.trust.student import student_quantile
 
-__all__ = ["FEWEST_BLOCKS", "FEWEST_MOVES", "MOST_BLOCKS", "Balance", "balance_of"]
+BLOCK = 600.0
+"""Least time, s, of moves whose errors are taken as correlated."""
+
+_LEAST_MOVES = 4
+"""And least number of such moves in each direction."""
+
+
+def blocks_of(moves: Moves, most: int | None = None) -> NDArray[np.intp]:
+    """Return the block of each move: ten minutes at least, and some moves in each direction.
+
+    Parameters
+    ----------
+    moves : Moves
+        The moves, oldest first.
+    most : int, optional
+        Number of blocks that is hardly passed: beyond it they are longer.
+    """
+    if not len(moves):
+        return np.array([], dtype=np.intp)
+    span = BLOCK
+    if most is not None:
+        span = max(span, float(moves.time[-1] - moves.time[0]) / most)
+    block, begin, up, down = 0, float(moves.time[0]), 0, 0
+    found = []
+    for time, way in zip(moves.time.tolist(), moves.direction.tolist(), strict=True):
+        if time - begin >= span and min(up, down) >= _LEAST_MOVES:
+            block, begin, up, down = block + 1, time, 0, 0
+        found.append(block)
+        up, down = up + (way > 0), down + (way < 0)
+    blocks = np.array(found, dtype=np.intp)
+    if block and (min(up, down) < _LEAST_MOVES or time - begin < 0.5 * span):
+        blocks[blocks == block] = block - 1
+    return blocks
+
+
+SPRING, SPEED, ALONG, STATIC, PRELOAD = range(5)
+"""Places of the unknowns. Deviations of the preload follow, one an epoch; frictions are last."""
+
+SLIDING = -1
+
+_EPOCH = 3600.0
+"""Time, s, over which the preload stays the same: temperature and sensors drift over longer."""
+
+_MOST_EPOCHS = 60
+"""Their number is bounded: months of a quiet valve cost no more than hours of a busy one."""
+
+_SPEED, _ALONG, _DRIFT = 1.0, 0.5, 0.2
+"""Standard deviations of what friction may change by with the speed, at the mean speed, and along
+the travel; and of the preload from hour to hour; as shares of the sliding friction."""
+
+_SIDE, _LEAST_OF_A_SIDE, _SEARCHED = 12, 3, 6
+"""Moves on either side of a step of the preload that are compared, least number of them in each
+direction, and moves to either side within which the step is then placed."""
+
+_STEP_ERRORS, _STEP_SHARE, _MOST_STEPS = 6.0, 0.25, 120
+"""Standard errors, and share of the friction, from which the preload has stepped; and how many
+steps are followed. Smaller ones are drift or outliers."""
+
+_FASTEST = 3.0
+"""Speed of a move, over the mean, beyond which its friction is taken to change no further."""
+
+_ONSET = 0.25
+"""Weight of a breakaway. It alone decides the static friction; of the rest it knows less than a
+move."""
+
+_HUBER = 2.0
+_ROUNDS = 4
+_QUIETEST = 1e-3
+"""Least scatter of a move, as a share of the friction."""
+
+
+class Scales(NamedTuple):
+    """A rough friction (N), the mean place (m) and the mean speed (m/s) of moves."""
+
+    friction: float
+    place: float
+    speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Rows of linear equations of force.
+
+    The unknowns are the spring constant (N/m), the change of friction with speed (N·s/m) and along
+    the travel (N/m), the static friction (N), the preload (N) at the mean place, its deviations by
+    epoch, and last one sliding friction (N) or several.
+
+    Attributes
+    ----------
+    dense : ndarray of float, shape (n, 5)
+        Regressors of the unknowns up to `PRELOAD`.
+    epoch, group : ndarray of int, shape (n,)
+        Deviation of the preload, and sliding friction, of each row.
+    way : ndarray of float, shape (n,)
+        Regressor of the sliding friction: ±1, or 0 for a breakaway.
+    force, weight, rate : ndarray of float, shape (n,)
+        Force, N; weight, mean 1; and rate of the force, N/s.
+    epochs, groups : int
+        Number of deviations, 0 where the preload has none, and of sliding frictions.
+    step : float
+        Largest step of the preload, N; 0 without any.
+    """
+
+    dense: NDArray[np.float64]
+    epoch: NDArray[np.intp]
+    group: NDArray[np.intp]
+    way: NDArray[np.float64]
+    force: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    epochs: int
+    groups: int
+    step: float = 0.0
+
+    @property
+    def shared(self) -> int:
+        """Number of the unknowns but the sliding frictions."""
+        return PRELOAD + 1 + self.epochs
+
+    @property
+    def size(self) -> int:
+        """Number of the unknowns."""
+        return self.shared + self.groups
+
+    def rows(self) -> NDArray[np.float64]:
+        """Return all regressors, shape (n, p)."""
+        every = np.arange(self.force.size)
+        rows = np.zeros((every.size, self.size))
+        rows[:, : PRELOAD + 1] = self.dense
+        if self.epochs:
+            rows[every, PRELOAD + 1 + self.epoch] = 1.0
+        rows[every, self.shared + self.group] = self.way
+        return rows
+
+    def normal(self, weight: NDArray[np.float64], precision: NDArray[np.float64]) -> "Normal":
+        """Return the normal equations of weighted rows, and of priors about zero."""
+        dense, first, shared = self.dense * weight[:, None], PRELOAD + 1, self.shared
+        both, mixed = np.diag(precision[:shared]), np.zeros((shared, self.groups))
+        both[:first, :first] += dense.T @ self.dense
+        mixed[:first] = _sums((dense * self.way[:, None]).T, self.group, self.groups)
+        if self.epochs:
+            both[:first, first:] = _sums(dense.T, self.epoch, self.epochs)
+            both[first:, :first] = both[:first, first:].T
+            places = np.arange(first, shared)
+            both[places, places] += np.bincount(self.epoch, weight, self.epochs)
+            cells, count = self.epoch * self.groups + self.group, self.epochs * self.groups
+            mixed[first:] = np.bincount(cells, weight * self.way, count).reshape(self.epochs, -1)
+        friction = precision[shared:] + np.bincount(self.group, weight * self.way**2, self.groups)
+        return Normal(both, mixed, friction)
+
+    def right(self, weighted: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the right side of the normal equations of weighted targets, shape (p,)."""
+        epochs = np.bincount(self.epoch, weighted, self.epochs)[: self.epochs]
+        frictions = np.bincount(self.group, weighted * self.way, self.groups)
+        return np.concatenate((self.dense.T @ weighted, epochs, frictions))
+
+    def forces(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the force of each row, N."""
+        forces = self.dense @ values[: PRELOAD + 1] + self.way * values[self.shared + self.group]
+        if self.epochs:
+            forces += values[PRELOAD + 1 + self.epoch]
+        return np.asarray(forces, dtype=np.float64)
+
+
+def _sums(rows: NDArray[np.float64], places: NDArray[np.intp], count: int) -> NDArray[np.float64]:
+    return np.array([np.bincount(places, row, count) for row in rows])
+
+
+class Normal(NamedTuple):
+    """Normal equations of s shared unknowns and g sliding frictions.
+
+    Hundreds of frictions cost little: none meets another one, so they are eliminated first.
+
+    Attributes
+    ----------
+    shared, mixed, friction : ndarray of float, shapes (s, s), (s, g), (g,)
+        Their parts; that of the frictions is diagonal.
+    """
+
+    shared: NDArray[np.float64]
+    mixed: NDArray[np.float64]
+    friction: NDArray[np.float64]
+
+    def solved(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the unknowns, shape (p,)."""
+        size = self.shared.shape[0]
+        ratio = self.mixed / self.friction
+        left = self.shared - ratio @ self.mixed.T
+        shared = solution(left, right[:size] - ratio @ right[size:])
+        return np.concatenate((shared, right[size:] / self.friction - ratio.T @ shared))
+
+    def friction_covariance(self) -> NDArray[np.float64]:
+        """Return the block of the inverse that belongs to the frictions, shape (g, g)."""
+        ratio = self.mixed / self.friction
+        left = self.shared - ratio @ self.mixed.T
+        return np.diag(1.0 / self.friction) + ratio.T @ solution(left, ratio)
+
+
+def scales_of(moves: Moves) -> Scales:
+    """Return the scales of moves."""
+    place, speed = (
+        float(np.average(one, weights=moves.distance)) for one in (moves.place, moves.speed)
+    )
+    rows = np.column_stack((moves.direction, moves.place - place, np.ones(len(moves))))
+    root = np.sqrt(moves.distance)
+    found = scipy.linalg.lstsq(rows * root[:, None], moves.force * root)[0]
+    least = 1e-9 * (1.0 + float(np.max(np.abs(moves.force))))
+    return Scales(max(abs(float(found[0])), least), place, speed)
+
+
+class Levels(NamedTuple):
+    """Levels of the preload, between steps of the process force.
+
+    Attributes
+    ----------
+    number : ndarray of int, shape (n,)
+        Level of each move, from 0 on.
+    largest : float
+        Largest step, N.
+    """
+
+    number: NDArray[np.intp]
+    largest: float
+
+
+def levels_of(moves: Moves) -> Levels:
+    """Find the steps of the process force.
+
+    A pressure on the plug shifts the forces of moves up and of moves down alike, friction shifts
+    them apart. So the mean of both medians, after and before a place, steps with the process force
+    and not with friction; medians ignore the move in which it steps.
+    """
+    count, way = len(moves), moves.direction
+    number = np.zeros(count, dtype=np.intp)
+    if count < 4 * _LEAST_OF_A_SIDE:
+        return Levels(number, 0.0)
+    left, friction = _without_spring(moves)
+    error = 1.4826 * float(np.median(np.abs(np.diff(left)))) / math.sqrt(2.0)
+    sides = np.array([_medians(np.where(way == sign, left, np.nan)) for sign in (1.0, -1.0)])
+    median, known = sides[:, 0], sides[:, 1]
+    steps = 0.5 * (median[:, 1] - median[:, 0]).sum(axis=0)
+    with np.errstate(divide="ignore"):
+        errors = error * np.sqrt(0.25 * 0.5 * math.pi * (1.0 / known).sum(axis=(0, 1)))
+    enough = known.min(axis=(0, 1)) >= _LEAST_OF_A_SIDE
+    over = np.abs(steps) / np.maximum(_STEP_ERRORS * errors, _STEP_SHARE * friction)
+    over = np.where(enough, over, 0.0)
+    largest = 0.0
+    for _ in range(_MOST_STEPS):
+        place = int(np.argmax(over))
+        if over[place] <= 1.0:
+            break
+        near = slice(max(place - _SEARCHED, 0), place + _SEARCHED)
+        before, after = (np.where(way[near] > 0, *median[:, side, place]) for side in (0, 1))
+        gain = np.abs(left[near] - before) - np.abs(left[near] - after)
+        number[near.start + int(np.argmin(np.concatenate(([0.0], np.cumsum(gain))))) :] += 1
+        largest = max(largest, abs(float(steps[place])))
+        over[near] = 0.0
+    return Levels(number, largest)
+
+
+def _without_spring(moves: Moves) -> tuple[NDArray[np.float64], float]:
+    """Return the forces of moves without spring and friction, N, and the friction.
+
+    Fitted to differences of successive moves, where each step of the preload is one outlier.
+    """
+    way = moves.direction
+    rows = np.column_stack((way, moves.place, way * moves.speed))
+    changes, target = np.diff(rows, axis=0), np.diff(moves.force)
+    least = _QUIETEST * float(np.median(np.abs(target)))
+    weight: NDArray[np.float64] = np.ones(target.size)
+    values: NDArray[np.float64] = np.zeros(rows.shape[1])
+    for _ in range(2 * _ROUNDS):
+        normal = (changes * weight[:, None]).T @ changes
+        values = solution(normal, changes.T @ (weight * target))
+        off = np.abs(target - changes @ values)
+        limit = _HUBER * max(1.4826 * float(np.median(off)), least)
+        weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
+    friction = values[0] + values[2] * float(np.mean(moves.speed))
+    return moves.force - rows @ values, abs(float(friction))
+
+
+def _medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return medians before and from each place on, and of how many; shape (2, 2, n).
+
+    A value that is nan does not count.
+    """
+    padded = np.concatenate((np.full(_SIDE, np.nan), values, np.full(_SIDE, np.nan)))
+    windows = np.sort(np.lib.stride_tricks.sliding_window_view(padded, _SIDE), axis=1)
+    counts = np.isfinite(windows).sum(axis=1)
+    every = np.arange(counts.size)
+    high, low = np.minimum(counts // 2, _SIDE - 1), np.maximum(counts - 1, 0) // 2
+    found = np.array([0.5 * (windows[every, low] + windows[every, high]), counts])
+    return np.stack((found[:, : values.size], found[:, _SIDE : _SIDE + values.size]), axis=1)
+
+
+def design_of(moves: Moves, frictions: NDArray[np.intp], scales: Scales) -> Design:
+    """Return the rows of moves, with one friction for each number in `frictions`."""
+    passed = moves.time - moves.time[0]
+    epoch = max(_EPOCH, float(passed[-1]) / (_MOST_EPOCHS - 1))
+    levels = levels_of(moves)
+    numbers = (passed / epoch).astype(np.intp) + (_MOST_EPOCHS + 1) * levels.number
+    kinds, epochs = np.unique(numbers, return_inverse=True)
+    way, away = moves.direction, moves.place - scales.place
+    dense = np.zeros((len(moves), PRELOAD + 1))
+    dense[:, SPRING], dense[:, PRELOAD] = away, 1.0
+    speed = scales.speed
+    dense[:, SPEED] = way * (np.minimum(moves.speed, _FASTEST * speed) - speed)
+    dense[:, ALONG] = way * away
+    return Design(
+        dense,
+        epochs.astype(np.intp),
+        frictions,
+        way,
+        moves.force,
+        moves.distance / float(np.mean(moves.distance)),
+        moves.force_rate,
+        kinds.size if kinds.size > 1 else 0,
+        int(frictions.max()) + 1,
+        levels.largest,
+    )
+
+
+def with_onsets(design: Design, moves: Moves, place: float) -> Design:
+    """Add a row for each breakaway, in their order."""
+    begun = np.isfinite(moves.onset_force)
+    way, away = moves.direction[begun], moves.onset_position[begun] - place
+    dense = design.dense[begun]
+    dense[:, SPEED] = 0.0
+    dense[:, STATIC], dense[:, SPRING], dense[:, ALONG] = way, away, way * away
+    return replace(
+        design,
+        dense=np.vstack((design.dense, dense)),
+        epoch=np.concatenate((design.epoch, design.epoch[begun])),
+        group=np.concatenate((design.group, design.group[begun])),
+        way=np.concatenate((design.way, np.zeros(way.size))),
+        force=np.concatenate((design.force, moves.onset_force[begun])),
+        weight=np.concatenate((design.weight, np.full(way.size, _ONSET))),
+        rate=np.concatenate((design.rate, moves.onset_rate[begun])),
+    )
+
+
+def priors(design: Design, scales: Scales, moves: Moves, travel: float) -> NDArray[np.float64]:
+    """Return the precision of the prior of each unknown, all about zero."""
+    friction, _, speed = scales
+    precision = np.full(design.size, 1.0 / math.hypot(_DRIFT * friction, design.step) ** 2)
+    precision[[SPRING, PRELOAD]] = 0.0
+    precision[STATIC] = (1e-3 / friction) ** 2
+    precision[SPEED] = (speed / (_SPEED * friction)) ** 2
+    length = travel if math.isfinite(travel) else max(float(np.ptp(moves.place)), 1e-9)
+    precision[ALONG] = (length / (_ALONG * friction)) ** 2
+    precision[design.shared :] = (1e-3 / friction) ** 2
+    return precision
+
+
+def robust(
+    design: Design, target: NDArray[np.float64], precision: NDArray[np.float64], friction: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the unknowns by Huber's weights, and the weights of the rows, 1/N²."""
+    deviation = friction
+    factor: NDArray[np.float64] = np.ones(target.size, dtype=np.float64)
+    values: NDArray[np.float64] = np.zeros(design.size, dtype=np.float64)
+    for _ in range(_ROUNDS):
+        weight = design.weight * factor / deviation**2
+        values = design.normal(weight, precision).solved(design.right(weight * target))
+        left = np.abs(target - design.forces(values)) * np.sqrt(design.weight)
+        deviation = max(1.4826 * float(np.median(left)), _QUIETEST * friction)
+        factor = np.minimum(1.0, _HUBER * deviation / np.maximum(left, 1e-300))
+    return values, design.weight * factor / deviation**2
+
+
+def solution(normal: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve with unknowns of one size; one that nothing determines stays zero.
+
+    Several systems are solved at once where both have another axis before.
+    """
+    size = np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 1e-300))
+    scaled = normal / (size[..., :, None] * size[..., None, :]) + 1e-12 * np.eye(size.shape[-1])
+    columns = right if right.ndim == normal.ndim else right[..., None]
+    found = np.linalg.solve(scaled, columns / size[..., None]) / size[..., None]
+    return np.asarray(found.reshape(right.shape), dtype=np.float64)
+
 
 MOST_BLOCKS = 60
 """Blocks of an estimate at most: the intervals of more are no narrower."""
@@ -87,10 +468,7 @@ class Balance:
             math.sqrt(max(float(slope @ one @ slope), 0.0))
             for one in (self.scatter, self.systematic)
         )
-        return math.hypot(random, fixed), math.hypot(self.quantile * random, _TWO * fixed)
-
-
-_TWO = 2.0
+        return math.hypot(random, fixed), math.hypot(self.quantile * random, 2.0 * fixed)
 
 
 def balance_of(

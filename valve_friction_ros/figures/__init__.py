@@ -1,12 +1,22 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Figures of records and identifications; no ROS."""
 
-from valve_friction_ros.figures.case import Case
-from valve_friction_ros.figures.friction_figure import friction_figure, identification_figure
-from valve_friction_ros.figures.panels import draw_curves
-from valve_friction_ros.figures.picture import require_picture_file, save_picture
-from valve_friction_ros.figures.plan_figure import plan_figure
-from valve_friction_ros.figures.trend_figure import trend_figure
-from valve_friction_ros.figures.validation_figure import validation_figure
+from valve_friction_ros.figures.history_figures import trend_figure
+from valve_friction_ros.figures.panels import Case, draw_curves, require_picture_file, save_picture
+from valve_friction_ros.figures.record_figures import (
+    friction_figure,
+    identification_figure,
+    plan_figure,
+    validation_figure,
+)
 
 __all__ = [
     "Case",

@@ -1,25 +1,174 @@
-"""Panels of the figures, each drawn on given axes in the paper's units: kPa, mm, m/s, N."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""What figures share: the page, the data of a record, panels in the paper's units, and files."""
+
+import io
 import math
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from valve_friction_ros.figures.case import Case
-from valve_friction_ros.identification import Curve, Panel, Parameter, two_digits
+from valve_friction_ros.identification import (
+    Curve,
+    Drawing,
+    Panel,
+    Parameter,
+    Result,
+    StemComparison,
+    two_digits,
+)
+from valve_friction_ros.model import Recording
+from valve_friction_ros.records.whole_file import write_whole
 
-__all__ = [
-    "COLOURS",
-    "SYMBOLS",
-    "draw_curves",
-    "draw_panels",
-    "draw_record",
-    "draw_signature",
-    "number",
-    "thinned",
-]
+_TITLE_WIDTH, _NOTE_WIDTH = 95, 130
+"""Characters of a line of the title and of the notes, which fill the width of the figure."""
+
+_MOST_NOTES = 3
+"""Notes on a figure; more would take the room of the panels."""
+
+_LEGEND_PAD = 0.2
+"""Room above and below the legend of a figure, in heights of its letters."""
+
+
+class _Shown(Figure):
+    """A figure that a notebook shows, also where nobody has imported pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        self.savefig(content, format="png")
+        return content.getvalue()
+
+
+def titled_figure(title: str, notes: Sequence[str] = ()) -> Figure:
+    """Return an empty figure with `title`, wrapped, above it, and the first notes below it.
+
+    The title is of this package; notes may hold text from outside, which is never read as maths.
+    """
+    figure = _Shown(figsize=(11, 8.5), layout="constrained", dpi=110)
+    title = title.replace(" %", "\N{NO-BREAK SPACE}%")  # which textwrap leaves whole
+    figure.suptitle(
+        textwrap.fill(title, _TITLE_WIDTH), fontsize=12, fontweight="bold", x=0.02, ha="left"
+    )
+    if notes:
+        shown = [f"note: {note}" for note in notes]
+        if len(notes) > _MOST_NOTES + 1:  # a line on one note would be as long as the note
+            hidden = len(notes) - _MOST_NOTES
+            shown[_MOST_NOTES:] = [f"and {hidden} more notes, which the command prints"]
+        lines = "\n".join(textwrap.fill(one, _NOTE_WIDTH) for one in shown)
+        text = figure.supxlabel(lines, fontsize=9, x=0.02, ha="left")
+        text.set_parse_math(False)
+    return figure
+
+
+def dress(panels: Iterable[Axes]) -> None:
+    """Give panels a faint grid, and remove the sides of the frame without a scale."""
+    for axes in panels:
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def labelled_in(panels: Iterable[Axes]) -> dict[str, Artist]:
+    """Return what a legend of panels lists, by its label, each label once."""
+    return {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+
+
+def legend_above(
+    figure: Figure, entries: Mapping[str, Artist], columns: int, place: str = "center"
+) -> None:
+    """Put a legend at the upper edge of a figure without a title, and its panels below it.
+
+    `place` is left, center or right. Needs no more than matplotlib 3.6, to which a legend outside
+    the panels is unknown.
+    """
+    legend = figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc=f"upper {place}",
+        ncols=columns,
+        frameon=False,
+        borderaxespad=_LEGEND_PAD,
+    )
+    pad = 2 * _LEGEND_PAD * legend.prop.get_size_in_points() / 72 * figure.dpi
+    share = (legend.get_window_extent().height + pad) / figure.bbox.height
+    figure.set_layout_engine("constrained", rect=(0, 0, 1, 1 - share))
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A record with what its identification offers to be drawn.
+
+    Attributes
+    ----------
+    label : str
+        Name in the legend.
+    recording : Recording
+        Drive and stem position.
+    drawing : Drawing
+        What the method adds.
+    stem : StemComparison or None
+        The model's stem beside the measured one.
+    """
+
+    label: str
+    recording: Recording = field(repr=False)
+    drawing: Drawing = field(repr=False)
+    stem: StemComparison | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, label: str, result: Result) -> "Case":
+        """Return the case of a result."""
+        return cls(label, result.recording, result.drawing, result.stem)
+
+
+def _format(path: Path) -> str:
+    return path.suffix.lstrip(".").lower()
+
+
+def require_picture_file(path: Path) -> None:
+    """Refuse a file that a figure cannot be saved to, before the work begins.
+
+    Raises
+    ------
+    ValueError
+        If the ending is not a picture format, or the folder does not exist; the message names it.
+    """
+    endings = Figure().canvas.get_supported_filetypes()
+    if _format(path) not in endings:
+        raise ValueError(f"{path}: the ending is not a picture format; choose .png, .pdf or .svg")
+    if not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or name another")
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Draw a figure into a file in the format of its ending.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; it names `path`, and no part of the picture stays.
+    """
+    content = io.BytesIO()
+    figure.savefig(content, format=_format(path))
+    write_whole(path, content.getvalue())
+
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Colours of Okabe and Ito: colour-blind readers can distinguish them."""
@@ -55,7 +204,7 @@ def draw_record(drive_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> Non
         drive_axes.plot(
             time, recording.drive[some] / recording.driven_by.size, color=colour, lw=1.2
         )
-        is_alone = case.simulated is None
+        is_alone = case.stem is None
         stem_axes.plot(
             time,
             recording.position[some] * 1e3,
@@ -64,10 +213,10 @@ def draw_record(drive_axes: Axes, stem_axes: Axes, cases: Sequence[Case]) -> Non
             lw=1.2 if is_alone else 3.2,
             alpha=1.0 if is_alone else _PALE,
         )
-        if case.simulated is not None:
-            spread = np.linspace(time[0], recording.time[-1] + time[0], case.simulated.size)
-            few = thinned(case.simulated.size)
-            stem_axes.plot(spread[few], case.simulated[few] * 1e3, "k:", lw=1.3)
+        if case.stem is not None:
+            few = thinned(case.stem.simulated.size)
+            model_time = (case.stem.time + recording.start_time - origin)[few]
+            stem_axes.plot(model_time, case.stem.simulated[few] * 1e3, "k:", lw=1.3)
             stem_axes.set_title(case.drawing.stem_title, loc="right", fontsize="small")
         draw_curves(stem_axes, case.drawing.stem, 1.0)
     drive_axes.set_ylabel(cases[0].recording.driven_by.label)
@@ -143,18 +292,18 @@ def _draw_level(axes: Axes, level: Parameter, colour: str) -> list[float]:
     return [level.value]
 
 
-def _tell_levels(axes: Axes, panels: Sequence[Panel]) -> None:
+def _tell_levels(axes: Axes, panels: Mapping[str, Panel]) -> None:
     """Write parameters with their verdicts into the upper left corner, where no sweep begins."""
-    levels = [panel.level for panel in panels if panel.level is not None]
-    for row, (level, colour) in enumerate(zip(levels, COLOURS, strict=False)):
+    told = [(colour, _told(one.level)) for colour, one in panels.items() if one.level is not None]
+    for row, (colour, words) in enumerate(told):
         axes.annotate(
-            _told(level),
+            words,
             (0.0, 1.0),
             xycoords="axes fraction",
             xytext=(6, -4 - 14 * row),
             textcoords="offset points",
             va="top",
-            color="black" if len(levels) == 1 else colour,
+            color="black" if len(told) == 1 else colour,
             bbox={"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1},
         )
 
@@ -171,35 +320,67 @@ def _make_logarithmic(axes: Axes) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def draw_panel(axes: Axes, panels: Sequence[Panel]) -> None:
-    """Draw the same panel of one or several cases."""
-    levels = [0.0]
-    for panel, colour in zip(panels, COLOURS, strict=False):
+def _draw_curve(axes: Axes, curve: Curve, colour: str, label: str) -> None:
+    """Draw a curve of a panel with its intervals: a band about a line, bars at markers."""
+    x, y = curve.scaled(1.0, 1.0)
+    half_width = None if curve.half_width is None else np.asarray(curve.half_width)
+    if not curve.is_line:
+        size = 7 if half_width is None else 5
+        axes.errorbar(
+            x,
+            y,
+            half_width,
+            fmt=curve.style,
+            color=colour,
+            mec="black",
+            ms=size,
+            capsize=3,
+            zorder=3,
+            label=label,
+        )
+        return
+    axes.plot(x, y, curve.style, color=colour, lw=1.2, label=label)
+    if half_width is not None:
+        axes.fill_between(x, y - half_width, y + half_width, color=colour, alpha=0.2, lw=0)
+
+
+def draw_panel(axes: Axes, panels: Mapping[str, Panel]) -> None:
+    """Draw the same panel of one or several cases, by their colours."""
+    levels, labels = [0.0], {""}
+    for colour, panel in panels.items():
         for curve in panel.curves:
-            x, y = curve.scaled(1.0, 1.0)
-            if curve.is_line:
-                axes.plot(x, y, curve.style, color=colour, lw=1.2)
-            else:
-                axes.plot(x, y, curve.style, color=colour, mec="black", ms=7, zorder=3)
-                levels += y.tolist()
+            label = "" if curve.label in labels else curve.label
+            labels.add(curve.label)
+            _draw_curve(axes, curve, colour, label)
+            if not curve.is_line:
+                levels += np.asarray(curve.y).tolist()
         if panel.chosen is not None:
             axes.axvline(panel.chosen, color=colour, ls=":", lw=1.2)
         if panel.level is not None:
             levels += _draw_level(axes, panel.level, colour)
+    first = next(iter(panels.values()))
     _tell_levels(axes, panels)
-    if panels[0].level is not None and max(levels) > 0:
+    if first.level is not None and max(levels) > 0:
         axes.set_ylim(0, 1.5 * max(levels))
-    if panels[0].is_logarithmic:
+    if first.is_logarithmic:
         _make_logarithmic(axes)
-    axes.set_ylabel(panels[0].y_label)
-    axes.set_title(panels[0].title)
+    if len(labels) > 1:
+        axes.legend(loc="best", frameon=False, fontsize="small")
+    axes.set_ylabel(first.y_label)
+    axes.set_title(first.title)
+    axes.set_xlabel(first.x_label)
 
 
-def draw_panels(axes: Sequence[Axes], cases: Sequence[Sequence[Panel]]) -> None:
-    """Draw the panels of one or several cases below one another; the lowest has the x label."""
-    for place, panels in zip(axes, zip(*cases, strict=True), strict=True):
-        draw_panel(place, panels)
+def draw_panels(axes: Mapping[str, Axes], cases: Sequence[Sequence[Panel]]) -> None:
+    """Draw panels, by name, of the cases that have them; those below share the x label."""
+    for name, place in axes.items():
+        found = {
+            colour: panel
+            for colour, panels in zip(COLOURS, cases, strict=False)
+            for panel in panels
+            if panel.name == name
+        }
+        draw_panel(place, found)
+    for place in list(axes.values())[:-1]:
+        place.set_xlabel("")
         place.tick_params(labelbottom=False)
-    if axes:
-        axes[-1].set_xlabel(cases[0][-1].x_label)
-        axes[-1].tick_params(labelbottom=True)

@@ -1,25 +1,56 @@
-"""The results of many identifications: kept in SQLite, written out in the formats asked for."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The results of many identifications: kept in SQLite, counted, written as CSV, JSON, a page."""
 
 import contextlib
+import csv
+import io
+import json
+import math
+import re
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from types import TracebackType
+from typing import NamedTuple
+from urllib.parse import quote
+from zoneinfo import ZoneInfo
 
-from valve_friction_ros.fleet.outputs import writer_of
-from valve_friction_ros.fleet.row import COLUMNS, PICTURE, Cell
+from valve_friction_ros import __version__
+from valve_friction_ros.fleet.rows import (
+    COLUMNS,
+    HEIGHT,
+    PICTURE,
+    WIDTH,
+    Cell,
+    RowStatus,
+    ranked,
+    status_of,
+)
+from valve_friction_ros.identification import two_digits
+from valve_friction_ros.outside_text import harmless
+from valve_friction_ros.page_template import page_environment
 from valve_friction_ros.records.whole_file import write_whole
-
-__all__ = ["Entry", "ResultsFile", "database_of", "reports_of"]
+from valve_friction_ros.wording import percentage
 
 _Row = Mapping[str, Cell]
 _KEPT = (*COLUMNS, PICTURE)
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class RecordingRows:
     """All rows of one recording, one for each valve.
 
     `content` and `settings` are fingerprints of its files and of the options of its identification.
@@ -56,15 +87,15 @@ class ResultsFile:
 
     They are kept in the table ``result`` of `database_of` the first output, in its columns and in
     the order in which they were appended. Only one process at a time can open it. The ending of an
-    output's name is its format.
+    output's name is its format; `zone` is that of the times on its page.
 
     Raises ValueError if an output or the database is another program's, or the database cannot be
     opened.
     """
 
-    def __init__(self, path: Path, *others: Path) -> None:
+    def __init__(self, path: Path, *others: Path, zone: str = "") -> None:
         self.path = path
-        self._outputs = {output: writer_of(output) for output in (path, *others)}
+        self._outputs = {output: writer_of(output, zone) for output in (path, *others)}
         self._database = database_of(path)
         for output in self._outputs:
             if output.is_file() and not self._database.exists():
@@ -91,9 +122,13 @@ class ResultsFile:
             "PRIMARY KEY (recording, valve))"
         )
         self._connection.commit()
-        found = self._connection.execute("SELECT * FROM result LIMIT 0").description
-        if tuple(name for name, *_ in found) != _KEPT:
+        found = [row[1] for row in self._connection.execute("PRAGMA table_info(result)")]
+        if set(found) - set(_KEPT):
             raise ValueError(f"{self._database}: results of another version: give another output")
+        for name in _KEPT:
+            if name not in found:  # of a column that an earlier version did not have
+                self._connection.execute(f"ALTER TABLE result ADD COLUMN {name}")
+        self._connection.commit()
 
     def __enter__(self) -> "ResultsFile":
         return self
@@ -121,7 +156,8 @@ class ResultsFile:
 
     def _rows(self) -> Iterator[_Row]:
         with self._explained():
-            for cells in self._connection.execute("SELECT * FROM result ORDER BY rowid"):
+            query = f"SELECT {', '.join(_KEPT)} FROM result ORDER BY rowid"  # noqa: S608 - own names
+            for cells in self._connection.execute(query):
                 yield dict(zip(_KEPT, cells, strict=True))
 
     def _write_outputs(self) -> None:
@@ -129,13 +165,13 @@ class ResultsFile:
         for output, write in self._outputs.items():
             write_whole(output, write(self._rows(), output).encode())
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[RecordingRows]:
         """Go through the recordings."""
         for recording, group in groupby(self._rows(), lambda row: str(row["recording"])):
             rows = tuple(group)
-            yield Entry(recording, str(rows[0]["content"]), str(rows[0]["settings"]), rows)
+            yield RecordingRows(recording, str(rows[0]["content"]), str(rows[0]["settings"]), rows)
 
-    def keep(self, wanted: Callable[[Entry], bool]) -> int:
+    def keep(self, wanted: Callable[[RecordingRows], bool]) -> int:
         """Drop the entries that are not wanted, all at once; return their number."""
         dropped = [(entry.recording,) for entry in self.entries() if not wanted(entry)]
         with self._explained(), self._connection:
@@ -147,4 +183,205 @@ class ResultsFile:
         marks = ", ".join("?" * len(_KEPT))
         cells = [[row.get(column) for column in _KEPT] for row in rows]
         with self._explained(), self._connection:
-            self._connection.executemany(f"INSERT INTO result VALUES ({marks})", cells)  # noqa: S608
+            self._connection.executemany(
+                f"INSERT INTO result ({', '.join(_KEPT)}) VALUES ({marks})",  # noqa: S608
+                cells,
+            )
+
+
+REFUSED = "refused"
+
+_NUMBER = re.compile(r"[-+−]?\b\d+(?:[.,]\d+)*(?:e[-+]?\d+)?")
+
+
+_QUOTED = re.compile(r"'[^']*'")
+
+
+def reason_of(error: str) -> str:
+    """Return the reason of a refusal without the numbers and names that are its own."""
+    return _NUMBER.sub("…", _QUOTED.sub("'…'", error))
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A reason of refusals, its numbers left open; its count of valves and its first recording."""
+
+    text: str
+    count: int
+    example: str
+
+
+@dataclass
+class Tally:
+    """Counts of valves: by the verdict on their Coulomb friction, or `REFUSED`."""
+
+    outcomes: Counter[str] = field(default_factory=Counter)
+    _reasons: Counter[str] = field(default_factory=Counter)
+    _examples: dict[str, str] = field(default_factory=dict)
+
+    def add(self, recording: str, verdict: Cell, error: Cell) -> None:
+        """Count a valve by the verdict on its Coulomb friction, or by its error."""
+        if not error:
+            self.outcomes[str(verdict)] += 1
+            return
+        self.outcomes[REFUSED] += 1
+        reason = reason_of(str(error))
+        self._reasons[reason] += 1
+        self._examples.setdefault(reason, recording)
+
+    def reasons(self) -> list[Reason]:
+        """Return the reasons of refusals, the most frequent first."""
+        return [
+            Reason(text, count, self._examples[text]) for text, count in self._reasons.most_common()
+        ]
+
+
+def tally(entries: Iterable[RecordingRows]) -> Tally:
+    """Count the valves of all entries."""
+    found = Tally()
+    for entry in entries:
+        for row in entry.rows:
+            found.add(entry.recording, row["coulomb_friction_verdict"], row["error"])
+    return found
+
+
+_Rows = Iterable[Mapping[str, Cell]]
+
+
+def _csv(rows: _Rows, _: Path) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([harmless(row[column]) for column in COLUMNS] for row in rows)
+    return text.getvalue()
+
+
+def _json_lines(rows: _Rows, _: Path) -> str:
+    shown = ({column: row[column] for column in COLUMNS} for row in rows)
+    return "".join(json.dumps(row, ensure_ascii=False, allow_nan=False) + "\n" for row in shown)
+
+
+def _page(rows: _Rows, output: Path, zone: str = "") -> str:
+    return page_text(rows, output.stem, zone)
+
+
+_WRITERS: Mapping[str, Callable[[_Rows, Path], str]] = {
+    ".csv": _csv,
+    ".jsonl": _json_lines,
+    ".html": _page,
+}
+
+
+def is_page(output: Path) -> bool:
+    """Return whether an output is the page for people."""
+    return output.suffix.lower() == ".html"
+
+
+def writer_of(output: Path, zone: str = "") -> Callable[[_Rows, Path], str]:
+    """Return what writes rows in the format that the name of the output ends in.
+
+    It takes the rows and the output, and returns the text. Raises ValueError if the ending is not
+    known; the message lists the known ones.
+    """
+    known = _WRITERS.get(output.suffix.lower())
+    if known is None:
+        raise ValueError(f"{output}: the output must end in {', '.join(_WRITERS)}")
+    return partial(_page, zone=zone) if is_page(output) else known
+
+
+class _Number(NamedTuple):
+    """A cell: its text, and what it is sorted by; an empty one comes last."""
+
+    text: str = ""
+    detail: str = ""
+    key: float = -math.inf
+
+
+class _Line(NamedTuple):
+    """A valve on the page, all of it text."""
+
+    status: RowStatus
+    name: str
+    recording: str
+    began: str
+    points: str
+    ratio: _Number
+    dead_band: _Number
+    sliding: _Number
+    coulomb: _Number
+    to_do: str
+    finding: str
+    report: str
+
+
+def _with_width(row: _Row, name: str) -> _Number:
+    value, width = row[f"{name}_n"], row[f"{name}_half_width_n"]
+    if not isinstance(value, (int, float)):
+        return _Number()
+    detail = f"± {two_digits(width)} N" if isinstance(width, (int, float)) else "N"
+    return _Number(f"{value:.4g}", detail, value)
+
+
+def _ratio(row: _Row) -> _Number:
+    ratio, low, high = row["ratio"], row["ratio_low"], row["ratio_high"]
+    if not isinstance(ratio, (int, float)):
+        return _Number()
+    is_known = isinstance(low, (int, float)) and isinstance(high, (int, float))
+    return _Number(f"{ratio:.2f}", f"{low:.2f} to {high:.2f}" if is_known else "", ratio)
+
+
+def _dead_band(row: _Row) -> _Number:
+    share = row["dead_band_of_travel"]
+    if not isinstance(share, (int, float)):
+        return _Number()
+    return _Number(percentage(share), "of travel", share)
+
+
+def _began(text: str, zone: str) -> str:
+    """Return when a record began, in words, in a zone."""
+    if not text:
+        return ""
+    time = datetime.fromisoformat(text.replace("Z", "+00:00"))
+    local = time.astimezone(ZoneInfo(zone) if zone else timezone.utc)
+    return f"{local:%Y-%m-%d %H:%M} {zone or 'UTC'}"
+
+
+def _line(row: _Row, zone: str) -> _Line:
+    def text(name: str) -> str:
+        return str(row.get(name) or "")
+
+    return _Line(
+        status_of(row),
+        text("valve") or text("recording"),
+        text("recording") if text("valve") else "",
+        _began(text("began"), zone),
+        text(PICTURE),
+        _ratio(row),
+        _dead_band(row),
+        _with_width(row, "sliding_friction"),
+        _with_width(row, "coulomb_friction"),
+        text("what_to_do"),
+        text("error") or "; ".join(filter(None, (text("message"), text("findings")))),
+        quote(text("report")),
+    )
+
+
+def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
+    """Return the page of the rows as one HTML file, which needs no network.
+
+    A valve is called by its tag where it is known; times are those of `zone`, or UTC. Its
+    table is sorted by `ranked`, and by any of its columns at a click.
+    """
+    lines = [_line(row, zone) for row in ranked(rows)]
+    return (
+        page_environment("valve_friction_ros.fleet")
+        .get_template("page.html")
+        .render(
+            name=name,
+            lines=lines,
+            counts=Counter(line.status for line in lines),
+            size=(WIDTH, HEIGHT),
+            made=_began(datetime.now(timezone.utc).isoformat(), zone),
+            version=__version__,
+        )
+    )

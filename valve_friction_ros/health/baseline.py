@@ -1,22 +1,31 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The healthy valve: its friction, and what else was measured of it."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import SLIDING, Parameter, RefusalError, Result
-from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.checks import require_non_negative, require_positive
+from valve_friction_ros.wording import Code, Statement, lack_words, said, sentence
 
-__all__ = ["LARGEST_SHARE", "Baseline", "SlidingFriction"]
+GOOD_SHARE, LARGEST_SHARE = 0.13, 0.33
+"""Half widths of a friction, as shares of its value, of a good baseline and of the widest.
 
-LARGEST_SHARE = 0.13
-"""Largest half width of a friction, as a share of its value, that can be a baseline.
-
-With it a friction that has grown by half, and is known no better, is still declared to have grown:
-ln(1.5/1.25)/√2, with the 1.25 of `FrictionLimits`."""
+With the one a friction that has grown by half, and is known no better, is still declared to have
+grown, with the other one that has doubled: ln(1.5/1.25)/√2 and ln(2/1.25)/√2, with the 1.25 of
+`FrictionLimits`."""
 
 
 _MORE = (
@@ -24,6 +33,70 @@ _MORE = (
     "and lags of both signals are known"
 )
 _OTHER_METHOD = "identify by a method that gives intervals"
+
+
+class Lack(Enum):
+    """What is missing to a baseline."""
+
+    RESULT = "no result"
+    VALUE = "no value"
+    SIZE = "not above zero"
+    INTERVAL = "no interval"
+    PRECISION = "interval too wide"
+    HEALTH = "in alarm"
+
+
+@dataclass(frozen=True)
+class BaselineLack:
+    """A condition of a baseline that is not met.
+
+    Attributes
+    ----------
+    of : str
+        What does not meet it: ``coulomb_friction``, ``sliding_friction``, ``moves`` in service,
+        the ``result`` or the ``valve``.
+    lack : Lack
+        What is missing.
+    share, largest : float
+        Half width over the value, and the most that a baseline may have; nan where neither counts.
+    """
+
+    of: str
+    lack: Lack
+    share: float = math.nan
+    largest: float = math.nan
+
+    @property
+    def words(self) -> str:
+        """What is missing, in words."""
+        return lack_words(self.of, self.lack.name, self.share, self.largest)
+
+    @classmethod
+    def found(cls, of: str, one: Parameter, largest: float) -> "BaselineLack | None":
+        """Return what a friction lacks to be known to a share; None: nothing."""
+        if math.isnan(one.value):
+            return cls(of, Lack.VALUE)
+        if one.value <= 0:
+            return cls(of, Lack.SIZE)
+        if math.isnan(one.half_width):
+            return cls(of, Lack.INTERVAL)
+        if one.half_width > largest * one.value:
+            return cls(of, Lack.PRECISION, one.half_width / one.value, largest)
+        return None
+
+
+class BaselineRefusalError(RefusalError):
+    """Nothing can be the baseline; the message names cause and remedy.
+
+    Attributes
+    ----------
+    lacks : tuple of BaselineLack
+        The conditions that are not met.
+    """
+
+    def __init__(self, message: str, *lacks: BaselineLack) -> None:
+        super().__init__(message)
+        self.lacks = lacks
 
 
 @dataclass(frozen=True)
@@ -50,10 +123,14 @@ class SlidingFriction:
         require_non_negative("half_width", self.half_width)
         require_positive("sliding_speed", self.speed)
 
+    @property
+    def share(self) -> float:
+        """Half width over the value."""
+        return self.half_width / self.value
+
     def __str__(self) -> str:
         """Return value, half width and speed."""
-        width = f" ± {two_digits(self.half_width)}" if self.half_width > 0 else ""
-        return f"{self.value:.6g}{width} N at {self.speed * 1e3:.3g} mm/s"
+        return str(said(Code.SLIDING_SIZE, **vars(self)))
 
 
 @dataclass(frozen=True)
@@ -101,62 +178,120 @@ class Baseline:
             raise ValueError("a baseline needs a coulomb friction or a sliding friction")
         require_non_negative("half_width", self.half_width)
 
+    @property
+    def statement(self) -> Statement:
+        """Its frictions."""
+        found = []
+        if (value := self.coulomb_friction) is not None:
+            found.append(said(Code.BASELINE_COULOMB, value=value, half_width=self.half_width))
+        if self.sliding is not None:
+            found.append(said(Code.BASELINE_SLIDING, **vars(self.sliding)))
+        return said(Code.BASELINE, frictions=tuple(found))
+
     def __str__(self) -> str:
         """Return its frictions on one line."""
-        told = []
+        return sentence(self.statement)
+
+    @property
+    def remark(self) -> str:
+        """Which growth alone is sure to be declared, where it is more than by half; else empty."""
+        shares = [] if self.sliding is None else [self.sliding.share]
         if self.coulomb_friction is not None:
-            width = f" ± {two_digits(self.half_width)}" if self.half_width > 0 else ""
-            told.append(f"coulomb friction {self.coulomb_friction:.6g}{width} N")
-        if self.sliding is not None:
-            told.append(f"sliding friction {self.sliding}")
-        return ", ".join(told)
+            shares.append(self.half_width / self.coulomb_friction)
+        share = min(shares)
+        if share <= GOOD_SHARE:
+            return ""
+        least = 1.5 * math.exp(math.sqrt(2.0) * (share - GOOD_SHARE))
+        return sentence(said(Code.BASELINE_REMARK, share=share, least=least))
 
     @classmethod
     def of(cls, result: Result) -> "Baseline":
-        """Return a result as baseline, with those of its frictions that are known well enough.
+        """Return those frictions of a result as baseline that are known well enough (`serving`).
 
-        Raises RefusalError if neither is known to `LARGEST_SHARE`; the message names why.
+        Raises BaselineRefusalError if neither does; the message names why.
         """
-        names = ["coulomb_friction"]
-        if SLIDING in result.parameters and result.sliding_speed > 0:
-            names.append(SLIDING)
-        frictions = {name: result.parameters[name].without_calibration for name in names}
+        frictions = _frictions(result)
+        lacks = _lacks(frictions)
         for one in frictions.values():
             if one.value < 0:
-                raise RefusalError(
+                raise BaselineRefusalError(
                     f"a {one.name.replace('_', ' ')} of {one.value:.4g} N cannot be a baseline: "
-                    "check the direction of both signals, then identify again"
+                    "check the direction of both signals, then identify again",
+                    BaselineLack(one.name, Lack.SIZE),
                 )
-        useful = {name: one for name, one in frictions.items() if not _why_not(one)}
-        if not useful:
-            why_not = "; ".join(map(_why_not, frictions.values()))
-            without = all(math.isnan(one.half_width) for one in frictions.values())
-            known = any(not math.isnan(one.value) for one in frictions.values())
-            remedy = _OTHER_METHOD if without and known else _MORE
-            raise RefusalError(f"this result cannot be the baseline: {why_not}: {remedy}")
-        coulomb, slid = useful.get("coulomb_friction"), useful.get(SLIDING)
-        return cls(
-            None if coulomb is None else coulomb.value,
-            0.0 if coulomb is None else coulomb.half_width,
+        known = {
+            name: Measured(one.value, one.half_width)
+            for name, one in frictions.items()
+            if name not in lacks
+        }
+        slid = known.get(SLIDING)
+        sliding = (
             None
             if slid is None
-            else SlidingFriction(slid.value, slid.half_width, result.sliding_speed),
-            valve_numbers(result),
+            else SlidingFriction(slid.value, slid.half_width, result.sliding_speed)
         )
+        found = cls.serving(known.get("coulomb_friction"), sliding, valve_numbers(result))
+        if found is None:
+            why_not = "; ".join(_why_not(frictions[name], one) for name, one in lacks.items())
+            without = all(math.isnan(one.half_width) for one in frictions.values())
+            has_value = any(not math.isnan(one.value) for one in frictions.values())
+            remedy = _OTHER_METHOD if without and has_value else _MORE
+            raise BaselineRefusalError(
+                f"this result cannot be the baseline: {why_not}: {remedy}", *lacks.values()
+            )
+        return found
+
+    @staticmethod
+    def lacks(result: Result) -> tuple[BaselineLack, ...]:
+        """Return the conditions of a baseline that a result does not meet; empty: `of` takes it."""
+        frictions = _frictions(result)
+        wrong = [one.name for one in frictions.values() if one.value < 0]
+        if wrong:
+            return (BaselineLack(wrong[0], Lack.SIZE),)
+        found = _lacks(frictions)
+        return tuple(found.values()) if len(found) == len(frictions) else ()
+
+    @classmethod
+    def serving(
+        cls,
+        coulomb: Measured | None,
+        sliding: SlidingFriction | None,
+        numbers: Mapping[str, Measured],
+    ) -> "Baseline | None":
+        """Return those of two frictions as baseline that are known well enough; None without.
+
+        They are those known to `GOOD_SHARE`. Where neither is, one serves that is known to
+        `LARGEST_SHARE`, the sliding friction first.
+        """
+        for largest in (GOOD_SHARE, LARGEST_SHARE):
+            slid = sliding if sliding is not None and sliding.share <= largest else None
+            dry = coulomb if coulomb is not None and coulomb.share <= largest else None
+            if slid is not None and largest == LARGEST_SHARE:
+                dry = None
+            if slid is not None or dry is not None:
+                value, width = (None, 0.0) if dry is None else (dry.value, dry.half_width)
+                return cls(value, width, slid, numbers)
+        return None
 
 
-def _why_not(friction: Parameter) -> str:
-    """Return why a friction cannot be a baseline; empty if it can."""
-    name, value, width = friction.name.replace("_", " "), friction.value, friction.half_width
-    if math.isnan(value):
+def _frictions(result: Result) -> dict[str, Parameter]:
+    """Return the frictions of a result that may be a baseline."""
+    names = ["coulomb_friction"]
+    if SLIDING in result.parameters and result.sliding_speed > 0:
+        names.append(SLIDING)
+    return {name: result.parameters[name].without_calibration for name in names}
+
+
+def _lacks(frictions: Mapping[str, Parameter]) -> dict[str, BaselineLack]:
+    found = {name: BaselineLack.found(name, one, LARGEST_SHARE) for name, one in frictions.items()}
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def _why_not(friction: Parameter, lack: BaselineLack) -> str:
+    """Return why a friction cannot be a baseline, with its numbers."""
+    name = friction.name.replace("_", " ")
+    if lack.lack is Lack.VALUE:
         return f"{name} is not identifiable ({friction.reason})"
-    if value <= 0:
-        return f"{name} is {value:.4g} N"
-    if math.isnan(width):
-        return f"{name} has no interval"
-    if width > LARGEST_SHARE * value:
-        return (
-            f"{name} is known to ±{percentage(width / value)}, and a baseline needs "
-            f"±{percentage(LARGEST_SHARE)}"
-        )
-    return ""
+    if lack.lack is Lack.SIZE:
+        return f"{name} is {friction.value:.4g} N"
+    return lack.words

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The diagnosis by the moves of a valve in service, and the baseline that they can be."""
 
 import contextlib
@@ -5,27 +14,29 @@ import math
 from dataclasses import dataclass
 
 from valve_friction_ros.evidence import Evidence
-from valve_friction_ros.health.baseline import LARGEST_SHARE, Baseline, SlidingFriction
-from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, compared
+from valve_friction_ros.health.baseline import (
+    GOOD_SHARE,
+    Baseline,
+    BaselineLack,
+    BaselineRefusalError,
+    Lack,
+    SlidingFriction,
+)
+from valve_friction_ros.health.comparison import Ratio, compared
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     FrictionLimits,
     FrictionState,
     against,
 )
-from valve_friction_ros.health.levels import Level, StatusSignal
 from valve_friction_ros.identification import SLIDING, RefusalError
-from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import utc_minute
+from valve_friction_ros.wording import Code, Statement, percentage, said
 
-__all__ = [
-    "Reference",
-    "baseline_by_evidence",
-    "diagnosis_by_evidence",
-    "reference_by_evidence",
-    "why_not_compared",
-]
+_LARGEST_SPEED_RATIO = 2.0
+"""Speed over that of the baseline, or the reverse, up to which moves are compared with it.
+
+Beyond it, the moves before say more than a baseline at another speed. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -47,24 +58,33 @@ class Reference:
 def baseline_by_evidence(evidence: Evidence) -> Baseline:
     """Return the sliding friction of the moves as baseline.
 
-    Raises RefusalError if it is not known to `LARGEST_SHARE`.
+    Raises BaselineRefusalError if it is not known to `GOOD_SHARE`.
     """
     one = evidence.parameters[SLIDING].without_calibration
-    if math.isnan(one.value):
-        raise RefusalError(f"the moves in service are no baseline yet: {one.reason}")
-    if one.value <= 0:
-        raise RefusalError(
+    lack = lack_of_moves(evidence)
+    if lack is None:
+        return Baseline(sliding=SlidingFriction(one.value, one.half_width, evidence.sliding_speed))
+    if lack.lack is Lack.VALUE:
+        message = f"the moves in service are no baseline yet: {one.reason}"
+    elif lack.lack is Lack.SIZE:
+        message = (
             f"a sliding friction of {one.value:.4g} N cannot be a baseline: check the direction of "
             "both signals"
         )
-    if one.half_width > LARGEST_SHARE * one.value:
-        raise RefusalError(
+    else:
+        message = (
             f"the moves in service are no baseline yet: sliding friction is known to "
             f"±{percentage(one.half_width / one.value)}, and a baseline needs "
-            f"±{percentage(LARGEST_SHARE)}: let the valve work on, and state a timing_uncertainty "
+            f"±{percentage(GOOD_SHARE)}: let the valve work on, and state a timing_uncertainty "
             "if the clocks and lags of both signals are known"
         )
-    return Baseline(sliding=SlidingFriction(one.value, one.half_width, evidence.sliding_speed))
+    raise BaselineRefusalError(message, lack)
+
+
+def lack_of_moves(evidence: Evidence) -> BaselineLack | None:
+    """Return what the moves in service lack to be a baseline; None: nothing."""
+    one = evidence.parameters[SLIDING].without_calibration
+    return BaselineLack.found("moves", one, GOOD_SHARE)
 
 
 def reference_by_evidence(evidence: Evidence) -> Reference | None:
@@ -116,74 +136,75 @@ def diagnosis_by_evidence(
     """
     one = evidence.parameters[SLIDING]
     if one.value < 0:
-        message = (
-            f"by {_moves(evidence)}, sliding friction is {one.value:.4g} N, and friction is above "
-            "zero: check the direction of both signals"
-        )
-        impossible = FrictionState.IMPOSSIBLE
-        return Diagnosis(Level.WARN, StatusSignal.CHECK_FUNCTION, message, None, impossible)
+        below = said(Code.MOVES_BELOW_ZERO, moves=_by_moves(evidence, None), value=one.value)
+        return Diagnosis.of(FrictionState.IMPOSSIBLE, below)
     if not evidence.is_known:
         return None
-    effect = f"by {_moves(evidence)}{_effect(evidence, valve)}"
+    effect = _by_moves(evidence, _dead_band(evidence, valve))
     found = None if baseline is None else _compared(evidence, baseline)
     if found is not None:
-        return against(found, limits, effect)
+        return against(found, limits, _dated(effect, evidence))
     if reference is not None:
         found = _compared(evidence, Baseline(sliding=reference.sliding))
     if reference is None or found is None:
         return _by_change(evidence, limits, effect)
-    what = "no baseline" if baseline is None else "the baseline cannot be compared"
-    healthy = (
-        f"what it was until {utc_minute(reference.time)}, when the moves of this valve were first "
-        f"combined ({what}: call ~/set_baseline while it is healthy)"
-    )
-    return against(found, limits, effect, healthy)
+    has_baseline = baseline is not None
+    healthy = said(Code.FIRST_MOVES, time=reference.time, has_baseline=has_baseline)
+    return against(found, limits, _dated(effect, evidence), healthy)
 
 
-def _by_change(evidence: Evidence, limits: FrictionLimits, effect: str) -> Diagnosis | None:
+def _dated(effect: Statement, evidence: Evidence) -> Statement:
+    """Add when friction last changed, where the moves still show it."""
+    change = evidence.change
+    if change is None:
+        return effect
+    return said(Code.CHANGED, of=effect, earliest=change.earliest, latest=change.latest)
+
+
+def _by_change(evidence: Evidence, limits: FrictionLimits, effect: Statement) -> Diagnosis | None:
     """Judge a declared change by itself; None where it is no alarm, for it says little else."""
     change = evidence.change
     if change is None:
         return None
-    ratio = Ratio(change.ratio, change.low, change.high, SLIDING, evidence.sliding_speed)
-    healthy = (
-        f"what it was before it changed, between {utc_minute(change.earliest)} and "
-        f"{utc_minute(change.latest)} (no baseline and no first moves to compare with: call "
-        "~/set_baseline while it is healthy)"
-    )
+    ends = change.ratio, change.low, change.high
+    ratio = Ratio.between(*ends, of=SLIDING, speed=evidence.sliding_speed)
+    healthy = said(Code.BEFORE_CHANGE, earliest=change.earliest, latest=change.latest)
     found = against(ratio, limits, effect, healthy)
     return found if found.state.side is not None else None
 
 
 def _compared(evidence: Evidence, baseline: Baseline) -> Ratio | None:
-    found = compared(evidence.parameters, evidence.sliding_speed, baseline)
+    speed, healthy = evidence.sliding_speed, baseline.sliding
+    if healthy is not None and not (
+        1 / _LARGEST_SPEED_RATIO <= healthy.speed / speed <= _LARGEST_SPEED_RATIO
+    ):
+        return None
+    found = compared(evidence.parameters, speed, baseline)
     return None if found is None else found.ratio
 
 
-def why_not_compared(evidence: Evidence, baseline: Baseline | None) -> str:
-    """Return why known evidence is not compared with a baseline; empty if it is."""
+def why_not_compared(evidence: Evidence, baseline: Baseline | None) -> Statement | None:
+    """Return why known evidence is not compared with a baseline; None if it is."""
     if baseline is None or not evidence.is_known or _compared(evidence, baseline) is not None:
-        return ""
+        return None
     if baseline.sliding is None:
-        return (
-            "not compared with the baseline, which has no sliding friction, and moves in service "
-            "determine no other: call ~/set_baseline while the valve is healthy"
-        )
-    return (
-        f"not compared with the baseline, which belongs to {1e3 * baseline.sliding.speed:.2g} "
-        f"mm/s, and the moves to {1e3 * evidence.sliding_speed:.2g} mm/s, beyond a factor of "
-        f"{LARGEST_SPEED_RATIO:g}: call ~/set_baseline while the valve is healthy"
+        return said(Code.BASELINE_WITHOUT_SLIDING)
+    return said(
+        Code.BASELINE_AT_OTHER_SPEED,
+        healthy=baseline.sliding.speed,
+        speed=evidence.sliding_speed,
+        factor=_LARGEST_SPEED_RATIO,
     )
 
 
-def _moves(evidence: Evidence) -> str:
-    return f"{evidence.moves} moves in service since {utc_minute(evidence.since)}"
+def _by_moves(evidence: Evidence, dead_band: Statement | None) -> Statement:
+    return said(Code.BY_MOVES, moves=evidence.moves, since=evidence.since, dead_band=dead_band)
 
 
-def _effect(evidence: Evidence, valve: Valve) -> str:
+def _dead_band(evidence: Evidence, valve: Valve) -> Statement | None:
     band = evidence.parameters["dead_band"]
     share = valve.share_of_travel(band.value)
     if not band.half_width < 0.5 * band.value or math.isnan(share):
-        return ""
-    width = two_digits(100 * valve.share_of_travel(band.half_width))
-    return f"; the stem ignores reversals smaller than {100 * share:.3g} ± {width} % of its travel"
+        return None
+    half_width = valve.share_of_travel(band.half_width)
+    return said(Code.DEAD_BAND_INTERVAL, share=share, half_width=half_width)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One factor by which spring and friction have changed alike: a scale, rather than the valve."""
 
 from collections.abc import Mapping
@@ -5,30 +14,29 @@ from dataclasses import replace
 
 from valve_friction_ros.health.diagnosis import Diagnosis
 from valve_friction_ros.health.levels import Level, StatusSignal
-from valve_friction_ros.health.valve_changes import Change
+from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
-
-__all__ = ["common_factor", "drive_scale", "explains", "qualified", "spring_change"]
+from valve_friction_ros.wording import Code, Statement, said
 
 _COMMON_SHARE = 0.3
 """Share by which the upper end of a ratio may lie above the lower, to speak for a common factor."""
 
 
-def drive_scale(valve: Valve) -> str:
-    """Return what scales all forces of a valve alike, in words."""
-    area = " and the diaphragm area" if valve.driven_by is Drive.PRESSURE else ""
-    return f"the scale of the {valve.driven_by.words} sensor{area}"
+def drive_scale(valve: Valve) -> Statement:
+    """Return what scales all forces of a valve alike."""
+    code = Code.AREA_AND_SCALE if valve.driven_by is Drive.PRESSURE else Code.SCALE
+    return said(code, drive=valve.driven_by.name)
 
 
-def spring_change(changes: Mapping[str, Change], limits: ValveLimits) -> Change | None:
+def spring_change(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
     """Return the ratio of the spring constants where it is surely beyond its bound."""
     change, share = changes.get("spring_constant"), limits.spring_change
     return change if change is not None and change.beyond(1 - share, 1 + share) else None
 
 
-def common_factor(changes: Mapping[str, Change], limits: ValveLimits) -> Change | None:
+def common_factor(changes: Mapping[str, Measured], limits: ValveLimits) -> Measured | None:
     """Return the factor by which all forces have changed, as by another scale of the drive.
 
     None where the spring constant has not surely changed, or the frictions not by its factor.
@@ -41,31 +49,26 @@ def common_factor(changes: Mapping[str, Change], limits: ValveLimits) -> Change 
     return spring if all(one.agrees_with(spring) for one in (coulomb, *known)) else None
 
 
-def _is_narrow(ratio: Change) -> bool:
+def _is_narrow(ratio: Measured) -> bool:
     """Return whether a ratio is known well enough to speak for a common factor."""
     return ratio.low > 0 and ratio.high / ratio.low < 1 + _COMMON_SHARE
 
 
-def explains(factor: Change | None, diagnosis: Diagnosis) -> bool:
+def explains(factor: Measured | None, diagnosis: Diagnosis) -> bool:
     """Return whether a common factor explains what a diagnosis finds on the friction."""
     ratio = diagnosis.ratio
     if factor is None or ratio is None or diagnosis.level < Level.WARN:
         return False
-    return Change(ratio.value, ratio.low, ratio.high).agrees_with(factor)
+    return ratio.agrees_with(factor)
 
 
-def qualified(diagnosis: Diagnosis, factor: Change | None, valve: Valve) -> Diagnosis:
+def qualified(diagnosis: Diagnosis, factor: Measured | None, valve: Valve) -> Diagnosis:
     """Return a diagnosis that says so where a common factor explains what it finds.
 
     The level stays, as nothing proves that the friction is healthy; the signal is to check the
     function.
     """
-    words = (
-        "friction and spring constant have changed by one factor, which points to "
-        f"{drive_scale(valve)}: check them before any work on the packing; "
-    )
-    if not explains(factor, diagnosis) or diagnosis.message.startswith(words):
+    if not explains(factor, diagnosis) or diagnosis.statement.code is Code.SCALED:
         return diagnosis
-    return replace(
-        diagnosis, status_signal=StatusSignal.CHECK_FUNCTION, message=words + diagnosis.message
-    )
+    statement = said(Code.SCALED, scale=drive_scale(valve), of=diagnosis.statement)
+    return replace(diagnosis, status_signal=StatusSignal.CHECK_FUNCTION, statement=statement)

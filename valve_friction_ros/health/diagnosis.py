@@ -1,50 +1,42 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """From a result to the diagnosis: whether friction has grown or collapsed, and its consequence."""
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
 from typing import Any, Protocol
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.comparison import LARGEST_SPEED_RATIO, Ratio, carried, compared
+from valve_friction_ros.health.comparison import Ratio, carried, compared
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.survey import Survey, SurveyLimits, surveyed
+from valve_friction_ros.health.valve_numbers import comparable_numbers
 from valve_friction_ros.identification import SLIDING, Parameter, Result, plain
-from valve_friction_ros.identification.trust.rounding import percentage, two_digits
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import utc_minute
+from valve_friction_ros.wording import Code, Statement, said, sentence
 
-__all__ = [
-    "DOUBT",
-    "Diagnosis",
-    "EarlierEstimate",
-    "FrictionLimits",
-    "FrictionState",
-    "Frictions",
-    "Side",
-    "StandingAlarm",
-    "against",
-    "dead_band",
-    "dead_band_half_width",
-    "diagnose",
-    "diagnose_again",
-    "friction_state",
-    "leading_ratio",
-    "percentage",
-]
+_SURELY = 1.5
+"""Half widths of its 95 % interval by which a ratio must differ from 1 to be a change at all.
 
-DOUBT = "the Karnopp model does not describe this valve"
-"""How the diagnosis of a valve begins that the model does not describe."""
-
-_AGAIN = "identify it again from a longer record with more strokes to be sure"
+With normal errors three of a thousand records of an unchanged valve differ by so much; by one half
+width, 5 %: in a plant of a hundred valves some would always be in doubt."""
 
 
 @dataclass(frozen=True)
 class FrictionLimits:
     """Bounds of the friction, as ratios to its baseline.
 
-    A bound counts as passed only when the whole interval of the ratio lies beyond it.
+    `friction_state` says when one counts as passed.
 
     Attributes
     ----------
@@ -54,6 +46,8 @@ class FrictionLimits:
         Ratio from which friction is excessive.
     low_ratio : float
         Ratio below which friction has collapsed: the packing is worn and may leak.
+    survey : SurveyLimits
+        Bounds of the dead band, where there is no baseline; not compared, as no ratio is of them.
 
     Raises
     ------
@@ -70,6 +64,7 @@ class FrictionLimits:
     warn_ratio: float = 1.25
     error_ratio: float = 2.0
     low_ratio: float = 0.5
+    survey: SurveyLimits = field(default_factory=SurveyLimits, compare=False)
 
     def __post_init__(self) -> None:
         """Refuse limits that are out of order."""
@@ -79,6 +74,11 @@ class FrictionLimits:
                 f"low_ratio {self.low_ratio:g}, warn_ratio {self.warn_ratio:g}, "
                 f"error_ratio {self.error_ratio:g}"
             )
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """The ratios by name, as they are kept."""
+        return {name: getattr(self, name) for name in ("warn_ratio", "error_ratio", "low_ratio")}
 
     @property
     def low_warn_ratio(self) -> float:
@@ -91,20 +91,20 @@ class FrictionLimits:
 
 
 class FrictionState(Enum):
-    """How the friction of a record compares with its baseline, in words."""
+    """How the friction of a record compares with its baseline."""
 
-    UNKNOWN = ""
+    UNKNOWN = auto()
     """It is not compared."""
-    IMPOSSIBLE = "friction below zero"
-    NORMAL = "friction normal"
-    UNCLEAR = "friction cannot be told from its baseline"
+    IMPOSSIBLE = auto()
+    """It is below zero."""
+    NORMAL = auto()
+    UNCLEAR = auto()
     """It is beyond a limit, and may be unchanged all the same."""
-    PERHAPS_GROWN = "friction perhaps grown"
-    GROWN = "friction has grown"
-    EXCESS = "excess friction"
-    PERHAPS_FALLEN = "friction perhaps fallen"
-    FALLEN = "friction has fallen"
-    COLLAPSED = "friction collapsed, the packing may leak"
+    GROWN = auto()
+    """It has surely changed, and most probably beyond the bound of a warning."""
+    EXCESS = auto()
+    FALLEN = auto()
+    COLLAPSED = auto()
 
     @property
     def side(self) -> "Side | None":
@@ -113,8 +113,8 @@ class FrictionState(Enum):
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether the friction is beyond a limit, and its interval is not."""
-        return self in _PERHAPS
+        """Whether the friction is beyond a limit, and may be unchanged all the same."""
+        return self is FrictionState.UNCLEAR
 
     @property
     def level(self) -> Level:
@@ -141,14 +141,11 @@ _SEVERITY = {
     FrictionState.IMPOSSIBLE: (Level.WARN, StatusSignal.CHECK_FUNCTION),
     FrictionState.NORMAL: (Level.OK, StatusSignal.GOOD),
     FrictionState.UNCLEAR: (Level.OK, StatusSignal.GOOD),
-    FrictionState.PERHAPS_GROWN: (Level.WARN, StatusSignal.CHECK_FUNCTION),
     FrictionState.GROWN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
     FrictionState.EXCESS: (Level.ERROR, StatusSignal.FAILURE),
-    FrictionState.PERHAPS_FALLEN: (Level.WARN, StatusSignal.CHECK_FUNCTION),
     FrictionState.FALLEN: (Level.WARN, StatusSignal.MAINTENANCE_REQUIRED),
     FrictionState.COLLAPSED: (Level.ERROR, StatusSignal.OUT_OF_SPECIFICATION),
 }
-_PERHAPS = (FrictionState.UNCLEAR, FrictionState.PERHAPS_GROWN, FrictionState.PERHAPS_FALLEN)
 
 
 @dataclass(frozen=True)
@@ -163,8 +160,8 @@ class StandingAlarm:
         The severity as a status signal of NE 107.
     state : FrictionState
         What the record said that raised it, or what later ones leave of it.
-    message : str
-        Its sentence, dated.
+    statement : Statement
+        What the record said, dated.
     time : int
         When that record was identified, ns since 1970 (UTC).
     """
@@ -172,7 +169,7 @@ class StandingAlarm:
     level: Level
     status_signal: StatusSignal
     state: FrictionState
-    message: str
+    statement: Statement
     time: int
 
 
@@ -186,29 +183,44 @@ class Diagnosis:
         Severity.
     status_signal : StatusSignal
         The severity as a status signal of NE 107.
-    message : str
-        One sentence, with the consequence.
+    statement : Statement
+        What is found, with the consequence.
     ratio : Ratio or None
         Friction over its baseline, with its interval and the friction that is compared; None
         without a baseline, or where the result has no friction to compare with it.
     state : FrictionState
         What the record says of the friction.
-    doubt : str
-        Why the model does not describe the valve, with which the message begins; empty if it does.
+    doubt : Statement or None
+        Why the model does not describe the valve, with which the statement begins; None if it does.
     alarm : StandingAlarm or None
         The alarm of an earlier record that stands.
     latest : Diagnosis or None
         What the record itself says, where an alarm stands.
+    survey : Survey
+        What a first survey says of a valve without a baseline.
     """
 
     level: Level
     status_signal: StatusSignal
-    message: str
+    statement: Statement
     ratio: Ratio | None
     state: FrictionState = FrictionState.UNKNOWN
-    doubt: str = ""
+    doubt: Statement | None = None
     alarm: StandingAlarm | None = None
     latest: "Diagnosis | None" = None
+    survey: Survey = Survey.UNKNOWN
+
+    @classmethod
+    def of(
+        cls, state: FrictionState, statement: Statement, ratio: Ratio | None = None
+    ) -> "Diagnosis":
+        """Return the diagnosis of a state, as severe as that is."""
+        return cls(*_SEVERITY[state], statement, ratio, state)
+
+    @property
+    def message(self) -> str:
+        """What is found in one sentence."""
+        return sentence(self.statement)
 
     @property
     def own(self) -> "Diagnosis":
@@ -235,16 +247,15 @@ class Diagnosis:
         """
         if self.state is not FrictionState.NORMAL or self.ratio is None:
             return self
-        dated = "" if time is None else f" (identified {utc_minute(time)})"
-        message = f"{self.ratio.what} was {_figures(self.ratio)} times its baseline{dated}"
-        doubt = f"{self.doubt}; " if self.doubt else ""
-        return replace(self, message=doubt + message)
+        ratio = self.ratio
+        was = said(Code.WAS_COMPARED, what=ratio.friction, ratio=ratio.interval, time=time)
+        return replace(self, statement=_doubted(was, self.doubt))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the diagnosis as a mapping of plain values, from which other forms are derived.
 
         Its keys are ``level`` (OK, WARN or ERROR), ``ne_107``, ``message``, ``ratio``,
-        ``ratio_interval``, ``ratio_of`` and ``ratio_speed``.
+        ``ratio_interval``, ``ratio_of``, ``ratio_speed`` and ``survey``.
         """
         ratio = self.ratio
         return {
@@ -255,6 +266,7 @@ class Diagnosis:
             "ratio_interval": None if ratio is None else plain([ratio.low, ratio.high]),
             "ratio_of": None if ratio is None else ratio.of,
             "ratio_speed": None if ratio is None else plain(ratio.speed),
+            "survey": self.survey.value,
         }
 
     def __str__(self) -> str:
@@ -342,6 +354,21 @@ def dead_band_half_width(result: Frictions, valve: Valve) -> float:
     return abs(band) * math.hypot(friction, spring.half_width / spring.value)
 
 
+def survey_of(result: Frictions, valve: Valve, limits: SurveyLimits | None = None) -> Survey:
+    """Return what a first survey says of a valve, by its dead band.
+
+    Where there is no spring, twice the sliding friction over the force of the pressure sensor's
+    range takes its place.
+    """
+    band, width = dead_band(result, valve), dead_band_half_width(result, valve)
+    if math.isnan(band) and valve.diaphragm_area is not None:
+        span = valve.diaphragm_area * (valve.pressure_maximum - valve.pressure_minimum)
+        known = [one for one in _frictions(result) if math.isfinite(one.value)]
+        if known and math.isfinite(span) and not result.values.get("spring_constant", 0.0) > 0:
+            band, width = 2 * known[-1].value / span, 2 * known[-1].half_width / span
+    return surveyed(band, width, limits)
+
+
 def leading_ratio(diagnosis: Diagnosis, findings: Iterable[Finding], level: Level) -> float:
     """Return the friction over its baseline that a level of a valve rests on; nan if on none.
 
@@ -354,12 +381,12 @@ def leading_ratio(diagnosis: Diagnosis, findings: Iterable[Finding], level: Leve
     return [*leading, *(f.friction_ratio for f in known), math.nan][0]
 
 
-def _consequence(result: Frictions, valve: Valve) -> str:
+def _consequence(result: Frictions, valve: Valve) -> Statement:
     share = dead_band(result, valve)
     if math.isnan(share):
         friction = next(one for one in _frictions(result) if not math.isnan(one.value))
-        return f"{_words(friction)} {friction.value:.4g} ± {two_digits(friction.half_width)} N"
-    return f"the stem ignores reversals smaller than {percentage(share)} of its travel"
+        return said(Code.FRICTION_SIZE, **_sized(friction))
+    return said(Code.DEAD_BAND, share=share)
 
 
 def _frictions(result: Frictions) -> list[Parameter]:
@@ -367,12 +394,8 @@ def _frictions(result: Frictions) -> list[Parameter]:
     return [result.parameters[n] for n in ("coulomb_friction", SLIDING) if n in result.parameters]
 
 
-def _words(friction: Parameter) -> str:
-    return friction.name.replace("_", " ")
-
-
-def _figures(ratio: Ratio) -> str:
-    return f"{ratio.value:.2f} ({ratio.low:.2f} to {ratio.high:.2f})"
+def _sized(friction: Parameter) -> dict[str, Any]:
+    return {"of": friction.name, "value": friction.value, "half_width": friction.half_width}
 
 
 def diagnose(
@@ -397,10 +420,8 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        A bound counts as passed when the 95 % interval of the ratio lies beyond it, so that an
-        uncertain result raises no alarm: on an unchanged valve it would have to be wrong by the
-        whole distance to the bound. Where only the ratio itself lies beyond one, and the interval
-        excludes an unchanged friction, the valve is to be identified again (WARN, check function).
+        Its state is that of `friction_state`: an uncertain result raises no alarm, as friction must
+        surely have changed.
         A friction that is not identifiable has collapsed where even its largest possible value
         lies below the low bound. A model that does not describe the valve is said, and raises no
         alarm: one record is no sign of a fault.
@@ -408,15 +429,13 @@ def diagnose(
     limits = limits or FrictionLimits()
     for friction in _frictions(result):
         if friction.value < 0:
-            width = two_digits(friction.half_width)
-            message = (
-                f"{_words(friction)} is {friction.value:.4g} ± {width} N, and "
-                "friction is above zero: check the direction of both signals"
-            )
-            return Diagnosis(
-                Level.WARN, StatusSignal.CHECK_FUNCTION, message, None, FrictionState.IMPOSSIBLE
-            )
-    return _with_model_doubt(_by_size(result, valve, baseline, limits), result)
+            below = said(Code.FRICTION_BELOW_ZERO, **_sized(friction))
+            return Diagnosis.of(FrictionState.IMPOSSIBLE, below)
+    numbers, misfit = comparable_numbers(result.evidence), result.misfit
+    found = _by_size(result, valve, baseline, limits, numbers)
+    if misfit is None or misfit.describes:
+        return found
+    return _with_doubt(found, said(Code.MISFIT, misfit=(misfit.systematic, misfit.unit)))
 
 
 def diagnose_again(
@@ -435,51 +454,60 @@ def diagnose_again(
     is_same = (baseline, limits) == (earlier.baseline, earlier.limits)
     if baseline is None or is_same or any(one.value < 0 for one in _frictions(earlier)):
         return kept
-    if compared(earlier.parameters, earlier.sliding_speed, baseline) is None:
+    found = compared(earlier.parameters, earlier.sliding_speed, baseline, earlier.numbers)
+    if found is None:
         return kept
-    again = _by_size(earlier, valve, baseline, limits)
-    return _doubted(again, kept.doubt) if kept.doubt else again
+    again = _by_size(earlier, valve, baseline, limits, earlier.numbers)
+    return again if kept.doubt is None else _with_doubt(again, kept.doubt)
 
 
 def _by_size(
-    result: Frictions, valve: Valve, baseline: Baseline | None, limits: FrictionLimits
+    result: Frictions,
+    valve: Valve,
+    baseline: Baseline | None,
+    limits: FrictionLimits,
+    numbers: Mapping[str, Measured],
 ) -> Diagnosis:
     found = None
     if baseline is not None:
-        found = compared(result.parameters, result.sliding_speed, baseline)
-        if vanished := _vanished(result, baseline, limits):
-            level, signal = _SEVERITY[FrictionState.COLLAPSED]
-            return Diagnosis(level, signal, vanished, None, FrictionState.COLLAPSED)
+        found = compared(result.parameters, result.sliding_speed, baseline, numbers)
+        if vanished := _vanished(result, baseline, limits, numbers):
+            return Diagnosis.of(FrictionState.COLLAPSED, vanished)
     if all(math.isnan(one.value) for one in _frictions(result)):
-        friction = _frictions(result)[0]
-        message = f"{_words(friction)} is not identifiable: {friction.reason}"
-        return Diagnosis(Level.OK, StatusSignal.GOOD, message, None)
+        return Diagnosis.of(FrictionState.UNKNOWN, _not_identifiable(_frictions(result)[0]))
     effect = _consequence(result, valve)
     if found is not None:
         return against(found.ratio, limits, effect)
-    why = "no baseline yet" if baseline is None else _why_not_compared(result, baseline)
-    return Diagnosis(Level.OK, StatusSignal.GOOD, f"{why}; {effect}", None)
+    if baseline is None:
+        survey = survey_of(result, valve, limits.survey)
+        first = said(Code.NO_BASELINE, effect=effect, survey=survey.name)
+        return replace(Diagnosis.of(FrictionState.UNKNOWN, first), survey=survey)
+    reasons = tuple(_why_not_compared(one, result, baseline) for one in _frictions(result))
+    why = said(Code.NOT_COMPARED, baseline=baseline.statement, reasons=reasons, effect=effect)
+    return Diagnosis.of(FrictionState.UNKNOWN, why)
 
 
-def _why_not_compared(result: Frictions, baseline: Baseline) -> str:
-    """Return why a result has no friction to compare with a baseline, in one sentence."""
-    reasons = []
-    for one in _frictions(result):
-        if math.isnan(one.value):
-            reasons.append(f"{_words(one)} is not identifiable: {one.reason}")
-        elif one.name == SLIDING and baseline.sliding is not None:
-            reasons.append(
-                f"the stem slides at {result.sliding_speed * 1e3:.2g} mm/s, and at "
-                f"{baseline.sliding.speed * 1e3:.2g} mm/s in the baseline: move it at a speed "
-                f"within a factor of {LARGEST_SPEED_RATIO:g}"
-            )
-        else:
-            reasons.append(f"the baseline has no {_words(one)}: set it anew")
-    return f"no comparison with the baseline ({baseline}): {'; '.join(reasons)}"
+def _not_identifiable(friction: Parameter) -> Statement:
+    return said(Code.NOT_IDENTIFIABLE, of=friction.name, reason=friction.reason)
 
 
-def _vanished(result: Frictions, baseline: Baseline, limits: FrictionLimits) -> str:
-    """Return that a friction too small to be identified lies below the low limit, or nothing.
+def _why_not_compared(one: Parameter, result: Frictions, baseline: Baseline) -> Statement:
+    """Return why a friction of a result is not compared with a baseline."""
+    if math.isnan(one.value):
+        return _not_identifiable(one)
+    if one.name == SLIDING and baseline.sliding is not None:
+        speeds = {"speed": result.sliding_speed, "healthy": baseline.sliding.speed}
+        return said(Code.NOT_COMPARED_SPEED, **speeds)
+    return said(Code.NOT_COMPARED_LACKING, of=one.name)
+
+
+def _vanished(
+    result: Frictions,
+    baseline: Baseline,
+    limits: FrictionLimits,
+    numbers: Mapping[str, Measured],
+) -> Statement | None:
+    """Return that a friction too small to be identified lies below the low limit, or None.
 
     The sliding friction decides where both have it. F_c decides only where no sliding friction
     contradicts it: what F_c loses to F_v is no collapse. At a higher speed a sliding friction is
@@ -488,58 +516,66 @@ def _vanished(result: Frictions, baseline: Baseline, limits: FrictionLimits) -> 
     healthy = {"coulomb_friction": (baseline.coulomb_friction or 0.0, baseline.half_width)}
     if (slid := baseline.sliding) is not None:
         healthy[SLIDING] = (slid.value, slid.half_width)
-        now = carried(result.parameters, result.sliding_speed, slid)
+        now = carried(result.parameters, result.sliding_speed, slid, numbers)
         if now is not None and now.value + now.half_width >= slid.value - slid.half_width:
-            return ""
+            return None
     for one in _frictions(result):
         value, width = healthy.get(one.name, (0.0, 0.0))
         largest = one.magnitude_bound
         if one.name == SLIDING and slid is not None:
             largest *= max(slid.speed / result.sliding_speed, 1.0)
         if math.isnan(one.value) and largest <= limits.low_ratio * (value - width):
-            return (
-                f"friction collapsed, the packing may leak: {_words(one)} is too small to be "
-                f"identified, at most {largest:.2g} N; its baseline is {value:.4g} N"
-            )
-    return ""
+            return said(Code.VANISHED, of=one.name, largest=largest, healthy=value)
+    return None
 
 
-def _with_model_doubt(diagnosis: Diagnosis, result: Result) -> Diagnosis:
-    misfit = result.misfit
-    if misfit is None or misfit.describes:
-        return diagnosis
-    return _doubted(diagnosis, f"{DOUBT} ({misfit.words} of misfit)")
+def _with_doubt(diagnosis: Diagnosis, doubt: Statement) -> Diagnosis:
+    return replace(diagnosis, statement=_doubted(diagnosis.statement, doubt), doubt=doubt)
 
 
-def _doubted(diagnosis: Diagnosis, doubt: str) -> Diagnosis:
-    return replace(diagnosis, message=f"{doubt}; {diagnosis.message}", doubt=doubt)
+def _doubted(statement: Statement, doubt: Statement | None) -> Statement:
+    return statement if doubt is None else said(Code.DOUBTED, doubt=doubt, of=statement)
 
 
 def against(
-    ratio: Ratio, limits: FrictionLimits, effect: str, healthy: str = "its baseline"
+    ratio: Ratio,
+    limits: FrictionLimits,
+    effect: Statement,
+    healthy: Statement | None = None,
 ) -> Diagnosis:
-    """Return the diagnosis of a friction over the `healthy` one, with its `effect` in words."""
+    """Return the diagnosis of a friction over the `healthy` one, its baseline if not given.
+
+    `effect` is what the friction does to the valve.
+    """
     state = friction_state(ratio, limits)
-    level, signal = _SEVERITY[state]
-    finding = f"{ratio.what} is {_figures(ratio)} times {healthy}"
-    advice = f"; {_AGAIN}" if state.is_uncertain else ""
-    return Diagnosis(level, signal, f"{state.value}: {finding}; {effect}{advice}", ratio, state)
+    statement = said(
+        Code.COMPARED_AGAIN if state.is_uncertain else Code.COMPARED,
+        state=state.name,
+        what=ratio.friction,
+        ratio=ratio.interval,
+        healthy=healthy or said(Code.ITS_BASELINE),
+        effect=effect,
+    )
+    return Diagnosis.of(state, statement, ratio)
 
 
 def friction_state(ratio: Ratio, limits: FrictionLimits) -> FrictionState:
-    """Return what a ratio says: a limit is passed where the whole interval lies beyond it.
+    """Return what a ratio and its 95 % interval say.
 
-    Where the ratio itself lies beyond a limit and the interval does not, friction has perhaps
-    changed so far, provided that it surely has changed at all.
+    Friction is excessive, or has collapsed, where the whole interval lies beyond the bound. It has
+    grown or fallen where the ratio lies beyond the bound of a warning and friction has surely
+    changed (`_SURELY`); where the change may be chance, nothing is said for sure.
     """
+    surely = math.isnan(ratio.low) or (
+        ratio.low > 0
+        and abs(math.log(ratio.value)) > _SURELY * 0.5 * math.log(ratio.high / ratio.low)
+    )
     is_high, is_low = ratio.value >= limits.warn_ratio, ratio.value <= limits.low_warn_ratio
     passed = (
         (ratio.low >= limits.error_ratio, FrictionState.EXCESS),
         (ratio.high <= limits.low_ratio, FrictionState.COLLAPSED),
-        (ratio.low >= limits.warn_ratio, FrictionState.GROWN),
-        (ratio.high <= limits.low_warn_ratio, FrictionState.FALLEN),
-        (is_high and not ratio.low <= 1.0, FrictionState.PERHAPS_GROWN),
-        (is_low and not ratio.high >= 1.0, FrictionState.PERHAPS_FALLEN),
+        (ratio.low >= limits.warn_ratio or (is_high and surely), FrictionState.GROWN),
+        (ratio.high <= limits.low_warn_ratio or (is_low and surely), FrictionState.FALLEN),
         (is_high or is_low, FrictionState.UNCLEAR),
     )
     return next((state for is_passed, state in passed if is_passed), FrictionState.NORMAL)

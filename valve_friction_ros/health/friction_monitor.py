@@ -1,15 +1,26 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The monitor of one valve, without ROS: buffer, last result, baseline, diagnosis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.alarm_conditions import farthest
+from valve_friction_ros.health.baseline import Baseline, BaselineLack, Lack
 from valve_friction_ros.health.common_factor import qualified
 from valve_friction_ros.health.diagnosis import (
     Diagnosis,
     EarlierEstimate,
     FrictionLimits,
+    FrictionState,
     StandingAlarm,
     diagnose,
     diagnose_again,
@@ -19,7 +30,8 @@ from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
 from valve_friction_ros.health.standing_alarm import followed, limited, raised, standing
-from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.valve_changes import valve_changes
+from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import (
@@ -27,21 +39,14 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     RefusalError,
     Result,
+    current_name,
     method_named,
-    method_used,
 )
 from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
-
-__all__ = [
-    "MOST_SAMPLES",
-    "FrictionMonitor",
-    "IdentificationInput",
-    "MonitorSettings",
-    "identify_snapshot",
-]
+from valve_friction_ros.wording import Code, Statement, said
 
 MOST_SAMPLES = 65_536
 """Samples of a signal that are identified at most; of more, means are. Chosen: the usual window of
@@ -62,7 +67,7 @@ class MonitorSettings:
     identification : IdentificationSettings
         Settings of the identification.
     method : str
-        Name of the method of identification, among `METHODS`.
+        Name of the method of identification, among `METHODS`; a former name becomes the new one.
     limits : FrictionLimits
         Bounds of the friction.
     window : float
@@ -81,12 +86,8 @@ class MonitorSettings:
     def __post_init__(self) -> None:
         """Refuse impossible windows and unknown methods."""
         method_named(self.method)
+        object.__setattr__(self, "method", current_name(self.method))
         require_positive("window", self.window)
-
-    @property
-    def method_used(self) -> str:
-        """Name of the method that identifies with these settings."""
-        return method_used(self.method, self.identification)
 
 
 class IdentificationInput(NamedTuple):
@@ -94,6 +95,14 @@ class IdentificationInput(NamedTuple):
 
     snapshot: Snapshot
     settings: MonitorSettings
+
+
+def identify_with_numbers(
+    snapshot: Snapshot, settings: MonitorSettings
+) -> tuple[Result, dict[str, Measured]]:
+    """Return what `identify_snapshot` returns, and the numbers of the valve by that result."""
+    result = identify_snapshot(snapshot, settings)
+    return result, valve_numbers(result)
 
 
 def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
@@ -130,16 +139,6 @@ def _of_means(result: Result, count: int) -> Result:
         evidence={**result.evidence, "averaged_samples": count},
         findings=(*result.findings, told),
     )
-
-
-def _ago(age: int) -> str:
-    """Write an age, ns, as whole units before a comma; a clock that went back is told."""
-    seconds = age / 1e9
-    if seconds < 0:
-        return "at a time to come, by a clock that has gone back since, "
-    units = (("days", 86400), ("h", 3600), ("min", 60))
-    unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
-    return f"{seconds // length:.0f} {unit} ago, "
 
 
 class _Raised(NamedTuple):
@@ -235,7 +234,7 @@ class FrictionMonitor:
         return self._known
 
     @property
-    def changes(self) -> dict[str, Change]:
+    def changes(self) -> dict[str, Measured]:
         """Changes of these numbers since the baseline; empty without one."""
         return (
             {}
@@ -249,8 +248,19 @@ class FrictionMonitor:
         settings = self._settings
         return self._known.findings(self.baseline, settings.valve, settings.valve_limits)
 
+    def may_have_changed(self) -> bool:
+        """Return whether, by the far ends of the intervals, something beside friction may differ.
+
+        So an alarm on it ends where no more than an interval's width of doubt is left.
+        """
+        baseline, settings = self.baseline, self._settings
+        if baseline is None or not baseline.numbers:
+            return False
+        numbers = farthest(self._known.numbers, baseline.numbers)
+        return bool(diagnose_numbers(numbers, baseline, settings.valve, settings.valve_limits))
+
     @property
-    def common_factor(self) -> Change | None:
+    def common_factor(self) -> Measured | None:
         """Factor by which spring and friction have changed alike, if they have."""
         return self._known.common_factor(self.baseline, self._settings.valve_limits)
 
@@ -275,7 +285,7 @@ class FrictionMonitor:
             self._follow_alarm()
         if (settings.valve, settings.window) != (self._settings.valve, self._settings.window):
             self.buffer = RecordBuffer(settings.valve, settings.window)
-            self.buffer.clear("valve or window parameters were changed")
+            self.buffer.clear(said(Code.CLEARED_AS_SETTINGS))
         self._settings = settings
 
     def input(self) -> IdentificationInput:
@@ -302,10 +312,13 @@ class FrictionMonitor:
         if self._raised is not None and self._raised.time <= time:
             self._raised = None
 
-    def accept(self, result: Result, stamp: int) -> None:
-        """Remember a result found at `stamp` (ns)."""
+    def accept(
+        self, result: Result, stamp: int, numbers: Mapping[str, Measured] | None = None
+    ) -> None:
+        """Remember a result found at `stamp` (ns), with its `valve_numbers`, if they are known."""
         self._result, self._earlier, self._stamp = result, None, stamp
-        self._known = self._known.followed_by(valve_numbers(result), stamp)
+        found = valve_numbers(result) if numbers is None else numbers
+        self._known = self._known.followed_by(found, stamp)
         self._refusal = self._internal_error = None
         self._refused = 0
         self._follow_alarm()
@@ -350,11 +363,11 @@ class FrictionMonitor:
             self._refused, self._refused_last = self._refused + 1, str(refusal)
 
     @property
-    def refusals_problem(self) -> str | None:
+    def refusals_problem(self) -> Statement | None:
         """That one identification after the other is refused, with the latest reason, if so."""
         if self._refused < _REFUSED:
             return None
-        return f"the latest {self._refused} identifications were refused: {self._refused_last}"
+        return said(Code.REFUSED_REPEATEDLY, count=self._refused, reason=self._refused_last)
 
     def fail(self, internal_error: str) -> None:
         """Remember that a bug has ended an identification, whatever its record."""
@@ -369,6 +382,12 @@ class FrictionMonitor:
             raise RefusalError("the valve has no result to take as baseline: identify it first")
         return Baseline.of(self._result)
 
+    def baseline_lacks(self) -> tuple[BaselineLack, ...]:
+        """Return the conditions of a baseline that the latest result does not meet; empty: none."""
+        if self._result is None:
+            return (BaselineLack("result", Lack.RESULT),)
+        return Baseline.lacks(self._result)
+
     def diagnosis(self, now: int | None = None, is_watched: bool = True) -> Diagnosis:
         """Return the diagnosis by the latest result, also after a refusal; OK without any.
 
@@ -379,10 +398,10 @@ class FrictionMonitor:
         diagnosis = self._diagnosis_by_result(now, is_watched)
         if self._internal_error is None:
             return diagnosis
-        message = f"{self._internal_error}; before: {diagnosis.message}"
+        failed = said(Code.FAILED, error=self._internal_error, of=diagnosis.statement)
         if diagnosis.level >= Level.ERROR:
-            return replace(diagnosis, message=message)
-        return Diagnosis(Level.ERROR, StatusSignal.CHECK_FUNCTION, message, diagnosis.ratio)
+            return replace(diagnosis, statement=failed)
+        return Diagnosis(Level.ERROR, StatusSignal.CHECK_FUNCTION, failed, diagnosis.ratio)
 
     def _diagnosis_by_result(self, now: int | None, is_watched: bool) -> Diagnosis:
         if (estimate := self.estimate) is not None:
@@ -390,15 +409,16 @@ class FrictionMonitor:
             if not is_watched:
                 diagnosis = diagnosis.of_before(self._stamp if self._earlier is None else None)
             if self._earlier is not None and now is not None:
-                age = f"(identified {_ago(now - self._earlier.time)}before the restart)"
-                diagnosis = replace(diagnosis, message=f"{diagnosis.message} {age}")
+                age = now - self._earlier.time
+                aged = said(Code.AGED, of=diagnosis.statement, age=age)
+                diagnosis = replace(diagnosis, statement=aged)
         else:
-            reason = self._refusal or "nothing has been identified yet"
-            return Diagnosis(Level.OK, StatusSignal.GOOD, f"no estimate: {reason}", None)
+            reason = self._refusal or said(Code.NOTHING_IDENTIFIED)
+            return Diagnosis.of(FrictionState.UNKNOWN, said(Code.NO_ESTIMATE, reason=reason))
         if self._refusal is None:
             return diagnosis
-        message = f"the latest identification was refused: {self._refusal}; before: "
-        return replace(diagnosis, message=message + diagnosis.message)
+        refused = said(Code.REFUSED, reason=self._refusal, of=diagnosis.statement)
+        return replace(diagnosis, statement=refused)
 
     def _with_alarm(self, estimate: Result | EarlierEstimate) -> Diagnosis:
         """Return the diagnosis by the latest estimate, and the alarm that it does not end."""

@@ -1,37 +1,28 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The newest measurement of each number of a valve, and what has changed by them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.common_factor import common_factor
 from valve_friction_ros.health.levels import Finding
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.valve_changes import Change, valve_changes
+from valve_friction_ros.health.measured import DatedNumber, Measured
+from valve_friction_ros.health.valve_changes import valve_changes
 from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import utc_minute
-
-__all__ = ["DatedNumber", "KnownNumbers"]
+from valve_friction_ros.wording import Code, said
 
 _ENDS = (("lowest_position", "lower_stop", -1.0), ("highest_position", "upper_stop", 1.0))
-
-
-class DatedNumber(NamedTuple):
-    """A number of a valve, and when it was measured.
-
-    Attributes
-    ----------
-    number : Measured
-        Number and interval, SI unit.
-    time : int
-        When its record was identified, ns since 1970 (UTC).
-    """
-
-    number: Measured
-    time: int
 
 
 @dataclass(frozen=True)
@@ -87,12 +78,12 @@ class KnownNumbers:
                 del dated[stop]
             if end in dated and not _is_farther(fresh[end], dated[end].number, side):
                 del fresh[end]
-        dated |= {name: DatedNumber(one, time) for name, one in fresh.items()}
+        dated |= {n: DatedNumber(time, one.value, one.half_width) for n, one in fresh.items()}
         return KnownNumbers(dated, time)
 
     def common_factor(
         self, baseline: Baseline | None, limits: ValveLimits | None = None
-    ) -> Change | None:
+    ) -> Measured | None:
         """Return the factor by which spring and friction have changed alike (`common_factor`)."""
         if baseline is None:
             return None
@@ -124,8 +115,8 @@ class KnownNumbers:
         times = {self.dated[name].time for name in finding.numbers if name in self.dated}
         if not times - {self.latest}:
             return finding
-        message = f"{finding.message} (measured {utc_minute(min(times))}; no record since shows it)"
-        return replace(finding, message=message)
+        dated = said(Code.MEASURED_EARLIER, of=finding.statement, time=min(times))
+        return replace(finding, statement=dated)
 
 
 def _is_beyond(end: Measured, stop: Measured, side: float) -> bool:

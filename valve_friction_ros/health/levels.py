@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Severity of what is found on a valve."""
 
 import math
@@ -6,7 +15,7 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import Any
 
-__all__ = ["Finding", "Level", "StatusSignal", "by_severity"]
+from valve_friction_ros.wording import Statement, sentence
 
 
 class Level(IntEnum):
@@ -37,8 +46,8 @@ class Finding:
         Severity.
     status_signal : StatusSignal
         The severity as a status signal of NE 107.
-    message : str
-        One sentence that says what to check.
+    statement : Statement
+        What is found, and what to check.
     numbers : tuple of str
         Names of the numbers that it rests on, if any.
     leads : bool
@@ -49,10 +58,15 @@ class Finding:
 
     level: Level
     status_signal: StatusSignal
-    message: str
+    statement: Statement
     numbers: tuple[str, ...] = field(default=(), compare=False)
     leads: bool = field(default=False, compare=False)
     friction_ratio: float = field(default=math.nan, compare=False)
+
+    @property
+    def message(self) -> str:
+        """The finding in one sentence."""
+        return sentence(self.statement)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a mapping of plain values: ``level``, ``ne_107`` and ``message``."""

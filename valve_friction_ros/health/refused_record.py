@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a record shows of a valve though its friction cannot be identified."""
 
 import contextlib
@@ -19,8 +28,6 @@ from valve_friction_ros.identification.trust.excitation import (
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-
-__all__ = ["RefusedRecordError", "numbers_of_refused"]
 
 
 class RefusedRecordError(RefusalError):

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Noise of both sensors of a record, where the record shows it as noise and as nothing else."""
 
 import math
@@ -7,10 +16,7 @@ import numpy as np
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.stamped import StampedSignal
-from valve_friction_ros.signals.holds import without_repeats
-from valve_friction_ros.signals.stamped_noise import stamped_noise
-
-__all__ = ["sensor_noises"]
+from valve_friction_ros.signals import stamped_noise, without_repeats
 
 _FEWEST = 200
 _LIKE_WHITE = 1.25

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """An alarm on friction that stands until a record surely shows its end."""
 
 from dataclasses import replace
@@ -10,9 +19,7 @@ from valve_friction_ros.health.diagnosis import (
     StandingAlarm,
 )
 from valve_friction_ros.health.levels import Level, StatusSignal
-from valve_friction_ros.streams import utc_minute
-
-__all__ = ["followed", "limited", "raised", "standing"]
+from valve_friction_ros.wording import Code, said
 
 _LESSER = {Side.HIGH: FrictionState.GROWN, Side.LOW: FrictionState.FALLEN}
 """What is left of an alarm that a record has surely ended as an ERROR, and not as a WARN."""
@@ -22,8 +29,8 @@ def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
     """Return the alarm on the friction that a record, identified at a time, ns, raises, if any."""
     if diagnosis.state.side is None:
         return None
-    message = f"{diagnosis.message} (identified {utc_minute(time)})"
-    return StandingAlarm(diagnosis.level, diagnosis.status_signal, diagnosis.state, message, time)
+    dated = said(Code.DATED, of=diagnosis.statement, time=time)
+    return StandingAlarm(diagnosis.level, diagnosis.status_signal, diagnosis.state, dated, time)
 
 
 def followed(
@@ -66,12 +73,11 @@ def limited(alarm: StandingAlarm, level: Level) -> StandingAlarm:
 def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
     """Return what is said of a valve whose latest record has not ended an alarm.
 
-    It is the alarm with its date, and the sentence of the latest record, whose ratio it has.
+    It is the alarm with its date, and what the latest record says, whose ratio it has.
     """
     if alarm is None:
         return latest
-    is_compared = latest.ratio is not None
-    link = "does not surely end it" if is_compared else "cannot be compared"
+    code = Code.STANDS_UNCOMPARED if latest.ratio is None else Code.STANDS_UNCERTAIN
     is_worse = latest.level > alarm.level
     level, signal = (
         (latest.level, latest.status_signal) if is_worse else (alarm.level, alarm.status_signal)
@@ -79,7 +85,7 @@ def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
     return Diagnosis(
         level,
         signal,
-        f"{alarm.message}; the latest record {link}: {latest.message}",
+        said(code, alarm=alarm.statement, latest=latest.statement),
         latest.ratio,
         alarm.state,
         alarm=alarm,

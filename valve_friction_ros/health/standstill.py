@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A stem that stands still between its stops while the pressure asks it to move."""
 
 import math
@@ -11,9 +20,8 @@ from valve_friction_ros.health.baseline import Baseline
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams import Samples, utc_minute
-
-__all__ = ["Standstill", "StandstillCounter", "standstill_finding"]
+from valve_friction_ros.streams import Samples
+from valve_friction_ros.wording import Code, said
 
 _STILL = 0.005
 """Share of the travel within which a stem stands still: above noise and creep. Chosen."""
@@ -182,11 +190,15 @@ def standstill_finding(
     return Finding(
         Level.ERROR,
         StatusSignal.FAILURE,
-        f"the stem has stood still at {1e3 * standstill.position:.1f} mm since "
-        f"{utc_minute(standstill.since)} while its {drive.words} changed by {change:.3g} "
-        f"{drive.unit}: more than {least / healthy:.2g} times the friction of the baseline holds "
-        "it, or a part in the trim or a lock does, or the position sensor has stopped: look at "
-        "the stem",
+        said(
+            Code.STOOD_STILL,
+            position=standstill.position,
+            since=standstill.since,
+            drive=drive.name,
+            change=change,
+            unit=drive.unit,
+            ratio=least / healthy,
+        ),
         leads=True,
         friction_ratio=least / healthy,
     )

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """How far the stem went in a record, and whether a stop held it there."""
 
 import math
@@ -9,9 +18,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.runs import runs_of
-
-__all__ = ["stem_reach"]
+from valve_friction_ros.signals import runs_of, sensor_noise
 
 _MEAN = 0.1
 """Time, s, over which the stem is averaged."""
@@ -63,7 +70,7 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
     force = valve.actuator_force(
         scipy.ndimage.uniform_filter1d(recording.drive, mean, mode="nearest")
     )
-    noise = float(np.std(recording.position - position)) / math.sqrt(mean)
+    noise = sensor_noise(recording.position) / math.sqrt(mean)
     near = max(_NEAR * float(np.ptp(position)), _NOISE * noise)
     least: NDArray[np.float64] = np.full(position.size, _SURELY * slip_force)
     if math.isnan(slip_force):

@@ -1,17 +1,25 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Travel stops that have moved since the baseline."""
 
 from collections.abc import Iterator, Mapping
 
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.health.valve_changes import Change, difference
+from valve_friction_ros.health.valve_changes import difference
 from valve_friction_ros.model.valve import Valve
-
-__all__ = ["stop_findings"]
+from valve_friction_ros.wording import Code, Statement, said
 
 _SIDES = {
-    "lower_stop": ("lowest_position", -1.0, "lower end"),
-    "upper_stop": ("highest_position", 1.0, "upper end"),
+    "lower_stop": ("lowest_position", -1.0),
+    "upper_stop": ("highest_position", 1.0),
 }
 
 
@@ -29,39 +37,25 @@ def stop_findings(
     moved = _moved(now, healthy, bound)
     changes = list(moved.values())
     if len(changes) == len(_SIDES) and changes[0].agrees_with(changes[1]):
-        yield _finding(
-            f"both travel stops have moved alike, by {_millimetres(changes[0])}: the zero of the "
-            "position sensor or its coupling to the stem has moved: check its mounting",
-            *moved,
-        )
+        yield _finding(said(Code.STOPS_MOVED_ALIKE, change=changes[0].interval), *moved)
         return
-    sensor = "zero and span" if len(moved) == len(_SIDES) else "zero or span"
+    sensor = "BOTH" if len(moved) == len(_SIDES) else "EITHER"
     if any(name in now and name in healthy for name in _SIDES.keys() - moved.keys()):
-        sensor = "span"
+        sensor = "SPAN"
     for name, change in moved.items():
-        end, side, words = _SIDES[name]
-        if side * change.value < 0:
-            yield _finding(
-                f"travel is lost at its {words}: the stem stops {_millimetres(change)} from where "
-                "it went before: check for dirt or a part in the trim, a stop that was set, and "
-                f"the {sensor} of the position sensor",
-                name,
-            )
-        else:
-            yield _finding(
-                f"the travel stop at its {words} has moved outward by {_millimetres(change)}: "
-                f"check seat and plug for wear, stop and coupling, and the {sensor} of the "
-                "position sensor",
-                name if name in now else end,
-            )
+        end, side = _SIDES[name]
+        is_lost = side * change.value < 0
+        code = Code.TRAVEL_LOST if is_lost else Code.STOP_MOVED_OUTWARD
+        statement = said(code, stop=name, change=change.interval, sensor=sensor)
+        yield _finding(statement, name if is_lost or name in now else end)
 
 
 def _moved(
     now: Mapping[str, Measured], healthy: Mapping[str, Measured], bound: float
-) -> dict[str, Change]:
+) -> dict[str, Measured]:
     """Return the changes of the stops that have surely moved by more than a bound, m."""
     moved = {}
-    for name, (end, side, _) in _SIDES.items():
+    for name, (end, side) in _SIDES.items():
         if name not in now:
             if end in now and name in healthy:
                 change = difference(now[end], healthy[name])
@@ -78,10 +72,5 @@ def _moved(
     return moved
 
 
-def _finding(message: str, *numbers: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, numbers)
-
-
-def _millimetres(change: Change) -> str:
-    change = change.times(1e3)
-    return f"{change.value:+.2f} mm ({change.low:+.2f} to {change.high:+.2f})"
+def _finding(statement: Statement, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, statement, numbers)

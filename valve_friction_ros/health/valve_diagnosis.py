@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What has changed on a valve beside its friction, and what to check."""
 
 import math
@@ -16,14 +25,12 @@ from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits, diagn
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.stop_findings import stop_findings
-from valve_friction_ros.health.valve_changes import Change, difference, valve_changes
+from valve_friction_ros.health.valve_changes import difference, valve_changes
 from valve_friction_ros.health.valve_limits import ValveLimits
 from valve_friction_ros.health.valve_numbers import valve_numbers
 from valve_friction_ros.identification import Result
-from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.valve import Valve
-
-__all__ = ["ValveDiagnosis", "diagnose_numbers", "diagnose_parameters", "diagnose_valve"]
+from valve_friction_ros.wording import Code, Statement, said
 
 
 class ValveDiagnosis(NamedTuple):
@@ -133,7 +140,7 @@ class _Case:
 
     now: Mapping[str, Measured]
     healthy: Mapping[str, Measured]
-    changes: Mapping[str, Change]
+    changes: Mapping[str, Measured]
     valve: Valve
     limits: ValveLimits
 
@@ -147,42 +154,31 @@ class _Case:
 
     @property
     def drive(self) -> str:
-        """The drive in words."""
-        return self.valve.driven_by.words
+        """The name of the drive."""
+        return self.valve.driven_by.name
 
     @property
-    def spring_change(self) -> Change | None:
+    def spring_change(self) -> Measured | None:
         """Ratio of the spring constants where it is surely beyond its bound."""
         return spring_change(self.changes, self.limits)
 
 
-def _maintenance(message: str, *numbers: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, message, numbers)
+def _maintenance(statement: Statement, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, statement, numbers)
 
 
-def _check(message: str, *numbers: str) -> Finding:
-    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message, numbers)
+def _check(statement: Statement, *numbers: str) -> Finding:
+    return Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, statement, numbers)
 
 
-def _times(change: Change) -> str:
-    return f"{change.value:.3g} times ({change.low:.3g} to {change.high:.3g})"
-
-
-def _by(change: Change, unit: str) -> str:
-    """Write a difference and its interval."""
-    return f"{change.value:+.3g} {unit} ({change.low:+.3g} to {change.high:+.3g})"
-
-
-def _common_scale(case: _Case, factor: Change) -> Iterator[Finding]:
+def _common_scale(case: _Case, factor: Measured) -> Iterator[Finding]:
     """Find that all forces have changed by one factor, as by another scale of the drive.
 
     A change that would be the failure of a spring stays one, as nothing proves that it is sound.
     """
     share = case.limits.spring_failure
     found = _check(
-        f"spring constant and friction have changed alike, to {_times(factor)} the baseline: "
-        f"one common factor points to {drive_scale(case.valve)} rather than to spring and "
-        "packing at once: check them",
+        said(Code.COMMON_SCALE, change=factor.interval, scale=drive_scale(case.valve)),
         "spring_constant",
         "coulomb_friction",
     )
@@ -195,22 +191,23 @@ def _spring(case: _Case) -> Iterator[Finding]:
         return
     share, value = case.limits.spring_failure, case.now["spring_constant"].value
     coulomb, preload = case.changes.get("coulomb_friction"), _preload_ratio(case)
-    causes = [] if _is_scale_excluded(case, change) else ["the position sensor's scale"]
+    causes = [] if _is_scale_excluded(case, change) else [said(Code.POSITION_SCALE)]
     if coulomb is None or coulomb.agrees_with(change):
         causes.append(drive_scale(case.valve))
-    also = ", and its preload with it" if preload and preload.agrees_with(change) else ""
-    alike = f", and {' and '.join(causes)}, which would look the same" if causes else ""
-    message = (
-        f"the spring constant has changed{also}: {_times(change)} the baseline, now {value:.4g} "
-        f"N/m: check the spring{alike}"
+    statement = said(
+        Code.SPRING_CHANGED,
+        with_preload=preload is not None and preload.agrees_with(change),
+        change=change.interval,
+        value=value,
+        causes=tuple(causes),
     )
     if change.beyond(1 - share, 1 + share):
-        yield Finding(Level.ERROR, StatusSignal.FAILURE, message, ("spring_constant",))
+        yield Finding(Level.ERROR, StatusSignal.FAILURE, statement, ("spring_constant",))
     else:
-        yield _maintenance(message, "spring_constant")
+        yield _maintenance(statement, "spring_constant")
 
 
-def _is_scale_excluded(case: _Case, spring: Change) -> bool:
+def _is_scale_excluded(case: _Case, spring: Measured) -> bool:
     """Return whether the distance of the stops contradicts a new scale of the position sensor.
 
     A scale s makes it s times as long, and the spring constant 1/s times as large.
@@ -224,11 +221,13 @@ def _is_scale_excluded(case: _Case, spring: Change) -> bool:
         return False
     widths = (0.5 * (one.high - one.low) / one.value for one in (now, healthy))
     span, spread = now.value / healthy.value, math.hypot(*widths)
-    expected = Change(1 / spring.value, 1 / spring.high, 1 / spring.low)
-    return not Change(span, span * (1 - spread), span * (1 + spread)).agrees_with(expected)
+    expected = Measured.between(1 / spring.value, 1 / spring.high, 1 / spring.low)
+    return not Measured.between(span, span * (1 - spread), span * (1 + spread)).agrees_with(
+        expected
+    )
 
 
-def _preload_ratio(case: _Case) -> Change | None:
+def _preload_ratio(case: _Case) -> Measured | None:
     """Return the ratio of the preloads, where both are surely above zero."""
     now, healthy = (side.get("spring_preload") for side in (case.now, case.healthy))
     if now is None or healthy is None:
@@ -246,16 +245,17 @@ def _preload(case: _Case) -> Iterator[Finding]:
     spring, ratio = case.spring_change, _preload_ratio(case)
     if spring is not None and ratio is not None and ratio.agrees_with(spring):
         return  # the same spring, as far compressed as before
-    share = percentage(abs(shift.value) / case.spring_force)
-    yield _maintenance(
-        f"the balance of forces has shifted: spring preload {_by(shift, 'N')}, {share} of the "
-        f"spring's force over the travel: check {' or '.join(_preload_causes(case, shift))}",
-        "spring_preload",
+    statement = said(
+        Code.BALANCE_SHIFTED,
+        change=shift.interval,
+        share=abs(shift.value) / case.spring_force,
+        causes=_preload_causes(case, shift),
     )
+    yield _maintenance(statement, "spring_preload")
 
 
-def _preload_causes(case: _Case, shift: Change) -> list[str]:
-    """Name what may have shifted the balance, but for what another number excludes.
+def _preload_causes(case: _Case, shift: Measured) -> tuple[Statement, ...]:
+    """Return what may have shifted the balance, but for what another number excludes.
 
     A reading of the pressure that is too high by e adds A·e to the preload; one of the position by
     b takes k·b from it.
@@ -264,26 +264,27 @@ def _preload_causes(case: _Case, shift: Change) -> list[str]:
     moved = shift.times(-1.0 / stiffness)
     stops = [case.changes[name] for name in ("lower_stop", "upper_stop") if name in case.changes]
     bound = case.limits.stop_change * case.valve.travel
-    zero = f"the zero of the position sensor ({1e3 * moved.value:+.2g} mm in its reading)"
     with_balance = [one.agrees_with(moved) for one in stops]
     have_moved = all(with_balance) and all(one.beyond(-bound, bound) for one in stops)
     if have_moved and len(stops) == _BOTH:
-        return [f"{zero}, as both travel stops have moved alike"]
+        return (said(Code.POSITION_ZERO, reading=moved.value, stops="BOTH"),)
+    drive = case.valve.driven_by
     zero_of_drive = case.valve.actuator_drive(shift.value) - case.valve.actuator_drive(0.0)
-    drive = f"{zero_of_drive / case.valve.driven_by.size:+.3g} {case.valve.driven_by.unit}"
-    causes = ["the bench set", f"the zero of the {case.drive} sensor ({drive} in its reading)"]
-    if have_moved and stops:
-        causes.append(f"{zero}, with which the move of the one stop that was met agrees")
-    elif all(with_balance):
-        causes.append(zero)
+    reading = zero_of_drive / drive.size
+    causes = [
+        said(Code.BENCH_SET),
+        said(Code.DRIVE_ZERO, drive=drive.name, reading=reading, unit=drive.unit),
+    ]
+    if all(with_balance):
+        met = "ONE" if have_moved and stops else "NONE"
+        causes.append(said(Code.POSITION_ZERO, reading=moved.value, stops=met))
     friction = case.now.get("coulomb_friction")
     if friction is None or min(abs(shift.low), abs(shift.high)) < friction.value:
-        way = "up" if shift.value > 0 else "down"
-        causes.append(f"packing whose friction is larger {way}ward")
-    return causes
+        causes.append(said(Code.UNEVEN_PACKING, upward=shift.value > 0))
+    return tuple(causes)
 
 
-def _slip(case: _Case, factor: Change | None) -> Iterator[Finding]:
+def _slip(case: _Case, factor: Measured | None) -> Iterator[Finding]:
     """Find that the slip jump has grown, unless all forces have by a factor that explains it."""
     growth, bound = case.changes.get("slip_force"), case.limits.slip_change * case.spring_force
     if growth is None or not growth.low > bound:
@@ -291,63 +292,44 @@ def _slip(case: _Case, factor: Change | None) -> Iterator[Finding]:
     healthy = case.healthy["slip_force"].value
     if factor is not None and growth.low <= healthy * (factor.high - 1):
         return
-    jump = percentage(case.now["slip_force"].value / case.spring_force)
-    yield _maintenance(
-        f"the slip jump has grown: static above sliding friction {_by(growth, 'N')}, which makes "
-        f"the stem jump by {jump} of its travel: check packing, stem and guides for sticking",
-        "slip_force",
-    )
+    jump = case.now["slip_force"].value / case.spring_force
+    yield _maintenance(said(Code.SLIP_GROWN, change=growth.interval, share=jump), "slip_force")
 
 
-def _viscous(case: _Case, factor: Change | None) -> Iterator[Finding]:
+def _viscous(case: _Case, factor: Measured | None) -> Iterator[Finding]:
     """Find that viscous friction has changed, unless all forces have alike."""
     ratio, bound = case.changes.get("viscous_friction"), case.limits.viscous_factor
     way = 0 if ratio is None else ratio.beyond(1 / bound, bound)
     is_explained = factor is not None and ratio is not None and ratio.agrees_with(factor)
     if ratio is not None and way and not is_explained:
-        yield _maintenance(
-            f"viscous friction has {'grown' if way > 0 else 'fallen'} to {_times(ratio)} the "
-            "baseline: check packing and lubricant, and the air path of the actuator; a changed "
-            "lag between the signals would look much the same",
-            "viscous_friction",
-        )
+        statement = said(Code.VISCOUS_CHANGED, grown=way > 0, change=ratio.interval)
+        yield _maintenance(statement, "viscous_friction")
 
 
 def _asymmetry(case: _Case) -> Iterator[Finding]:
     change, bound = case.changes.get("viscous_asymmetry"), case.limits.asymmetry_change
     if change is not None and change.beyond(-bound, bound):
-        way = "up" if change.value > 0 else "down"
-        yield _maintenance(
-            f"viscous friction has become larger {way}ward: share {_by(change, '')}: check stem "
-            "and packing for wear on one side, and the air path for a throttle that acts one way",
-            "viscous_asymmetry",
-        )
+        upward, interval = change.value > 0, change.interval
+        statement = said(Code.ASYMMETRY_CHANGED, upward=upward, change=interval)
+        yield _maintenance(statement, "viscous_asymmetry")
 
 
 def _noises(case: _Case, has_scaled: bool) -> Iterator[Finding]:
     """Find noise that has grown; a new scale of the drive explains its noise where it agrees."""
-    names = {"drive_noise": case.drive, "stem_noise": "stem position"}
-    for name, words in names.items():
+    signals = {"drive_noise": case.drive, "stem_noise": "STEM"}
+    for name, signal in signals.items():
         ratio = case.changes.get(name)
         if ratio is None or not ratio.low > case.limits.noise_factor:
             continue
         is_scale = has_scaled and ratio.agrees_with(case.changes["spring_constant"])
         if not (is_scale and name == "drive_noise"):
-            yield _check(
-                f"the noise of the {words} has grown to {_times(ratio)} the baseline: check the "
-                "sensor, its cable, its supply and its mounting",
-                name,
-            )
+            grown = said(Code.NOISE_GROWN, signal=signal, change=ratio.interval)
+            yield _check(grown, name)
 
 
 def _lag(case: _Case) -> Iterator[Finding]:
     change, bound = case.changes.get("lag"), case.limits.lag_change
     if change is None or not change.beyond(-bound, bound):
         return
-    way = "later" if change.value > 0 else "earlier"
-    yield _check(
-        f"the stem has become {way} against the {case.drive}: {_by(change.times(1e3), 'ms')}: "
-        "check filters and clocks of both sensors, and tubing and volume between sensor and "
-        "actuator; a changed viscous friction would look much the same",
-        "lag",
-    )
+    later, interval = change.value > 0, change.interval
+    yield _check(said(Code.LAG_CHANGED, later=later, drive=case.drive, change=interval), "lag")

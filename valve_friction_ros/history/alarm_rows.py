@@ -1,89 +1,414 @@
-"""The recordings of alarms in the history."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""The life of the alarms as rows of the history: written step by step, listed and filtered.
+
+A step is made in one transaction, which begins with the alarms as they are in the file: so two
+processes make no step twice, and a killed one makes it or not. All functions raise HistoryError if
+the history cannot be read or written.
+"""
+
+import csv
+import io
+import math
+import threading
+import uuid
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from valve_friction_ros.health.levels import Level
-from valve_friction_ros.history.connection import has_table
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, RowMapping
+
+from valve_friction_ros.health.alarms import (
+    TRANSITIONS,
+    Alarm,
+    AlarmAction,
+    AlarmEvent,
+    AlarmKind,
+    AlarmRequest,
+    AlarmState,
+    Condition,
+    all_followed,
+    all_requested,
+    requested,
+)
+from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.history import tables
+from valve_friction_ros.history.database import reading, writing
 from valve_friction_ros.history.entry import KeptValve
-from valve_friction_ros.history.file import HistoryFile
-from valve_friction_ros.history.reader import History
-from valve_friction_ros.history.retention import forget_older
-from valve_friction_ros.history.rows import valve_id
-from valve_friction_ros.history.schema import HistoryError, reading, writing
+from valve_friction_ros.history.history import History, HistoryFile
+from valve_friction_ros.history.place import file_state
+from valve_friction_ros.history.rows import oldest_kept, valve_id
+from valve_friction_ros.history.tables import joined, put
+from valve_friction_ros.outside_text import harmless
+from valve_friction_ros.streams import utc
 
-__all__ = ["AlarmRecording", "alarm_recordings", "keep_alarm_recording"]
+_EVENT = tables.alarm_event
+_END_OF_TIME = 2**63 - 1
+
+
+class KeptAlarmEvent(NamedTuple):
+    """An event of an alarm, and the valve that it is of."""
+
+    valve: KeptValve
+    event: AlarmEvent
+
+    @property
+    def area(self) -> str:
+        """The area of its valve."""
+        return area_of(self.valve.name)
+
+
+def area_of(name: str) -> str:
+    """Return the area of a valve, by the name of its identifier: what its namespace lies in.
+
+    The area of ``/unit_3/fv_101/identifier`` is ``/unit_3``, that of ``/fv_101/identifier`` ``/``.
+    """
+    return name.rsplit("/", 2)[0] or "/"
+
+
+# Steps
+
+
+def _row(valve: int, event: AlarmEvent) -> dict[str, Any]:
+    alarm = event.alarm
+    return {
+        "valve_id": valve,
+        "uid": uuid.uuid4().hex,
+        "time_ns": event.time,
+        "kind": alarm.kind.value,
+        "action": event.action.name,
+        "state_before": event.before.name,
+        "state": alarm.state.name,
+        "level": int(alarm.condition.level),
+        "status_signal": alarm.condition.status_signal.value,
+        "message": alarm.message,
+        "raised_ns": alarm.raised,
+        "until_ns": alarm.until,
+        "who": event.who,
+        "text": event.text,
+    }
+
+
+def _event(row: RowMapping) -> AlarmEvent:
+    message, level = row["message"], Level(row["level"])
+    shown = Condition(level, StatusSignal(row["status_signal"]), message if level else "")
+    alarm = Alarm(
+        AlarmKind(row["kind"]),
+        AlarmState[row["state"]],
+        shown,
+        row["raised_ns"],
+        row["until_ns"],
+        message,
+    )
+    before = AlarmState[row["state_before"]]
+    return AlarmEvent(
+        row["time_ns"], AlarmAction[row["action"]], before, alarm, row["who"], row["text"]
+    )
+
+
+def _newest(*of_valve: Any) -> Any:
+    """Return what selects the number of the last event of each alarm."""
+    newest = sa.func.max(_EVENT.c.id)
+    return sa.select(newest).where(*of_valve).group_by(_EVENT.c.valve_id, _EVENT.c.kind)
+
+
+def _alarms(connection: Connection, valve: int) -> dict[AlarmKind, Alarm]:
+    last = sa.select(_EVENT).where(_EVENT.c.id.in_(_newest(_EVENT.c.valve_id == valve)))
+    events = map(_event, connection.execute(last).mappings())
+    return {one.alarm.kind: one.alarm for one in events}
+
+
+class AlarmSteps(NamedTuple):
+    """What a transaction has made of the alarms of a valve: its events, and the alarms now."""
+
+    events: tuple[AlarmEvent, ...]
+    alarms: Mapping[AlarmKind, Alarm]
+
+
+def _kept(
+    file: HistoryFile,
+    valve: KeptValve,
+    days: float,
+    steps: Callable[[Mapping[AlarmKind, Alarm]], tuple[AlarmEvent, ...]],
+) -> AlarmSteps:
+    with writing(file.path) as connection:
+        number = valve_id(connection, valve)
+        alarms = _alarms(connection, number)
+        events = steps(alarms)
+        put(connection, _EVENT, [_row(number, one) for one in events], is_kept=True)
+        if events and days > 0:
+            of_valve = _EVENT.c.valve_id == number
+            old = (of_valve, _EVENT.c.time_ns < oldest_kept(events[-1].time, days))
+            connection.execute(sa.delete(_EVENT).where(*old, _EVENT.c.id.not_in(_newest(of_valve))))
+    return AlarmSteps(events, alarms | {one.alarm.kind: one.alarm for one in events})
+
+
+def follow_alarms(
+    file: HistoryFile,
+    valve: KeptValve,
+    conditions: Mapping[AlarmKind, Condition],
+    time: int,
+    days: float = 0.0,
+) -> AlarmSteps:
+    """Keep what the valve and the clock make of its alarms at a time, ns (`all_followed`).
+
+    Events `days` older than that go, none for 0; the last one of each alarm stays.
+    """
+    return _kept(file, valve, days, lambda alarms: all_followed(alarms, conditions, time))
+
+
+def request_alarms(
+    file: HistoryFile,
+    valve: KeptValve,
+    kind: AlarmKind | None,
+    request: AlarmRequest,
+    time: int,
+    days: float = 0.0,
+) -> AlarmSteps:
+    """Keep what a person asks of one alarm of a valve, or of all (`all_requested`).
+
+    Raises AlarmError if that is not possible now; nothing is kept then.
+    """
+    return _kept(file, valve, days, lambda alarms: all_requested(alarms, kind, request, time))
+
+
+def request_many(
+    file: HistoryFile,
+    asked: Sequence[tuple[KeptValve, AlarmKind]],
+    request: AlarmRequest,
+    time: int,
+) -> int:
+    """Keep what a person asks of many alarms, in one transaction; return of how many it was kept.
+
+    Those that do not allow it now are left out. Identifiers that run see it by `AlarmFeed`.
+    """
+    with writing(file.path) as connection:
+        numbers = {valve: valve_id(connection, valve) for valve in {one for one, _ in asked}}
+        of_valves = _EVENT.c.valve_id.in_(numbers.values())
+        last = sa.select(_EVENT).where(_EVENT.c.id.in_(_newest(of_valves)))
+        rows = connection.execute(last).mappings()
+        alarms = {(row["valve_id"], row["kind"]): _event(row).alarm for row in rows}
+        written = []
+        for valve, kind in dict.fromkeys(asked):
+            alarm = alarms.get((numbers[valve], kind.value), Alarm(kind))
+            if (alarm.state, request.action) in TRANSITIONS:
+                written.append(_row(numbers[valve], requested(alarm, request, time)))
+        put(connection, _EVENT, written, is_kept=True)
+    return len(written)
+
+
+class AlarmFeed:
+    """Steps of alarms that come into a file, for all identifiers of a process together.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._seen: object = None
+        self._last: int | None = None
+        self._looked = -math.inf
+        self._news: defaultdict[str, dict[AlarmKind, Alarm]] = defaultdict(dict)
+
+    def is_due(self, now: float) -> bool:
+        """Return whether a look is due at a time, s of a clock that does not go back; once."""
+        with self._lock:
+            if now - self._looked < _FEED_PERIOD:
+                return False
+            self._looked = now
+            return True
+
+    def look(self) -> None:
+        """Read what is new, in any thread; the first look finds nothing new.
+
+        Raises HistoryError if the file cannot be read.
+        """
+        state = file_state(self._path)
+        if state == self._seen:
+            return
+        newest = sa.select(sa.func.max(_EVENT.c.id))
+        query = (
+            sa.select(_EVENT, tables.valve.c.name)
+            .select_from(joined(_EVENT, tables.valve))
+            .where(_EVENT.c.id > (self._last or 0))
+            .order_by(_EVENT.c.id)
+        )
+        with reading(self._path) as connection:
+            if self._last is None:
+                self._last = int(connection.scalar(newest) or 0)
+                rows: Sequence[RowMapping] = ()
+            else:
+                rows = connection.execute(query).mappings().all()
+        with self._lock:
+            for row in rows:
+                alarm = _event(row).alarm
+                self._news[row["name"]][alarm.kind] = alarm
+                self._last = row["id"]
+        self._seen = state
+
+    def take(self, valve: str) -> dict[AlarmKind, Alarm]:
+        """Return the alarms of a valve that have changed since the last call."""
+        with self._lock:
+            return self._news.pop(valve, {})
+
+
+_FEED_PERIOD = 1.0
+_feeds: dict[Path, AlarmFeed] = {}
+
+
+def alarm_feed(path: Path) -> AlarmFeed:
+    """Return the feed of a file, which all identifiers of the process share."""
+    return _feeds.setdefault(path.absolute(), AlarmFeed(path))
+
+
+def read_alarms(file: History, valve: str) -> dict[AlarmKind, Alarm]:
+    """Return the alarms of the valve of this name; those that were never raised are not there."""
+    number = sa.select(tables.valve.c.id).where(tables.valve.c.name == valve)
+    with reading(file.place) as connection:
+        found = connection.scalar(number)
+        return {} if found is None else _alarms(connection, found)
+
+
+# Lists
 
 
 @dataclass(frozen=True)
-class AlarmRecording:
-    """The record that was saved when the level of a valve had risen.
+class AlarmFilter:
+    """Which events, or alarms, are listed.
 
     Attributes
     ----------
-    time : int
-        When the level rose, ns since 1970 (UTC).
-    level : Level
-        The level from then on.
-    path : Path
-        The bag, with the page of the report in its folder; it may have been removed since.
-    message : str
-        The diagnosis of that time.
+    since, until : int
+        Times, ns since 1970 (UTC), from and before which they happened.
+    area : str
+        Area of their valves, with the areas in it; ``/``: the whole plant.
+    valve : str
+        Name of the identifier; empty: all.
+    states : frozenset of AlarmState
+        States of the alarms from then on; empty: all.
+    kinds : frozenset of AlarmKind
+        What they are about; empty: all.
+    words : str
+        Each of these words must be in tag, name, sentence, person or text.
     """
 
-    time: int
-    level: Level
-    path: Path
-    message: str
+    since: int = -_END_OF_TIME
+    until: int = _END_OF_TIME
+    area: str = "/"
+    valve: str = ""
+    states: frozenset[AlarmState] = frozenset()
+    kinds: frozenset[AlarmKind] = frozenset()
+    words: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return a mapping of plain values; the time is ns since 1970 (UTC)."""
-        return {
-            "time": self.time,
-            "level": self.level.name,
-            "path": str(self.path),
-            "message": self.message,
-        }
-
-
-def keep_alarm_recording(
-    file: HistoryFile, valve: KeptValve, one: AlarmRecording, days: float = 0.0
-) -> None:
-    """Keep that an alarm was recorded; delete those of its valve `days` older, none for 0.
-
-    Raises HistoryError if it cannot be written.
-    """
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        connection.execute(
-            "DELETE FROM alarm_recording WHERE valve_id = ? AND time_ns = ?", (row, one.time)
-        )
-        connection.execute(
-            "INSERT OR REPLACE INTO alarm_recording (valve_id, time_ns, level, path, message) "
-            "VALUES (?, ?, ?, ?, ?)",
-            (row, one.time, int(one.level), str(one.path), one.message),
-        )
-        forget_older(connection, "alarm_recording", "time_ns", row, one.time, days)
+    def _conditions(self) -> Iterable[Any]:
+        name = tables.valve.c.name
+        yield _EVENT.c.time_ns >= self.since
+        yield _EVENT.c.time_ns < self.until
+        if area := self.area.strip("/"):
+            yield name.startswith(f"/{area}/", autoescape=True)
+        if self.valve:
+            yield name == self.valve
+        if self.states:
+            yield _EVENT.c.state.in_([one.name for one in self.states])
+        if self.kinds:
+            yield _EVENT.c.kind.in_([one.value for one in self.kinds])
+        searched = (tables.valve.c.tag, name, _EVENT.c.message, _EVENT.c.who, _EVENT.c.text)
+        for word in self.words.split():
+            yield sa.or_(*(one.icontains(word, autoescape=True) for one in searched))
 
 
-def alarm_recordings(file: History, valve: str) -> tuple[AlarmRecording, ...]:
-    """Return the recordings of the valve of this name, oldest first; an older file holds none.
-
-    Raises HistoryError if the file cannot be read.
-    """
-    with reading(file.place) as connection:
-        if not has_table(connection, "alarm_recording"):
-            return ()
-        rows = connection.execute(
-            "SELECT time_ns, level, path, message FROM alarm_recording "
-            "JOIN valve ON valve.id = valve_id WHERE name = ? ORDER BY time_ns, path",
-            (valve,),
-        ).fetchall()
-    try:
+def _listed(
+    history: History, chosen: AlarmFilter, most: int, *more: Any
+) -> tuple[KeptAlarmEvent, ...]:
+    # Names of columns are those of the events; name and tag are the valve's.
+    query = (
+        sa.select(_EVENT, tables.valve.c.name.label("valve_name"), tables.valve.c.tag)
+        .select_from(joined(_EVENT, tables.valve))
+        .where(*chosen._conditions(), *more)  # noqa: SLF001 - of this module
+        .order_by(_EVENT.c.time_ns.desc(), _EVENT.c.id.desc())
+        .limit(most)
+    )
+    with reading(history.place) as connection:
+        rows = connection.execute(query).mappings()
         return tuple(
-            AlarmRecording(time, Level(level), Path(path), message)
-            for time, level, path, message in rows
+            KeptAlarmEvent(KeptValve(row["valve_name"], row["tag"]), _event(row)) for row in rows
         )
-    except (TypeError, ValueError) as error:
-        raise HistoryError(f"{file.place}: a row holds no recording: {error}") from None
+
+
+def alarm_events(
+    history: History, chosen: AlarmFilter | None = None, most: int = 100_000
+) -> tuple[KeptAlarmEvent, ...]:
+    """Return events of alarms, the newest first, `most` of them at most."""
+    return _listed(history, chosen or AlarmFilter(), most)
+
+
+def standing_alarms(
+    history: History, chosen: AlarmFilter | None = None, most: int = 100_000
+) -> tuple[KeptAlarmEvent, ...]:
+    """Return the last event of each alarm that is not normal, the newest first."""
+    is_last = _EVENT.c.id.in_(_newest())
+    is_normal = _EVENT.c.state == AlarmState.NORMAL.name
+    return _listed(history, chosen or AlarmFilter(), most, is_last, sa.not_(is_normal))
+
+
+_COLUMNS = (
+    "time",
+    "area",
+    "valve",
+    "tag",
+    "alarm",
+    "event",
+    "state",
+    "level",
+    "ne_107",
+    "raised",
+    "until",
+    "who",
+    "text",
+    "message",
+)
+
+
+def alarms_as_csv(events: Iterable[KeptAlarmEvent]) -> str:
+    """Write events as CSV, a line each, times after ISO 8601 (UTC)."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for one in events:
+        event, alarm = one.event, one.event.alarm
+        row = (
+            _iso(event.time),
+            one.area,
+            one.valve.name,
+            one.valve.tag,
+            alarm.kind.value,
+            event.action.value,
+            alarm.state.value,
+            alarm.condition.level.name,
+            alarm.condition.status_signal.value,
+            _iso(alarm.raised),
+            _iso(alarm.until),
+            event.who,
+            event.text,
+            alarm.message,
+        )
+        writer.writerow(map(harmless, row))
+    return out.getvalue()
+
+
+def _iso(time: int | None) -> str:
+    return "" if time is None else f"{utc(time):%Y-%m-%dT%H:%M:%S}Z"

@@ -1,9 +1,19 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Entries of the history: identifications of a valve, and its baselines."""
 
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -13,7 +23,7 @@ from valve_friction_ros.health.comparison import carried
 from valve_friction_ros.health.diagnosis import Diagnosis, FrictionLimits
 from valve_friction_ros.health.friction_monitor import FrictionMonitor, MonitorSettings
 from valve_friction_ros.health.levels import Level
-from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.measured import DatedNumber, Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError
 from valve_friction_ros.identification import (
     SLIDING,
@@ -26,24 +36,10 @@ from valve_friction_ros.identification import (
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.streams.record_buffer import Snapshot
 
-__all__ = [
-    "Fit",
-    "FrictionPoint",
-    "HistoryEntry",
-    "KeptBaseline",
-    "KeptValve",
-    "Span",
-    "entry_of",
-    "friction_point",
-    "settings_text",
-    "span_of",
-    "trended",
-]
-
-
 _MOST_SAMPLES = 2000
 """Samples of a kept record. Chosen: the loop of forty strokes is round, in 16 kB."""
 
+_NOTHING: Mapping[str, Measured] = MappingProxyType({})
 _ENDLESS = 1e300
 """Half width, N, from which an interval says nothing."""
 
@@ -80,20 +76,35 @@ class Fit(NamedTuple):
     systematic: float = math.nan
 
 
-class FrictionPoint(NamedTuple):
-    """One friction of a trend.
+@dataclass(frozen=True)
+class AlarmRecording:
+    """The record that was saved when the level of a valve had risen.
 
     Attributes
     ----------
     time : int
-        When it was identified, ns since 1970 (UTC).
-    value, half_width : float
-        Friction, and half the width of its 95 % interval, N.
+        When the level rose, ns since 1970 (UTC).
+    level : Level
+        The level from then on.
+    path : Path
+        The bag, with the page of the report in its folder; it may have been removed since.
+    message : str
+        The diagnosis of that time.
     """
 
     time: int
-    value: float
-    half_width: float
+    level: Level
+    path: Path
+    message: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a mapping of plain values; the time is ns since 1970 (UTC)."""
+        return {
+            "time": self.time,
+            "level": self.level.name,
+            "path": str(self.path),
+            "message": self.message,
+        }
 
 
 @dataclass(frozen=True)
@@ -256,15 +267,17 @@ class HistoryEntry:
             "warnings": list(self.warnings),
             "diagnosis": self.diagnosis.to_dict(),
             **_frictions_of("baseline", self.baseline),
-            "limits": plain(vars(self.limits)),
+            "limits": plain(self.limits.ratios),
             "refusal": self.refusal,
             "settings": json.loads(self.settings),
             "software_version": self.version,
         }
 
-    def point(self, baseline: Baseline | None = None) -> FrictionPoint | None:
+    def point(self, baseline: Baseline | None = None) -> DatedNumber | None:
         """Return the point of this entry in a trend against a baseline (`friction_point`)."""
-        return friction_point(self.time, self.parameters, self.sliding_speed, baseline)
+        return friction_point(
+            self.time, self.parameters, self.sliding_speed, baseline, self.numbers
+        )
 
 
 def trended(baseline: Baseline | None) -> str:
@@ -274,8 +287,12 @@ def trended(baseline: Baseline | None) -> str:
 
 
 def friction_point(
-    time: int, parameters: Mapping[str, Parameter], speed: float, baseline: Baseline | None
-) -> FrictionPoint | None:
+    time: int,
+    parameters: Mapping[str, Parameter],
+    speed: float,
+    baseline: Baseline | None,
+    numbers: Mapping[str, Measured] = _NOTHING,
+) -> DatedNumber | None:
     """Return the point of an identification in a trend, or None.
 
     Where the baseline has a sliding friction, it is the sliding friction carried to that speed;
@@ -291,9 +308,9 @@ def friction_point(
     if not 0 <= one.half_width < _ENDLESS:
         return None
     if baseline is None or baseline.sliding is None:
-        return FrictionPoint(time, one.value, one.half_width)
-    now = carried(parameters, speed, baseline.sliding)
-    return None if now is None else FrictionPoint(time, now.value, now.half_width)
+        return DatedNumber(time, one.value, one.half_width)
+    now = carried(parameters, speed, baseline.sliding, numbers)
+    return None if now is None else DatedNumber(time, now.value, now.half_width)
 
 
 def span_of(snapshot: Snapshot) -> Span | None:
@@ -362,7 +379,7 @@ def entry_of(
         time=time,
         valve=valve,
         span=span_of(snapshot),
-        method=settings.method_used,
+        method=settings.method,
         diagnosis=monitor.diagnosis(time),
         limits=monitor.settings.limits,
         baseline=monitor.baseline,

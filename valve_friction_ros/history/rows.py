@@ -1,7 +1,18 @@
-"""Conversion between the history's value types and the rows of its tables."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""Identifications and baselines of the history as rows of its tables, and back."""
+
+import json
 import math
-import sqlite3
+import re
+import time
 import uuid
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,41 +21,37 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, RowMapping
 
 from valve_friction_ros.health.baseline import Baseline, SlidingFriction
 from valve_friction_ros.health.comparison import Ratio
-from valve_friction_ros.health.diagnosis import FrictionLimits
-from valve_friction_ros.health.levels import Level
-from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.history.connection import Connection, has_table
-from valve_friction_ros.history.diagnosis_rows import diagnosis_in, state_columns
-from valve_friction_ros.history.entry import (
-    Fit,
-    HistoryEntry,
-    KeptBaseline,
-    KeptValve,
-    Span,
+from valve_friction_ros.health.diagnosis import (
+    Diagnosis,
+    FrictionLimits,
+    FrictionState,
+    StandingAlarm,
+    friction_state,
 )
-from valve_friction_ros.history.number_rows import insert_numbers, numbers_in
+from valve_friction_ros.health.known_numbers import KnownNumbers
+from valve_friction_ros.health.levels import Level, StatusSignal
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.valve_changes import DIFFERENCES, RATIOS
+from valve_friction_ros.history import tables
+from valve_friction_ros.history.entry import Fit, HistoryEntry, KeptBaseline, KeptValve, Span
+from valve_friction_ros.history.tables import joined, put
 from valve_friction_ros.identification import (
-    FORMER_METHODS,
     PARAMETER_UNITS,
     Parameter,
     Verdict,
+    current_name,
+    plain,
 )
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
-
-__all__ = [
-    "entries_in",
-    "frictions_in",
-    "insert_baseline",
-    "insert_entry",
-    "kept_baseline_in",
-    "record_in",
-    "settings_id",
-    "valve_id",
-]
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.streams import DAY
+from valve_friction_ros.wording import Code, Statement, quoted, said, sentence
 
 _SAMPLE = np.dtype("<f4")
 
@@ -65,40 +72,51 @@ _OF_ENTRY = (
 _OF_REPLACED = tuple(f"replaced_{name}" for name in _OF_BASELINE)
 """Columns of a baseline: in its table, in that of the identifications, and as the one before."""
 
+_NUMBERS = {"baseline": tables.baseline_number, "identification": tables.identification_number}
+
 
 def valve_id(connection: Connection, valve: KeptValve) -> int:
     """Return the row of a valve, with its tag updated."""
-    connection.execute(
-        "INSERT INTO valve (name, tag) VALUES (?, ?) ON CONFLICT (name) DO UPDATE SET "
-        "tag = excluded.tag WHERE valve.tag != excluded.tag",
-        valve,
-    )
-    (row,) = connection.execute("SELECT id FROM valve WHERE name = ?", valve[:1]).fetchone()
-    return int(row)
+    row = connection.execute(_VALVE, {"named": valve.name}).first()
+    if row is None or row.tag != valve.tag:
+        put(connection, tables.valve, [{"name": valve.name, "tag": valve.tag}])
+        row = connection.execute(_VALVE, {"named": valve.name}).one()
+    return int(row.id)
+
+
+_VALVE = sa.select(tables.valve).where(tables.valve.c.name == sa.bindparam("named"))
+_SETTINGS = sa.select(tables.settings.c.id).where(tables.settings.c.content == sa.bindparam("text"))
 
 
 def settings_id(connection: Connection, text: str) -> int:
     """Return the row of settings, which are added where they are new."""
-    connection.execute("INSERT INTO settings (content) VALUES (?) ON CONFLICT DO NOTHING", (text,))
-    (row,) = connection.execute("SELECT id FROM settings WHERE content = ?", (text,)).fetchone()
+    if (row := connection.scalar(_SETTINGS, {"text": text})) is None:
+        put(connection, tables.settings, [{"content": text}], is_kept=True)
+        row = connection.execute(_SETTINGS, {"text": text}).scalar_one()
     return int(row)
 
 
-def _insert(connection: sqlite3.Connection, table: str, **values: object) -> int:
-    names, marks = ", ".join(values), ", ".join("?" * len(values))
-    statement = f"INSERT INTO {table} ({names}) VALUES ({marks})"  # noqa: S608 - no user's text
-    row = connection.execute(statement, tuple(values.values())).lastrowid
-    return int(row or 0)
+def oldest_kept(newest: int, days: float) -> int:
+    """Return the time, ns, before which rows leave that are `days` older than the newest one.
+
+    A newest row that is ahead of the clock of this machine ages none.
+    """
+    return min(newest, time.time_ns()) - round(days * DAY)
 
 
-def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry) -> None:
+def _insert(connection: Connection, table: sa.Table, **values: object) -> int:
+    done: Any = connection.execute(sa.insert(table), values)
+    return int(done.inserted_primary_key[0])
+
+
+def insert_entry(connection: Connection, valve: int, entry: HistoryEntry) -> None:
     """Add an identification to a valve. SQLite stores nan as NULL."""
-    diagnosis, baseline = entry.diagnosis, entry.baseline
+    diagnosis = entry.diagnosis
     begin, end = entry.span or (None, None)
-    ratio, low, high, of, speed = diagnosis.ratio or (None,) * 5
-    identification = _insert(
+    ratio = diagnosis.ratio
+    row = _insert(
         connection,
-        "identification",
+        tables.identification,
         uid=uuid.uuid4().hex,
         valve_id=valve,
         time_ns=entry.time,
@@ -113,42 +131,41 @@ def insert_entry(connection: sqlite3.Connection, valve: int, entry: HistoryEntry
         level=int(diagnosis.level),
         status_signal=diagnosis.status_signal.value,
         message=diagnosis.message,
-        ratio=ratio,
-        ratio_low=low,
-        ratio_high=high,
-        ratio_of=of,
-        ratio_speed=speed,
+        ratio=None if ratio is None else ratio.value,
+        ratio_low=None if ratio is None else ratio.low,
+        ratio_high=None if ratio is None else ratio.high,
+        ratio_of=None if ratio is None else ratio.of,
+        ratio_speed=None if ratio is None else ratio.speed,
         sliding_speed=entry.sliding_speed,
-        **_baseline_columns(baseline, _OF_ENTRY),
-        warn_ratio=entry.limits.warn_ratio,
-        error_ratio=entry.limits.error_ratio,
-        low_ratio=entry.limits.low_ratio,
+        **_baseline_columns(entry.baseline, _OF_ENTRY),
+        **entry.limits.ratios,
         **state_columns(diagnosis),
         settings_id=settings_id(connection, entry.settings),
         software_version=entry.version,
     )
-    for one in entry.parameters.values():
-        _insert(
-            connection,
-            "parameter",
-            identification_id=identification,
-            name=one.name,
-            value=one.value,
-            standard_error=one.standard_error,
-            half_width=one.half_width,
-            verdict=one.verdict.value,
-            reason=one.reason,
-            published=one.published,
-            uncalibrated_half_width=one.uncalibrated and one.uncalibrated.half_width,
-        )
-    insert_numbers(connection, "identification", identification, entry.numbers)
+    parameters = [
+        {
+            "identification_id": row,
+            "name": one.name,
+            "value": one.value,
+            "standard_error": one.standard_error,
+            "half_width": one.half_width,
+            "verdict": one.verdict.value,
+            "reason": one.reason,
+            "published": one.published,
+            "uncalibrated_half_width": one.uncalibrated and one.uncalibrated.half_width,
+        }
+        for one in entry.parameters.values()
+    ]
+    put(connection, tables.parameter, parameters)
+    _insert_numbers(connection, "identification", row, entry.numbers)
 
 
-def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseline) -> None:
+def insert_baseline(connection: Connection, valve: int, kept: KeptBaseline) -> None:
     """Add a baseline to a valve."""
     row = _insert(
         connection,
-        "baseline",
+        tables.baseline,
         uid=uuid.uuid4().hex,
         valve_id=valve,
         time_ns=kept.time,
@@ -159,11 +176,11 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         level=kept.level,
         withdrawn=kept.withdrawn,
     )
-    insert_numbers(connection, "baseline", row, kept.baseline.numbers)
+    _insert_numbers(connection, "baseline", row, kept.baseline.numbers)
     if kept.record is not None:
         _insert(
             connection,
-            "baseline_record",
+            tables.baseline_record,
             baseline_id=row,
             sample_period=kept.record.sample_period,
             driven_by=kept.record.driven_by.name,
@@ -172,20 +189,14 @@ def insert_baseline(connection: sqlite3.Connection, valve: int, kept: KeptBaseli
         )
 
 
-def record_in(connection: Connection, baseline: int) -> Recording | None:
-    """Return the record of the baseline of this row, if any."""
-    if not has_table(connection, "baseline_record"):
-        return None
-    row = connection.execute(
-        "SELECT sample_period, driven_by, drive, position FROM baseline_record "
-        "WHERE baseline_id = ?",
-        (baseline,),
-    ).fetchone()
-    if row is None:
-        return None
-    period, driven_by, *samples = row
-    drive, position = (np.frombuffer(one, dtype=_SAMPLE).astype(float) for one in samples)
-    return Recording(period, drive, position, driven_by=Drive[driven_by])
+def _insert_numbers(
+    connection: Connection, owner: str, row: int, numbers: Mapping[str, Measured]
+) -> None:
+    rows = [
+        {f"{owner}_id": row, "name": name, "value": one.value, "half_width": one.half_width}
+        for name, one in numbers.items()
+    ]
+    put(connection, _NUMBERS[owner], rows)
 
 
 def _baseline_columns(baseline: Baseline | None, names: Sequence[str]) -> dict[str, float | None]:
@@ -197,9 +208,16 @@ def _baseline_columns(baseline: Baseline | None, names: Sequence[str]) -> dict[s
     return dict(zip(names, values, strict=True))
 
 
-def kept_baseline_in(row: Any) -> KeptBaseline:
+def _baseline_in(row: RowMapping, names: Sequence[str]) -> Baseline | None:
+    friction, width, *sliding = (row[name] for name in names)
+    if friction is None and sliding[0] is None:
+        return None
+    return Baseline(friction, width, None if sliding[0] is None else SlidingFriction(*sliding))
+
+
+def kept_baseline_in(row: RowMapping) -> KeptBaseline:
     """Return the baseline in a row of its table, without its record."""
-    baseline, level = _baseline_in(row, _OF_BASELINE), _cell(row, "level")
+    baseline, level = _baseline_in(row, _OF_BASELINE), row["level"]
     if baseline is None:
         raise ValueError("a baseline without a friction")
     return KeptBaseline(
@@ -207,35 +225,92 @@ def kept_baseline_in(row: Any) -> KeptBaseline:
         row["time_ns"],
         row["since_ns"],
         replaced=_baseline_in(row, _OF_REPLACED),
-        by=_cell(row, "set_by") or "set_baseline",
+        by=row["set_by"] or "set_baseline",
         level=None if level is None else Level(level),
-        withdrawn=bool(_cell(row, "withdrawn")),
+        withdrawn=bool(row["withdrawn"]),
     )
 
 
-def _baseline_in(row: Any, names: Sequence[str]) -> Baseline | None:
-    friction, width, *sliding = (_cell(row, name) for name in names)
-    if friction is None and sliding[0] is None:
+def record_in(connection: Connection, baseline: int) -> Recording | None:
+    """Return the record of the baseline of this row, if any."""
+    table = tables.baseline_record
+    found = connection.execute(sa.select(table).where(table.c.baseline_id == baseline))
+    row = found.mappings().first()
+    if row is None:
         return None
-    return Baseline(friction, width, None if sliding[0] is None else SlidingFriction(*sliding))
+    drive, position = (
+        np.frombuffer(row[name], dtype=_SAMPLE).astype(float) for name in ("drive", "position")
+    )
+    return Recording(row["sample_period"], drive, position, driven_by=Drive[row["driven_by"]])
 
 
-def _cell(row: Any, name: str) -> Any:
-    """Return a cell, or None where a file of an older version has no such column."""
-    return row[name] if name in row.keys() else None  # noqa: SIM118 - a row is no mapping
+def numbers_in(
+    connection: Connection, owner: str, valve: str, first: int, last: int
+) -> dict[int, dict[str, Measured]]:
+    """Return the numbers of a valve's rows `first` to `last` of the table `owner`, by row."""
+    table, owners = _NUMBERS[owner], tables.METADATA.tables[owner]
+    query = (
+        sa.select(table)
+        .select_from(joined(table, owners, tables.valve))
+        .where(tables.valve.c.name == valve, owners.c.id.between(first, last))
+    )
+    found: defaultdict[int, dict[str, Measured]] = defaultdict(dict)
+    for row, name, value, width in connection.execute(query):
+        found[row][name] = Measured(value, width)
+    return found
+
+
+_FARTHEST = {"lowest_position": ("lower_stop", False), "highest_position": ("upper_stop", True)}
+"""Ends of the stem's motion: the stop beside each, and whether the farthest is the largest."""
+
+
+def known_numbers_in(connection: Connection, name: str, valve: Valve, since: int) -> KnownNumbers:
+    """Return what the identifications of a valve since a time (ns) say of it (`KnownNumbers`).
+
+    Those made with other parameters of the valve do not count.
+    """
+    same = json.dumps(plain(vars(valve)), sort_keys=True)
+    settings = [
+        row
+        for row, content in connection.execute(sa.select(tables.settings))
+        if json.dumps(json.loads(content).get("valve"), sort_keys=True) == same
+    ]
+    entry, number = tables.identification.c, tables.identification_number.c
+    of_valve = (
+        sa.select(entry.time_ns, number.value, number.half_width)
+        .select_from(joined(tables.identification, tables.identification_number, tables.valve))
+        .where(tables.valve.c.name == name, entry.settings_id.in_(settings))
+    )
+    newest = (entry.time_ns.desc(), entry.id.desc())
+
+    def first(named: str, since: int, *order: Any) -> tuple[int, str, Measured] | None:
+        chosen = of_valve.where(number.name == named, entry.time_ns >= since)
+        row = connection.execute(chosen.order_by(*order, *newest).limit(1)).first()
+        return None if row is None else (row[0], named, Measured(*row[1:]))
+
+    found = [first(one, since) for one in (*RATIOS, *DIFFERENCES)]
+    times = {one[1]: one[0] for one in found if one is not None}
+    for end, (stop, is_largest) in _FARTHEST.items():
+        order = number.value.desc() if is_largest else number.value
+        found.append(first(end, times.get(stop, since), order))
+    records: defaultdict[int, dict[str, Measured]] = defaultdict(dict)
+    for stamp, one, measured in filter(None, found):
+        records[stamp][one] = measured
+    known = KnownNumbers()
+    for stamp in sorted(records):
+        known = known.followed_by(records[stamp], stamp)
+    return known
 
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _place(parameter: Parameter) -> int:
-    """Place of a parameter in a result."""
-    names = [*PARAMETER_UNITS]
-    return names.index(parameter.name) if parameter.name in names else len(names)
+_PLACES = {name: place for place, name in enumerate(PARAMETER_UNITS)}
+"""Places of the parameters in a result; of any other one after them."""
 
 
-def _parameter(row: Any) -> Parameter:
+def _parameter(row: RowMapping) -> Parameter:
     shown = Parameter(
         row["name"],
         _number(row["value"]),
@@ -243,35 +318,36 @@ def _parameter(row: Any) -> Parameter:
         _number(row["half_width"]),
         Verdict(row["verdict"]),
         row["reason"],
-        published=_number(_cell(row, "published")),
+        published=_number(row["published"]),
     )
-    width = _cell(row, "uncalibrated_half_width")
+    width = row["uncalibrated_half_width"]
     if width is None:
         return shown
     return replace(shown, uncalibrated=replace(shown, standard_error=math.nan, half_width=width))
 
 
 def _entry(
-    row: Any, parameters: Sequence[Parameter], numbers: Mapping[str, Measured]
+    row: RowMapping, parameters: Sequence[Parameter], numbers: Mapping[str, Measured]
 ) -> HistoryEntry:
-    ratio = Ratio(
-        _number(row["ratio"]),
-        _number(row["ratio_low"]),
-        _number(row["ratio_high"]),
-        _cell(row, "ratio_of") or "coulomb_friction",
-        _number(_cell(row, "ratio_speed")),
-    )
+    ratio = None
+    if row["ratio"] is not None:
+        ratio = Ratio.between(
+            row["ratio"],
+            _number(row["ratio_low"]),
+            _number(row["ratio_high"]),
+            of=row["ratio_of"] or "coulomb_friction",
+            speed=_number(row["ratio_speed"]),
+        )
     limits = FrictionLimits(row["warn_ratio"], row["error_ratio"], row["low_ratio"])
-    known = None if row["ratio"] is None else ratio
     return HistoryEntry(
         time=row["time_ns"],
-        valve=KeptValve(row["name"], row["tag"]),
+        valve=KeptValve(row["valve_name"], row["tag"]),
         span=None if row["begin_ns"] is None else Span(row["begin_ns"], row["end_ns"]),
-        method=FORMER_METHODS.get(row["method"], row["method"]),
-        diagnosis=diagnosis_in(row, known, limits, any(one.value < 0 for one in parameters)),
+        method=current_name(row["method"]),
+        diagnosis=_diagnosis_in(row, ratio, limits, any(one.value < 0 for one in parameters)),
         limits=limits,
         baseline=_baseline_in(row, _OF_ENTRY),
-        sliding_speed=_number(_cell(row, "sliding_speed")),
+        sliding_speed=_number(row["sliding_speed"]),
         settings=row["content"],
         parameters={one.name: one for one in parameters},
         fit=Fit(*(_number(row[name]) for name in ("fit", "rms", "systematic_misfit"))),
@@ -283,47 +359,183 @@ def _entry(
 
 
 def frictions_in(
-    rows: Sequence[Any],
+    rows: Sequence[RowMapping],
 ) -> Iterator[tuple[int, dict[str, Parameter], float]]:
     """Gather rows of parameters, each with its identification: time, parameters, sliding speed."""
     for _, some in groupby(rows, key=lambda row: row["identification_id"]):
         several = [*some]
         parameters = {row["name"]: _parameter(row) for row in several}
-        yield several[0]["time_ns"], parameters, _number(_cell(several[0], "sliding_speed"))
+        yield several[0]["time_ns"], parameters, _number(several[0]["sliding_speed"])
 
 
 def entries_in(
     connection: Connection, valves: Sequence[str] | None, since: int, until: int
 ) -> tuple[HistoryEntry, ...]:
-    """Read identifications, oldest first; see `HistoryFile.entries`."""
-    names = sorted(name for (name,) in connection.execute("SELECT name FROM valve"))
-    wanted = names if valves is None else valves
+    """Read identifications, oldest first; see `History.entries`."""
+    if valves is None:
+        valves = sorted(connection.scalars(sa.select(tables.valve.c.name)))
     found = [
-        entry for valve in wanted for entry in _entries_of_valve(connection, (valve, since, until))
+        entry for valve in valves for entry in _entries_of_valve(connection, valve, since, until)
     ]
     return tuple(sorted(found, key=lambda entry: entry.time))
 
 
 def _entries_of_valve(
-    connection: Connection, choice: tuple[str, int, int]
+    connection: Connection, valve: str, since: int, until: int
 ) -> Iterator[HistoryEntry]:
+    time = tables.identification.c.time_ns
+    chosen = (tables.valve.c.name == valve, time >= since, time < until)
     parameters: defaultdict[int, list[Parameter]] = defaultdict(list)
-    for row in connection.execute(
-        "SELECT parameter.* FROM parameter JOIN identification ON identification.id = "
-        "identification_id JOIN valve ON valve.id = valve_id "
-        "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ?",
-        choice,
-    ):
+    of_entries = joined(tables.parameter, tables.identification, tables.valve)
+    query = sa.select(tables.parameter).select_from(of_entries).where(*chosen)
+    for row in connection.execute(query).mappings():
         parameters[row["identification_id"]].append(_parameter(row))
-    rows = connection.execute(
-        "SELECT identification.*, valve.name, valve.tag, settings.content FROM identification "
-        "JOIN settings ON settings.id = settings_id JOIN valve ON valve.id = valve_id "
-        "WHERE valve.name = ? AND time_ns >= ? AND time_ns < ? "
-        "ORDER BY time_ns, identification.id",
-        choice,
-    ).fetchall()
+    entries = (
+        sa.select(
+            tables.identification,
+            tables.valve.c.name.label("valve_name"),
+            tables.valve.c.tag,
+            tables.settings.c.content,
+        )
+        .select_from(joined(tables.identification, tables.valve, tables.settings))
+        .where(*chosen)
+        .order_by(time, tables.identification.c.id)
+    )
+    rows = connection.execute(entries).mappings().all()
     ids = [row["id"] for row in rows] or [0]
-    numbers = numbers_in(connection, "identification", choice[0], min(ids), max(ids))
+    numbers = numbers_in(connection, "identification", valve, min(ids), max(ids))
     for row in rows:
-        ordered = sorted(parameters[row["id"]], key=_place)
+        ordered = sorted(parameters[row["id"]], key=lambda one: _PLACES.get(one.name, len(_PLACES)))
         yield _entry(row, ordered, numbers.get(row["id"], {}))
+
+
+# The diagnosis: its state, and an alarm that stands
+
+
+def state_columns(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the columns of the state of a diagnosis; None where there is nothing to say."""
+    doubt, alarm, latest = diagnosis.own.doubt, diagnosis.alarm, diagnosis.latest
+    columns: dict[str, Any] = {
+        "state": diagnosis.state.name,
+        "doubt": "" if doubt is None else sentence(doubt),
+    }
+    statements = {"message": diagnosis.statement.to_dict()}
+    if doubt is not None:
+        statements["doubt"] = doubt.to_dict()
+    for name, one in (("alarm", alarm), ("latest", latest)):
+        columns |= {
+            f"{name}_level": None if one is None else int(one.level),
+            f"{name}_status_signal": None if one is None else one.status_signal.value,
+            f"{name}_state": None if one is None else one.state.name,
+            f"{name}_message": None if one is None else sentence(one.statement),
+        }
+        if one is not None:
+            statements[f"{name}_message"] = one.statement.to_dict()
+    columns["statements"] = json.dumps(statements, allow_nan=False)
+    return columns | {"alarm_time_ns": None if alarm is None else alarm.time}
+
+
+def _diagnosis_in(
+    row: RowMapping, ratio: Ratio | None, limits: FrictionLimits, is_below_zero: bool
+) -> Diagnosis:
+    """Return the diagnosis in a row of any version.
+
+    `is_below_zero` tells of a friction that the record found there. Raises ValueError for a state
+    that nobody knows.
+    """
+    level, signal = Level(row["level"]), StatusSignal(row["status_signal"])
+    if row["state"] is None:
+        return _of_former_version(
+            level, signal, row["message"], ratio, row["time_ns"], limits, is_below_zero
+        )
+    kept = json.loads(row["statements"] or "{}")
+    statement = _statement(row, kept, "message")
+    state = _state(row["state"])
+    doubt = _statement(row, kept, "doubt") if row["doubt"] else None
+    if row["alarm_state"] is None:
+        return Diagnosis(level, signal, statement, ratio, state, doubt)
+    raised, its_latest = (_statement(row, kept, f"{one}_message") for one in ("alarm", "latest"))
+    alarm = StandingAlarm(*_stated(row, "alarm"), raised, row["alarm_time_ns"])
+    of_latest, its_signal, its_state = _stated(row, "latest")
+    latest = Diagnosis(of_latest, its_signal, its_latest, ratio, its_state, doubt)
+    return Diagnosis(level, signal, statement, ratio, state, alarm=alarm, latest=latest)
+
+
+def _statement(row: RowMapping, kept: Mapping[str, Any], column: str) -> Statement:
+    """Return a statement of a row; one of version 8 has its sentence only."""
+    return Statement.from_dict(kept[column]) if column in kept else _quoted(row[column])
+
+
+def _stated(row: RowMapping, what: str) -> tuple[Level, StatusSignal, FrictionState]:
+    signal = StatusSignal(row[f"{what}_status_signal"])
+    return Level(row[f"{what}_level"]), signal, _state(row[f"{what}_state"])
+
+
+_FORMER_STATES = {
+    "PERHAPS_GROWN": FrictionState.UNCLEAR,
+    "PERHAPS_FALLEN": FrictionState.UNCLEAR,
+}
+"""States of a friction that versions 8 and before have kept, and what they are now."""
+
+
+def _state(name: str) -> FrictionState:
+    try:
+        return _FORMER_STATES.get(name) or FrictionState[name]
+    except KeyError:
+        raise ValueError(f"{name!r} is no state of a friction") from None
+
+
+# Rows of before version 9 have what is said in their sentences only, and those of before version 8
+# the state of the friction and an alarm that stands, too. Nothing else reads a sentence.
+
+_DOUBT = "the Karnopp model does not describe this valve"
+_LINK = "; the latest record cannot be compared: "
+_SCALED = re.compile(
+    "friction and spring constant have changed by one factor, which points to (.*?): check them "
+    "before any work on the packing; (.*)",
+    re.DOTALL,
+)
+_BY_SIGNAL = {
+    StatusSignal.FAILURE: FrictionState.EXCESS,
+    StatusSignal.OUT_OF_SPECIFICATION: FrictionState.COLLAPSED,
+    StatusSignal.MAINTENANCE_REQUIRED: FrictionState.GROWN,
+}
+
+
+def _quoted(message: str) -> Statement:
+    if found := _SCALED.fullmatch(message):
+        return said(Code.SCALED, scale=quoted(found[1]), of=quoted(found[2]))
+    return quoted(message)
+
+
+def _of_former_version(
+    level: Level,
+    signal: StatusSignal,
+    message: str,
+    ratio: Ratio | None,
+    time: int,
+    limits: FrictionLimits,
+    is_below_zero: bool,
+) -> Diagnosis:
+    """Return the diagnosis in a row of before version 8, with its state and alarm."""
+    raised, stood, of_record = message.partition(_LINK)
+    if not stood:
+        state = _BY_SIGNAL.get(signal, FrictionState.UNKNOWN)
+        if ratio is not None and state is FrictionState.UNKNOWN:
+            state = friction_state(ratio, limits)
+        state = FrictionState.IMPOSSIBLE if is_below_zero else state
+        return Diagnosis(level, signal, _quoted(message), ratio, state, _doubt(message))
+    of_level = FrictionState.EXCESS if level is Level.ERROR else FrictionState.GROWN
+    state, doubt = _BY_SIGNAL.get(signal, of_level), _doubt(of_record)
+    alarm = StandingAlarm(level, signal, state, _quoted(raised), time)
+    latest = Diagnosis.of(FrictionState.UNKNOWN, quoted(of_record))
+    if doubt is not None or is_below_zero:
+        own = FrictionState.IMPOSSIBLE if is_below_zero else FrictionState.UNKNOWN
+        check = StatusSignal.CHECK_FUNCTION
+        latest = Diagnosis(Level.WARN, check, quoted(of_record), None, own, doubt)
+    return Diagnosis(level, signal, quoted(message), None, state, alarm=alarm, latest=latest)
+
+
+def _doubt(message: str) -> Statement | None:
+    doubt, _, _ = message.partition(";")
+    return quoted(doubt) if doubt.startswith(_DOUBT) else None

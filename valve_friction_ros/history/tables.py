@@ -1,98 +1,348 @@
-"""The tables of the history in SQL, and what leads from an older version of them to the next."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
-from collections.abc import Iterator
-from itertools import chain
+"""The tables of the history, for SQLite and PostgreSQL alike, and what older ones lack.
 
-from valve_friction_ros.history.evidence_table import EVIDENCE_CHANGE, EVIDENCE_TABLE
-from valve_friction_ros.history.number_rows import NUMBER_TABLES
-from valve_friction_ros.history.service_tables import ALARM_RECORDINGS, ANSWERS, TOLD_LEVEL, USAGE
-
-__all__ = ["ADDED_LATE", "SCHEMA_VERSION", "statements_from"]
-
-SCHEMA_VERSION = 8
-"""The database's user_version.
-
-Version 1 has no published values, version 2 no sliding friction in baselines and ratios,
-and no half widths without calibration; version 3 has no records of baselines; version 4 does not
-say what a baseline replaced; version 5 knows nothing of the valve in service; version 6 has no keys
-that hold on several machines, and is the last one that servers never had; version 7 has the state
-of the friction and an alarm that stands in sentences only."""
-
-_SCHEMA = """
-CREATE TABLE valve (
-    id INTEGER PRIMARY KEY,
-    name TEXT NOT NULL UNIQUE,
-    tag TEXT NOT NULL
-);
-CREATE TABLE settings (
-    id INTEGER PRIMARY KEY,
-    content TEXT NOT NULL UNIQUE
-);
-CREATE TABLE identification (
-    id INTEGER PRIMARY KEY,
-    valve_id INTEGER NOT NULL REFERENCES valve,
-    time_ns INTEGER NOT NULL,
-    begin_ns INTEGER,
-    end_ns INTEGER,
-    method TEXT NOT NULL,
-    refusal TEXT,
-    fit REAL,
-    rms REAL,
-    systematic_misfit REAL,
-    warnings TEXT NOT NULL,
-    level INTEGER NOT NULL CHECK (level BETWEEN 0 AND 2),
-    status_signal TEXT NOT NULL,
-    message TEXT NOT NULL,
-    ratio REAL,
-    ratio_low REAL,
-    ratio_high REAL,
-    ratio_of TEXT,
-    ratio_speed REAL,
-    baseline REAL,
-    baseline_half_width REAL,
-    baseline_sliding_friction REAL,
-    baseline_sliding_half_width REAL,
-    baseline_sliding_speed REAL,
-    sliding_speed REAL,
-    warn_ratio REAL NOT NULL,
-    error_ratio REAL NOT NULL,
-    low_ratio REAL NOT NULL,
-    settings_id INTEGER NOT NULL REFERENCES settings,
-    software_version TEXT NOT NULL
-);
-CREATE INDEX identification_of_valve ON identification (valve_id, time_ns);
-CREATE TABLE parameter (
-    identification_id INTEGER NOT NULL REFERENCES identification ON DELETE CASCADE,
-    name TEXT NOT NULL,
-    value REAL,
-    standard_error REAL,
-    half_width REAL,
-    verdict TEXT NOT NULL,
-    reason TEXT NOT NULL,
-    published REAL,
-    uncalibrated_half_width REAL,
-    PRIMARY KEY (identification_id, name)
-) WITHOUT ROWID;
+Version 1 has no published values, version 2 no sliding friction in baselines and ratios, and no
+half widths without calibration; version 3 has no records of baselines; version 4 does not say what
+a baseline replaced; version 5 knows nothing of the valve in service; version 6 has no keys that
+hold on several machines, and is the last one that servers never had; version 7 has the state of
+the friction and an alarm that stands in sentences only; version 8 has what is said of them so, and
+knows no life of an alarm.
 """
 
-_BASELINE = """
-CREATE TABLE baseline (
-    id INTEGER PRIMARY KEY,
-    valve_id INTEGER NOT NULL REFERENCES valve,
-    time_ns INTEGER NOT NULL,
-    since_ns INTEGER NOT NULL,
-    coulomb_friction REAL CHECK (coulomb_friction > 0),
-    half_width REAL NOT NULL CHECK (half_width >= 0),
-    sliding_friction REAL CHECK (sliding_friction > 0),
-    sliding_half_width REAL CHECK (sliding_half_width >= 0),
-    sliding_speed REAL CHECK (sliding_speed > 0),
-    CHECK (coalesce(coulomb_friction, sliding_friction) IS NOT NULL)
-);
-CREATE INDEX baseline_of_valve ON baseline (valve_id, id);
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.engine import Connection, Dialect
+from sqlalchemy.schema import CreateColumn, CreateTable
+
+SCHEMA_VERSION = 9
+"""The user_version of a file; a row of `mark` on a server."""
+
+METADATA = sa.MetaData()
+"""The tables of a history."""
+
+FILE_METADATA = sa.MetaData()
+"""What a file has besides where its rows go to a server."""
+
+_INTEGER: Any = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
+_REAL: Any = sa.REAL().with_variant(postgresql.DOUBLE_PRECISION(), "postgresql")
+
+
+class _Text(sa.types.TypeDecorator[str]):
+    """A text; on a server without NUL, which no text of PostgreSQL has."""
+
+    impl = sa.Text
+    cache_ok = True
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
+        return without_nul(value) if dialect.name == "postgresql" else value
+
+
+def without_nul(value: Any) -> Any:
+    """Return a value as both databases hold it."""
+    return value.replace("\0", "\u2400") if isinstance(value, str) else value
+
+
+def _some(kind: Any, names: str, *, null: bool = True) -> list[sa.Column[Any]]:
+    return [sa.Column(name, kind, nullable=null) for name in names.split()]
+
+
+def _integers(names: str) -> list[sa.Column[Any]]:
+    return _some(_INTEGER, names, null=False)
+
+
+def _numbers(names: str) -> list[sa.Column[Any]]:
+    return _some(_REAL, names, null=False)
+
+
+def _texts(names: str) -> list[sa.Column[Any]]:
+    return _some(_Text, names, null=False)
+
+
+def _id() -> sa.Column[Any]:
+    return sa.Column("id", _INTEGER, sa.Identity(), primary_key=True)
+
+
+def _valve(*, key: bool = False) -> sa.Column[Any]:
+    return sa.Column(
+        "valve_id",
+        _INTEGER,
+        sa.ForeignKey("valve.id"),
+        primary_key=key,
+        nullable=False,
+        autoincrement=False,
+    )
+
+
+def _owner(table: str) -> sa.Column[Any]:
+    """Return the column that names the row of a table to which a row belongs, and goes with it."""
+    owner = sa.ForeignKey(f"{table}.id", ondelete="CASCADE")
+    return sa.Column(f"{table}_id", _INTEGER, owner, primary_key=True, autoincrement=False)
+
+
+def _key(name: str, kind: Any = _INTEGER) -> sa.Column[Any]:
+    return sa.Column(name, kind, primary_key=True, autoincrement=False)
+
+
+def _table(name: str, *columns: sa.schema.SchemaItem, key: Sequence[str] = ()) -> sa.Table:
+    """Declare a table; `key` are the columns of its rows' identity where its primary key is not."""
+    has_rows_of_size = name == "baseline_record"
+    numbered = has_rows_of_size or any(getattr(one, "name", None) == "id" for one in columns)
+    return sa.Table(name, METADATA, *columns, sqlite_with_rowid=numbered, info={"key": tuple(key)})
+
+
+def key_of(table: sa.Table) -> tuple[str, ...]:
+    """Return the columns by which the rows of a table are told apart."""
+    return table.info["key"] or tuple(one.name for one in table.primary_key)
+
+
+valve = _table(
+    "valve",
+    _id(),
+    sa.Column("name", _Text, nullable=False, unique=True),
+    *_texts("tag"),
+    key=["name"],
+)
+settings = _table("settings", _id(), *_texts("content"))
+identification = _table(
+    "identification",
+    _id(),
+    _valve(),
+    *_integers("time_ns"),
+    *_some(_INTEGER, "begin_ns end_ns"),
+    *_texts("method"),
+    *_some(_Text, "refusal"),
+    *_some(_REAL, "fit rms systematic_misfit"),
+    *_texts("warnings"),
+    *_integers("level"),
+    *_texts("status_signal message"),
+    *_some(_REAL, "ratio ratio_low ratio_high"),
+    *_some(_Text, "ratio_of"),
+    *_some(_REAL, "ratio_speed baseline baseline_half_width baseline_sliding_friction"),
+    *_some(_REAL, "baseline_sliding_half_width baseline_sliding_speed sliding_speed"),
+    *_numbers("warn_ratio error_ratio low_ratio"),
+    sa.Column("settings_id", _INTEGER, sa.ForeignKey("settings.id"), nullable=False),
+    *_texts("software_version"),
+    *_some(_Text, "uid state doubt"),
+    *_some(_INTEGER, "alarm_level"),
+    *_some(_Text, "alarm_status_signal alarm_state alarm_message"),
+    *_some(_INTEGER, "alarm_time_ns latest_level"),
+    *_some(_Text, "latest_status_signal latest_state latest_message statements"),
+    sa.CheckConstraint("level BETWEEN 0 AND 2"),
+    sa.Index("identification_of_valve", "valve_id", "time_ns"),
+    sa.Index("identification_uid", "valve_id", "uid", unique=True),
+    key=["valve_id", "uid"],
+)
+"""An identification; where an alarm of an earlier record stands, that alarm and what the record
+says by itself (`latest_`). The `statements` are an object of JSON; the messages beside them are for
+people who read the table."""
+
+parameter = _table(
+    "parameter",
+    _owner("identification"),
+    _key("name", _Text),
+    *_some(_REAL, "value standard_error half_width"),
+    *_texts("verdict reason"),
+    *_some(_REAL, "published uncalibrated_half_width"),
+)
+baseline = _table(
+    "baseline",
+    _id(),
+    _valve(),
+    *_integers("time_ns since_ns"),
+    *_some(_REAL, "coulomb_friction"),
+    *_numbers("half_width"),
+    *_some(_REAL, "sliding_friction sliding_half_width sliding_speed"),
+    sa.Column("set_by", _Text, nullable=False, server_default="set_baseline"),
+    *_some(_INTEGER, "level"),
+    sa.Column("withdrawn", _INTEGER, nullable=False, server_default=sa.text("0")),
+    *_some(_REAL, "replaced_coulomb_friction replaced_half_width replaced_sliding_friction"),
+    *_some(_REAL, "replaced_sliding_half_width replaced_sliding_speed"),
+    *_some(_Text, "uid"),
+    sa.CheckConstraint(
+        "coulomb_friction > 0 AND half_width >= 0 AND sliding_friction > 0 "
+        "AND sliding_half_width >= 0 AND sliding_speed > 0"
+    ),
+    sa.CheckConstraint("coalesce(coulomb_friction, sliding_friction) IS NOT NULL"),
+    sa.Index("baseline_of_valve", "valve_id", "id"),
+    sa.Index("baseline_uid", "valve_id", "uid", unique=True),
+    key=["valve_id", "uid"],
+)
+"""A change of a baseline: who set it, at which level, and what it replaced."""
+
+baseline_record = _table(
+    "baseline_record",
+    _owner("baseline"),
+    *_numbers("sample_period"),
+    *_texts("driven_by"),
+    *_some(sa.LargeBinary, "drive position", null=False),
+)
+"""Samples of the record of a baseline, single precision, the least significant byte first."""
+
+baseline_number, identification_number = (
+    _table(f"{owner}_number", _owner(owner), _key("name", _Text), *_numbers("value half_width"))
+    for owner in ("baseline", "identification")
+)
+usage = _table(
+    "usage",
+    _valve(key=True),
+    _key("renewal_ns"),
+    _key("day"),
+    _key("run", _Text),
+    *_numbers("distance"),
+    *_integers("reversals breakaways time_watched_ns"),
+    *_texts("histogram_ns"),
+    sa.CheckConstraint(
+        "distance >= 0 AND reversals >= 0 AND breakaways >= 0 AND time_watched_ns >= 0"
+    ),
+)
+"""A row for each day (since 1970, UTC) of each run of an identifier, with the packing in use.
+
+Runs that have ended become one, "", once two days have passed."""
+
+packing_renewal = _table("packing_renewal", _valve(key=True), _key("time_ns"))
+alarm_recording = _table(
+    "alarm_recording",
+    _valve(key=True),
+    *_integers("time_ns level"),
+    _key("path", _Text),
+    *_texts("message"),
+    sa.CheckConstraint("level BETWEEN 0 AND 2"),
+)
+told_level = _table(
+    "told_level",
+    _valve(key=True),
+    *_integers("level"),
+    sa.CheckConstraint("level BETWEEN 0 AND 2"),
+)
+"""The level of each valve that its alerts have told last."""
+
+alarm_event = _table(
+    "alarm_event",
+    _id(),
+    _valve(),
+    *_texts("uid"),
+    *_integers("time_ns"),
+    *_texts("kind action state_before state"),
+    *_integers("level"),
+    *_texts("status_signal message"),
+    *_some(_INTEGER, "raised_ns until_ns"),
+    *_texts("who text"),
+    sa.CheckConstraint("level BETWEEN 0 AND 2"),
+    sa.Index("alarm_event_of_valve", "valve_id", "kind", "id"),
+    sa.Index("alarm_event_time", "time_ns"),
+    sa.Index("alarm_event_uid", "valve_id", "uid", unique=True),
+    key=["valve_id", "uid"],
+)
+"""A step of an alarm, with the whole alarm from then on: the last one of a kind is the alarm."""
+
+move = _table(
+    "move",
+    _valve(key=True),
+    _key("end_ns"),
+    *_integers("begin_ns"),
+    *_some(_REAL, "diaphragm_area"),
+    *_numbers("pressure_reference start stop force force_rate speed"),
+    *_some(_REAL, "onset_force onset_position onset_rate"),
+    sa.CheckConstraint("begin_ns < end_ns AND stop != start AND speed >= 0"),
+)
+"""A move in service; its forces hold for the area and the pressure reference beside them."""
+
+evidence_reference = _table(
+    "evidence_reference",
+    _valve(key=True),
+    *_integers("time_ns"),
+    *_some(_REAL, "diaphragm_area"),
+    *_numbers("pressure_reference sliding_friction half_width speed"),
+    sa.CheckConstraint("sliding_friction > 0 AND half_width >= 0 AND speed > 0"),
+)
+"""What the moves of a valve said first since the packing was renewed."""
+
+evidence_change = _table(
+    "evidence_change",
+    _valve(key=True),
+    *_some(_REAL, "diaphragm_area"),
+    *_numbers("pressure_reference"),
+    *_integers("earliest_ns latest_ns"),
+    *_numbers("ratio low high"),
+    sa.CheckConstraint("earliest_ns <= latest_ns AND ratio > 0 AND low > 0 AND low <= high"),
+)
+"""The last change of friction that the moves of a valve have shown since then."""
+
+answer = _table(
+    "answer",
+    _id(),
+    _valve(),
+    *_numbers("travel"),
+    *_integers("stamp"),
+    *_numbers("change held"),
+    *_integers("moved settled"),
+    *_some(_REAL, "dead_time t63 t86 overshoot steady_error deviation high_deviation"),
+    *_some(_REAL, "pressure_delay pressure_t86 push pressure position"),
+    *_integers("rested pressure_rested at_stop"),
+    sa.CheckConstraint(
+        "moved IN (0, 1) AND settled IN (0, 1) AND rested IN (0, 1) "
+        "AND pressure_rested IN (0, 1) AND at_stop IN (0, 1)"
+    ),
+    sa.UniqueConstraint("valve_id", "stamp"),
+    key=["valve_id", "stamp"],
+)
+"""An answer of the stem to a step of its command, shares of the travel beside it."""
+
+mark = _table("mark", _key("name", _Text), *_texts("value"))
+"""Names of the database itself."""
+
+keeper = _table("keeper", _valve(key=True), *_texts("file"))
+"""The file that keeps a valve now."""
+
+unsent = sa.Table(
+    "unsent",
+    FILE_METADATA,
+    sa.Column("number", sa.Integer, primary_key=True),
+    *_integers("valve_id"),
+    *_texts("part key"),
+    *_integers("since"),
+    *_some(_Text, "refusal"),
+    sa.Index("unsent_row", "valve_id", "part", "key"),
+    sqlite_autoincrement=True,
+)
+"""A row for each row that was added, changed or deleted, and not sent since. A row that changes
+again gets a new number, so that what is acknowledged meanwhile is the change before."""
+
+
+@cache
+def joined(*some: sa.Table) -> Any:
+    """Return what joins tables one after the other, by their references."""
+    found: Any = some[0]
+    for table in some[1:]:
+        found = found.join(table)
+    return found
+
+
+_TIME = {
+    "sqlite": "strftime('%Y-%m-%dT%H:%M:%SZ', time_ns / 1000000000, 'unixepoch')",
+    "postgresql": "to_char(to_timestamp(time_ns / 1000000000) AT TIME ZONE 'UTC', "
+    '\'YYYY-MM-DD"T"HH24:MI:SS"Z"\')',
+}
+_CONTENT = {"sqlite": "content", "postgresql": "md5(content)"}
+"""The settings in their index: one of PostgreSQL takes no text of any length."""
+
+_VIEW = """
 CREATE VIEW friction AS
     SELECT
         identification.id AS id,
-        strftime('%Y-%m-%dT%H:%M:%SZ', time_ns / 1000000000, 'unixepoch') AS time,
+        {time} AS time,
         valve.name AS valve,
         valve.tag AS tag,
         parameter.value AS coulomb_friction,
@@ -112,128 +362,126 @@ CREATE VIEW friction AS
     LEFT JOIN parameter
         ON parameter.identification_id = identification.id AND parameter.name = 'coulomb_friction'
     LEFT JOIN parameter AS sliding
-        ON sliding.identification_id = identification.id AND sliding.name = 'sliding_friction';
+        ON sliding.identification_id = identification.id AND sliding.name = 'sliding_friction'
 """
 
-_RECORD = """
-CREATE TABLE baseline_record (
-    baseline_id INTEGER PRIMARY KEY REFERENCES baseline ON DELETE CASCADE,
-    sample_period REAL NOT NULL,
-    driven_by TEXT NOT NULL,
-    drive BLOB NOT NULL,
-    position BLOB NOT NULL
-)
-"""
-"""Samples of the record of a baseline, single precision, the least significant byte first."""
+_OF_BASELINE_2 = "id, valve_id, time_ns, since_ns, coulomb_friction, half_width"
 
-_REPLACED = """
-ALTER TABLE baseline ADD COLUMN set_by TEXT NOT NULL DEFAULT 'set_baseline';
-ALTER TABLE baseline ADD COLUMN level INTEGER;
-ALTER TABLE baseline ADD COLUMN withdrawn INTEGER NOT NULL DEFAULT 0;
-ALTER TABLE baseline ADD COLUMN replaced_coulomb_friction REAL;
-ALTER TABLE baseline ADD COLUMN replaced_half_width REAL;
-ALTER TABLE baseline ADD COLUMN replaced_sliding_friction REAL;
-ALTER TABLE baseline ADD COLUMN replaced_sliding_half_width REAL;
-ALTER TABLE baseline ADD COLUMN replaced_sliding_speed REAL;
-UPDATE baseline SET
-    (replaced_coulomb_friction, replaced_half_width, replaced_sliding_friction,
-     replaced_sliding_half_width, replaced_sliding_speed)
-    = (SELECT coulomb_friction, half_width, sliding_friction, sliding_half_width, sliding_speed
-       FROM baseline AS former
-       WHERE former.valve_id = baseline.valve_id AND former.id < baseline.id
-       ORDER BY former.id DESC LIMIT 1);
-"""
-"""Who set a baseline, at which level, and what it replaced: in an older file the row before it."""
-
-_SERVICE = ";".join(
-    (
-        NUMBER_TABLES,
-        USAGE,
-        ALARM_RECORDINGS,
-        TOLD_LEVEL,
-        EVIDENCE_TABLE,
-        EVIDENCE_CHANGE,
-        ANSWERS,
-    )
-)
-"""The tables of the valve in service."""
-
-_SHARED = """
-ALTER TABLE identification ADD COLUMN uid TEXT;
-ALTER TABLE baseline ADD COLUMN uid TEXT;
-UPDATE identification SET uid = time_ns || '-' || id;
-UPDATE baseline SET uid = time_ns || '-' || id;
-CREATE UNIQUE INDEX identification_uid ON identification (valve_id, uid);
-CREATE UNIQUE INDEX baseline_uid ON baseline (valve_id, uid);
-CREATE TABLE mark (
-    name TEXT PRIMARY KEY,
-    value TEXT NOT NULL
-);
-CREATE TABLE keeper (
-    valve_id INTEGER PRIMARY KEY REFERENCES valve,
-    file TEXT NOT NULL
-);
-"""
-"""What several files and a server need to share rows: a key of each row that holds everywhere (of
-a row from before the same in each copy of its file), names of the database itself, and the file
-that keeps a valve now."""
-
-_STATES = ";".join(
-    f"ALTER TABLE identification ADD COLUMN {name} {kind}"
-    for name, kind in {
-        "state": "TEXT",
-        "doubt": "TEXT",
-        "alarm_level": "INTEGER",
-        "alarm_status_signal": "TEXT",
-        "alarm_state": "TEXT",
-        "alarm_message": "TEXT",
-        "alarm_time_ns": "INTEGER",
-        "latest_level": "INTEGER",
-        "latest_status_signal": "TEXT",
-        "latest_state": "TEXT",
-        "latest_message": "TEXT",
-    }.items()
-)
-"""The state of the friction, what the model does not describe, and where an alarm of an earlier
-record stands, that alarm and what the record says by itself."""
-
-ADDED_LATE = (EVIDENCE_CHANGE, ANSWERS)
-"""Tables that the first files of this version lack: each writing makes what is not there."""
-
-_ADDED = {
-    "ratio_of": "TEXT",
-    "ratio_speed": "REAL",
-    "baseline_sliding_friction": "REAL",
-    "baseline_sliding_half_width": "REAL",
-    "baseline_sliding_speed": "REAL",
-    "sliding_speed": "REAL",
-}
-"""Columns of the identifications that version 3 adds."""
-
-_STEPS = {
-    1: ("ALTER TABLE parameter ADD COLUMN published REAL",),
-    2: (
-        *(f"ALTER TABLE identification ADD COLUMN {name} {kind}" for name, kind in _ADDED.items()),
-        "ALTER TABLE parameter ADD COLUMN uncalibrated_half_width REAL",
-        "DROP VIEW friction",
-        "DROP INDEX baseline_of_valve",
-        "ALTER TABLE baseline RENAME TO former_baseline",
-        *_BASELINE.split(";"),
-        "INSERT INTO baseline (id, valve_id, time_ns, since_ns, coulomb_friction, half_width) "
-        "SELECT id, valve_id, time_ns, since_ns, coulomb_friction, half_width FROM former_baseline",
+_CHANGES = {
+    3: (
+        f"INSERT INTO baseline ({_OF_BASELINE_2}) SELECT {_OF_BASELINE_2} FROM former_baseline",  # noqa: S608
         "DROP TABLE former_baseline",
     ),
-    3: (_RECORD,),
-    4: tuple(_REPLACED.split(";")),
-    5: tuple(_SERVICE.split(";")),
-    6: tuple(_SHARED.split(";")),
-    7: tuple(_STATES.split(";")),
+    5: (
+        """
+        UPDATE baseline SET
+            (replaced_coulomb_friction, replaced_half_width, replaced_sliding_friction,
+             replaced_sliding_half_width, replaced_sliding_speed)
+            = (SELECT coulomb_friction, half_width, sliding_friction, sliding_half_width,
+                   sliding_speed
+               FROM baseline AS former
+               WHERE former.valve_id = baseline.valve_id AND former.id < baseline.id
+               ORDER BY former.id DESC LIMIT 1)
+        """,
+    ),
+    7: (
+        "UPDATE identification SET uid = time_ns || '-' || id",
+        "UPDATE baseline SET uid = time_ns || '-' || id",
+    ),
 }
-"""What leads from a version to the next one."""
+"""What a version has changed beside what it has added: baselines without F_c, what a baseline
+replaced, which in an older file is the row before it, and keys of rows that are the same in each
+copy of their file."""
 
 
-def statements_from(version: int) -> Iterator[str]:
-    """Return the statements that lead from a version of the tables to the present; 0: no tables."""
-    tables = (_SCHEMA, _BASELINE, _RECORD, _REPLACED, _SERVICE, _SHARED, _STATES)
-    steps = (_STEPS[one] for one in range(version, SCHEMA_VERSION) if version)
-    return filter(str.strip, chain(*steps) if version else ";".join(tables).split(";"))
+def bring_up_to_date(connection: Connection, version: int) -> None:
+    """Make the tables of a new history (version 0), or add to those of a version what they lack.
+
+    Within a transaction. What a version has added is what its tables lack of the declared ones;
+    beside that a few have changed what was there.
+    """
+    do, database = connection.exec_driver_sql, connection.dialect.name
+    if 0 < version < 3:  # there a baseline must have F_c
+        do("DROP VIEW friction")
+        do("DROP INDEX baseline_of_valve")
+        do("ALTER TABLE baseline RENAME TO former_baseline")
+    METADATA.create_all(connection)
+    if version:
+        for table in METADATA.sorted_tables:
+            _add_lacking(connection, table)
+        for statement in (one for of, some in _CHANGES.items() if version < of for one in some):
+            do(statement)
+    else:
+        do(f"CREATE UNIQUE INDEX settings_content ON settings ({_CONTENT[database]})")
+    if version < 3:
+        do(_VIEW.format(time=_TIME[database]))
+
+
+def _add_lacking(connection: Connection, table: sa.Table) -> None:
+    for column in _lacking(connection, table):
+        definition = CreateColumn(column).compile(dialect=connection.dialect)
+        connection.exec_driver_sql(f"ALTER TABLE {table.name} ADD COLUMN {definition}")
+    for index in table.indexes:
+        index.create(connection, checkfirst=True)
+
+
+def _lacking(connection: Connection, table: sa.Table) -> list[sa.Column[Any]]:
+    found = {one["name"] for one in sa.inspect(connection).get_columns(table.name)}
+    return [column for column in table.c if column.name not in found]
+
+
+def show_as_of_now(connection: Connection) -> None:
+    """Have an older history look like one of this version, to this connection alone.
+
+    What its tables lack is NULL in temporary views before them; tables that it lacks are empty.
+    """
+    prefix = "main." if connection.dialect.name == "sqlite" else ""
+    there = set(sa.inspect(connection).get_table_names())
+    for table in METADATA.sorted_tables:
+        if table.name not in there:
+            columns = [sa.Column(one.name, one.type) for one in table.c]
+            empty = sa.Table(table.name, sa.MetaData(), *columns, prefixes=["TEMPORARY"])
+            connection.execute(CreateTable(empty))
+            continue
+        added = [
+            sa.cast(sa.null(), one.type).label(one.name) for one in _lacking(connection, table)
+        ]
+        if added:
+            former = sa.select(sa.literal_column("*"), *added).select_from(
+                sa.text(prefix + table.name)
+            )
+            text = former.compile(dialect=connection.dialect)
+            connection.exec_driver_sql(f"CREATE TEMPORARY VIEW {table.name} AS {text}")
+
+
+@cache
+def _insertion(database: str, table: sa.Table, names: tuple[str, ...], is_kept: bool) -> Any:
+    """Return the statement of `put`, which is made once: a transaction is not held up by it."""
+    dialect: Any = postgresql if database == "postgresql" else sqlite
+    insert, key = dialect.insert(table), key_of(table)
+    changed = {name: insert.excluded[name] for name in names if name not in key}
+    if is_kept or not changed:
+        return insert.on_conflict_do_nothing()
+    return insert.on_conflict_do_update(index_elements=key, set_=changed)
+
+
+def put(
+    connection: Connection,
+    table: sa.Table,
+    rows: Sequence[dict[str, Any]],
+    *,
+    is_kept: bool = False,
+) -> None:
+    """Insert rows, mappings of the same columns.
+
+    Where a row is there with the same key, the new values take the place of its own; one that
+    `is_kept` stays as it is.
+    """
+    if rows:
+        insert = _insertion(connection.dialect.name, table, tuple(rows[0]), is_kept)
+        connection.execute(insert, list(rows))
+
+
+def has_table(connection: Connection, table: sa.Table) -> bool:
+    """Return whether a history has a table."""
+    return sa.inspect(connection).has_table(table.name)

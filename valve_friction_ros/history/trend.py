@@ -1,23 +1,41 @@
-"""How the friction of a valve drifts, and when it is expected to cross a limit."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The history of a valve as values, how its friction drifts, and when it will cross a limit."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.baseline import Baseline
-from valve_friction_ros.health.comparison import friction_words
+from valve_friction_ros.health.comparison import friction_name
 from valve_friction_ros.health.diagnosis import FrictionLimits
-from valve_friction_ros.history.entry import FrictionPoint, trended
-from valve_friction_ros.history.scattered_line import LEAST_ESTIMATES, ScatteredLine, fit_line
+from valve_friction_ros.health.measured import DatedNumber
+from valve_friction_ros.history.entry import (
+    AlarmRecording,
+    HistoryEntry,
+    KeptBaseline,
+    KeptValve,
+    trended,
+)
+from valve_friction_ros.identification import SLIDING
 from valve_friction_ros.identification.trust.student import student_quantile
 from valve_friction_ros.model.checks import require_non_negative
-
-__all__ = ["MONTH", "Crossing", "Limit", "Trend", "trend_of"]
+from valve_friction_ros.response import ResponseSummary, summarised
+from valve_friction_ros.streams import utc
+from valve_friction_ros.usage import ValveUsage
+from valve_friction_ros.wording import number_and_width
 
 DAY = 86_400e9
 """Nanoseconds of a day."""
@@ -38,6 +56,147 @@ _OUTLIER = 0.001
 
 _MOST_OUTLIERS = 0.1
 """Largest share of the days left out as outliers. Chosen: more would be a change, not outliers."""
+
+LEAST_ESTIMATES = 4
+"""Fewest estimates of a line: two more than it has parameters."""
+_HALVINGS = 60
+
+LIMIT_NAMES = {"warn_ratio": "worth maintenance", "error_ratio": "excess", "low_ratio": "may leak"}
+"""What the limits of the friction mean."""
+
+
+class ScatteredLine(NamedTuple):
+    """A line y = level + slope·(t − centre), with its uncertainty.
+
+    Attributes
+    ----------
+    centre : float
+        Time at which level and slope are uncorrelated.
+    level, slope : float
+        Its parameters.
+    level_error, slope_error : float
+        Their standard errors.
+    scatter : float
+        Standard deviation between estimates beyond their own errors.
+    freedom : int
+        Degrees of freedom.
+    """
+
+    centre: float
+    level: float
+    slope: float
+    level_error: float
+    slope_error: float
+    scatter: float
+    freedom: int
+
+    @property
+    def quantile(self) -> float:
+        """Half width of a 95 % interval in standard errors."""
+        return student_quantile(0.975, self.freedom)
+
+    @property
+    def slope_half_width(self) -> float:
+        """Half the width of the slope's 95 % interval."""
+        return self.quantile * self.slope_error
+
+    def at(self, time: Any) -> Any:
+        """Return the line at a time, or at an array of times."""
+        return self.level + self.slope * (time - self.centre)
+
+    def half_width(self, time: Any) -> Any:
+        """Return half the width of the line's 95 % interval there."""
+        away = time - self.centre
+        return self.quantile * np.hypot(self.level_error, self.slope_error * away)
+
+    def crossing(self, level: float, level_error: float) -> tuple[float, float, float] | None:
+        """Return when the line reaches a level with a standard error: time and 95 % interval.
+
+        By Fieller: the interval holds the times at which line and level do not differ at the 5 %
+        level. It is finite exactly where the slope's own interval excludes zero; None elsewhere.
+        """
+        gap, factor = level - self.level, self.quantile**2
+        a = self.slope**2 - factor * self.slope_error**2
+        if a <= 0:
+            return None
+        c = gap**2 - factor * (self.level_error**2 + level_error**2)
+        root = math.sqrt(max((self.slope * gap) ** 2 - a * c, 0.0))
+        ends = sorted((self.slope * gap + sign * root) / a for sign in (-1.0, 1.0))
+        return (
+            self.centre + gap / self.slope,
+            self.centre + ends[0],
+            self.centre + ends[1],
+        )
+
+
+def _misfit(
+    scatter: float,
+    times: NDArray[np.float64],
+    values: NDArray[np.float64],
+    errors: NDArray[np.float64],
+) -> tuple[float, float, float, float, float]:
+    """Fit at a given scatter; centre, level, slope, total weight about the line, and χ²."""
+    weights = 1.0 / (errors**2 + scatter**2)
+    total = weights.sum()
+    centre = float(weights @ times / total)
+    level = float(weights @ values / total)
+    away = times - centre
+    spread = float(weights @ away**2)
+    slope = float(weights @ (away * values) / spread)
+    residual = values - level - slope * away
+    return centre, level, slope, spread, float(weights @ residual**2)
+
+
+def fit_line(
+    times: NDArray[np.float64], values: NDArray[np.float64], errors: NDArray[np.float64]
+) -> ScatteredLine:
+    """Fit a line to estimates with errors of their own and a common scatter beside them.
+
+    The scatter is the one with which χ² is as large as its degrees of freedom (Paule and Mandel),
+    zero where it is not that large without any. The standard errors are those of Knapp and
+    Hartung, scaled by √(χ²/freedom), but never down; with them belongs Student's t.
+
+    Parameters
+    ----------
+    times, values, errors : ndarray of float, shape (n,)
+        Times, not all equal; estimates; their standard errors. Errors below 1e-9 of the largest
+        value count as that much.
+
+    Returns
+    -------
+    ScatteredLine
+        The line.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than `LEAST_ESTIMATES`, or the times are all equal.
+    """
+    if times.size < LEAST_ESTIMATES or np.ptp(times) == 0:
+        raise ValueError(f"a line needs {LEAST_ESTIMATES} estimates at several times")
+    unit = float(np.abs(values).max()) or 1.0
+    values, errors = values / unit, np.maximum(errors / unit, 1e-9)
+    freedom = times.size - 2
+    scatter = 0.0
+    if _misfit(0.0, times, values, errors)[-1] > freedom:
+        highest = float(np.ptp(values)) + float(errors.max())
+        lowest, highest = 0.0, 2 * highest
+        for _ in range(_HALVINGS):  # the misfit falls with the scatter
+            scatter = 0.5 * (lowest + highest)
+            is_small = _misfit(scatter, times, values, errors)[-1] < freedom
+            lowest, highest = (lowest, scatter) if is_small else (scatter, highest)
+    centre, level, slope, spread, misfit = _misfit(scatter, times, values, errors)
+    total = float((1.0 / (errors**2 + scatter**2)).sum())
+    scale = unit * math.sqrt(max(misfit / freedom, 1.0))
+    return ScatteredLine(
+        centre,
+        unit * level,
+        unit * slope,
+        scale / math.sqrt(total),
+        scale / math.sqrt(spread),
+        unit * scatter,
+        freedom,
+    )
 
 
 class Limit(Enum):
@@ -85,7 +244,7 @@ class Trend:
     @property
     def what(self) -> str:
         """What drifts, in words."""
-        return friction_words(self.of, self.speed)
+        return str(friction_name(self.of, self.speed))
 
     @property
     def drift(self) -> float:
@@ -114,7 +273,7 @@ class _Days(NamedTuple):
         return _Days(*(np.delete(one, index) for one in self))
 
 
-def _days(points: Sequence[FrictionPoint]) -> _Days:
+def _days(points: Sequence[DatedNumber]) -> _Days:
     """Combine the points of each day (UTC) to one point: their weighted mean.
 
     The records of one day may overlap, and share temperature and load.
@@ -181,7 +340,7 @@ def _crossing(
 
 
 def trend_of(
-    points: Sequence[FrictionPoint],
+    points: Sequence[DatedNumber],
     baseline: Baseline | None = None,
     limits: FrictionLimits | None = None,
 ) -> Trend | None:
@@ -211,3 +370,64 @@ def trend_of(
     speed = math.nan if baseline is None or not baseline.sliding else baseline.sliding.speed
     of = trended(baseline)
     return Trend(line, days.times.size - outliers, outliers, begin, end, crossing, of, speed)
+
+
+def drift_text(trend: Trend) -> str:
+    """Return the drift with its interval, and when a limit is expected to be crossed."""
+    value, width = number_and_width(trend.drift, trend.half_width)
+    text = f"{'+' if trend.drift > 0 else ''}{value} {width} N a month"
+    if trend.crossing is None:
+        return text
+    when = utc(trend.crossing.time)
+    return f"{text}; {LIMIT_NAMES[trend.crossing.limit.value]} expected {when:%Y-%m-%d}"
+
+
+def end_of_trend(trend: Trend) -> int:
+    """Return the time up to which a trend is drawn, ns."""
+    if trend.crossing is None:
+        return trend.end
+    return min(trend.crossing.latest, trend.end + 2 * (trend.end - trend.begin))
+
+
+def friction_of(baseline: Baseline | None, of: str) -> float | None:
+    """Return the friction of a baseline by its name, N; None where it has none."""
+    if baseline is None:
+        return None
+    if of == SLIDING:
+        return None if baseline.sliding is None else baseline.sliding.value
+    return baseline.coulomb_friction
+
+
+@dataclass(frozen=True)
+class ValveHistory:
+    """Part of one valve's history.
+
+    Attributes
+    ----------
+    valve : KeptValve
+        The valve.
+    entries : tuple of HistoryEntry
+        Its identifications, oldest first; at least one.
+    set_baseline : KeptBaseline or None
+        The last baseline that was set; the trend begins with it.
+    trend : Trend or None
+        Drift of the results of the last method, against the last baseline and limits. Two methods
+        may differ by themselves, so a trend uses the results of one method.
+    baselines : tuple of KeptBaseline
+        Each change of its baseline, oldest first, without records.
+    usage : ValveUsage
+        What the valve has done, at any time.
+    alarms : tuple of AlarmRecording
+        The recordings of its alarms, oldest first.
+    response : ResponseSummary
+        Its answers to steps of its command, with the travel of the last one.
+    """
+
+    valve: KeptValve
+    entries: tuple[HistoryEntry, ...]
+    set_baseline: KeptBaseline | None
+    trend: Trend | None
+    baselines: tuple[KeptBaseline, ...] = ()
+    usage: ValveUsage = field(default_factory=ValveUsage)
+    alarms: tuple[AlarmRecording, ...] = ()
+    response: ResponseSummary = field(default_factory=lambda: summarised(()))

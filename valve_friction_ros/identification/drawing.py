@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a method offers to figures and reports: data that they draw for every method alike."""
 
 from collections.abc import Mapping
@@ -9,8 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.valve import Valve
-
-__all__ = ["Curve", "Drawing", "Exhibit", "Panel"]
 
 
 class Curve(NamedTuple):
@@ -24,12 +31,15 @@ class Curve(NamedTuple):
         A line, ``-`` or ``--``, or a marker: ``o``, ``^`` or ``v``.
     label : str
         Name in the legend; empty for none.
+    half_width : array_like or None
+        Half the interval of each y: bars at markers, a band about a line.
     """
 
     x: ArrayLike
     y: ArrayLike
     style: str = "-"
     label: str = ""
+    half_width: ArrayLike | None = None
 
     @property
     def is_line(self) -> bool:

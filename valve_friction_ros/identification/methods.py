@@ -1,26 +1,30 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The methods of identification by name; all have the same arguments and return type."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Protocol
 
+from valve_friction_ros.identification.engine.imperfections import Profile
+from valve_friction_ros.identification.engine.method import identify_bench, identify_plant
 from valve_friction_ros.identification.published import method as published
-from valve_friction_ros.identification.refined import method as refined
 from valve_friction_ros.identification.result import Result
-from valve_friction_ros.identification.robust import method as robust
-from valve_friction_ros.identification.settings import DEFAULT_METHOD, IdentificationSettings
+from valve_friction_ros.identification.settings import (
+    DEFAULT_METHOD,
+    IdentificationSettings,
+    current_name,
+)
 from valve_friction_ros.identification.signature import force_balance as signature
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-
-__all__ = [
-    "FORMER_METHODS",
-    "METHODS",
-    "Method",
-    "identify",
-    "method_named",
-    "method_used",
-]
 
 
 class Method(Protocol):
@@ -32,67 +36,36 @@ class Method(Protocol):
         """Identify a record; raise RefusalError if it does not determine the friction."""
 
 
-BEST = "best"
-"""Name of the choice between ``robust`` and ``refined``."""
-
-
-def identify_best(
-    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
-) -> Result:
-    """Identify with ``robust``; with ``refined`` where the settings ask for what only that has.
-
-    These are a known position bias and a known static friction. The result names the method that
-    was used. It raises RefusalError as that method does.
-    """
-    settings = settings or IdentificationSettings()
-    return METHODS[method_used(BEST, settings)](recording, valve, settings)
-
-
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        BEST: identify_best,
-        robust.METHOD: robust.identify_robust,
-        refined.METHOD: refined.identify_refined,
+        Profile.PLANT.value: identify_plant,
+        Profile.BENCH.value: identify_bench,
         published.METHOD: published.identify_published,
         signature.METHOD: signature.identify_signature,
     }
 )
-"""``best``: ``robust`` wherever it applies; ``robust``: with the imperfections of a plant in the
-fit; ``refined``: the Karnopp model alone; ``published``: the paper's model 1; ``signature``: its
-model 2."""
-
-FORMER_METHODS: Mapping[str, str] = MappingProxyType(
-    {"sweep": refined.METHOD, "force_balance": signature.METHOD}
-)
-"""Names that files of earlier versions use, and what they are called now."""
-
-
-def method_used(name: str, settings: IdentificationSettings) -> str:
-    """Return the name of the method that identifies with these settings: ``best`` is a choice."""
-    if name != BEST:
-        return name
-    return refined.METHOD if robust.has_no_place_for(settings) else robust.METHOD
+"""``plant``: with the imperfections of a plant in the fit; ``bench``: the Karnopp model alone;
+``published``: the paper's model 1; ``signature``: its model 2."""
 
 
 def method_named(name: str) -> Method:
-    """Return the method of this name.
+    """Return the method of this name; those of earlier versions are understood.
 
     Raises
     ------
     ValueError
         If no method has this name; the message lists the names.
     """
-    if name not in METHODS:
-        former = FORMER_METHODS.get(name)
-        hint = f"it is now called {former!r}" if former else f"choose from {', '.join(METHODS)}"
-        raise ValueError(f"there is no method {name!r}: {hint}")
-    return METHODS[name]
+    current = current_name(name)
+    if current not in METHODS:
+        raise ValueError(f"there is no method {name!r}: choose from {', '.join(METHODS)}")
+    return METHODS[current]
 
 
 def identify(
     recording: Recording,
     valve: Valve,
-    settings: IdentificationSettings | None = None,
+    settings: IdentificationSettings | str | None = None,
     method: str = DEFAULT_METHOD,
 ) -> Result:
     """Identify the friction of a valve from a recording.
@@ -103,12 +76,13 @@ def identify(
         Pressure and stem position, several strokes in both directions.
     valve : Valve
         Geometry.
-    settings : IdentificationSettings, optional
-        What is known beforehand, and the settings of the sweep.
+    settings : IdentificationSettings or str, optional
+        What is known beforehand, and the settings of the sweep; or the name of the method, where
+        there is nothing to set.
     method : str
-        ``best``; ``robust``, with the imperfections of a plant in the fit; ``refined``, with the
-        Karnopp model alone; ``published``, the paper's model 1; or ``signature``, the paper's
-        model 2, from a slow triangular wave.
+        ``plant``, with the imperfections of a plant in the fit; ``bench``, with the Karnopp model
+        alone; ``published``, the paper's model 1; or ``signature``, the paper's model 2, from a
+        slow triangular wave.
 
     Returns
     -------
@@ -137,4 +111,6 @@ def identify(
     >>> low < 150.0 < high
     True
     """
-    return method_named(name=method)(recording, valve, settings)
+    if isinstance(settings, str):
+        return method_named(settings)(recording, valve)
+    return method_named(method)(recording, valve, settings)

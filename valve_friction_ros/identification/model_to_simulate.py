@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A model to simulate from identified values; substitutes replace what was not identified."""
 
 import math
@@ -7,10 +16,8 @@ from typing import NamedTuple
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.units import CLOCK_OFFSET, UNITS
+from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-
-__all__ = ["IdentifiedModel", "identified_model"]
 
 _NEEDED = ("coulomb_friction", "spring_constant")
 _NAMES = tuple(field.name for field in fields(KarnoppParameters))
@@ -94,9 +101,5 @@ def identified_model(
             "the model takes F_s equal to F_c"
         )
         found["static_friction"] = found["coulomb_friction"]
-    if found.get(CLOCK_OFFSET):
-        notes.append(
-            f"{CLOCK_OFFSET} is not part of the model: it belongs to the clocks of the record"
-        )
     model = {name: value for name, value in found.items() if name in _NAMES}
     return IdentifiedModel(KarnoppParameters(**model), tuple(notes))

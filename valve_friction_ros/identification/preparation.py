@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Compilation of what the methods run, before the first record comes."""
 
 import numpy as np
@@ -11,8 +20,6 @@ from valve_friction_ros.model import (
     compile_kernels,
     simulate,
 )
-
-__all__ = ["compile_methods"]
 
 
 def compile_methods() -> None:

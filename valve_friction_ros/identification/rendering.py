@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Table, page and frame of a result, from the mapping that `Result.to_dict` returns."""
 
 import html
@@ -8,24 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from valve_friction_ros.identification.trust.rounding import two_digits
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict
 from valve_friction_ros.identification.units import column_suffix
+from valve_friction_ros.wording import two_digits
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = [
-    "frame_of",
-    "html_of",
-    "parameter_cells",
-    "parameter_columns",
-    "parameter_mapping",
-    "plain",
-    "table_of",
-    "text_of",
-    "two_digits",
-]
 
 _HEADER = ("parameter", "value", "± 95 %", "unit", "verdict", "published")
 _ALIGNED_RIGHT = (1, 2, 5)

@@ -1,8 +1,17 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The result: what every method of identification returns."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,36 +19,59 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification import rendering
 from valve_friction_ros.identification.drawing import Drawing, Exhibit
+from valve_friction_ros.identification.friction_drawing import (
+    FRICTION_CURVE,
+    IMPERFECTIONS_FOUND,
+    friction_drawing,
+)
 from valve_friction_ros.identification.published.estimate import Estimate
+from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
 from valve_friction_ros.identification.trust.calibration import with_calibration
+from valve_friction_ros.identification.trust.correlation import CORRELATION
 from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.model_comparison import (
+    ModelComparison,
+    models_compared,
+)
 from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
 from valve_friction_ros.identification.trust.verdict import Parameter
+from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.simulation import simulate
 from valve_friction_ros.model.valve import Valve
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["Result", "StemComparison"]
-
 
 class StemComparison(NamedTuple):
-    """Measured position, as the identification took it, and the model's, m, shape (m,) each."""
+    """Measured position, as the identification took it, and the model's.
+
+    Attributes
+    ----------
+    sample_period : float
+        Time between two samples, s.
+    measured, simulated : ndarray of float, shape (m,)
+        Positions, m.
+    start : float
+        Time of the first sample since the record began, s.
+    """
 
     sample_period: float
     measured: NDArray[np.float64]
     simulated: NDArray[np.float64]
+    start: float = 0.0
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Time of each sample since the first one, s, shape (m,)."""
-        return np.arange(self.measured.size, dtype=np.float64) * self.sample_period
+        """Time of each sample since the record began, s, shape (m,)."""
+        steps = np.arange(self.measured.size, dtype=np.float64)
+        return self.start + steps * self.sample_period
 
     @property
     def residual(self) -> NDArray[np.float64]:
@@ -76,7 +108,7 @@ class Result:
     parameters : mapping of str to Parameter
         By name: those of `UNITS`, the extensions that the record demanded, `sliding_friction`. The
         uncertainties of area and sensor scales in `settings` are in their intervals, and what its
-        stated values contradict is weak at most.
+        stated values contradict, or what depends on an assumed area, is weak at most.
     fit : float
         Share of the stem's movement that the model reproduces, at most 1; of the force where no
         stem is simulated.
@@ -102,6 +134,8 @@ class Result:
     sliding_speed : float
         Mean speed of the stem over the distance, ∫|v|·|dx| / ∫|dx|, m/s: the speed that
         `sliding_friction` belongs to; nan where it is unknown.
+    stated_by : IdentificationSettings or None
+        The settings whose stated values have been applied, once: a changed copy has them already.
 
     Examples
     --------
@@ -135,19 +169,21 @@ class Result:
     exhibit: Exhibit | None = field(default=None, repr=False)
     stem: StemComparison | None = field(default=None, repr=False)
     sliding_speed: float = math.nan
+    stated_by: IdentificationSettings | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Apply calibration and stated values, for every method; freeze the mappings."""
         parameters, evidence = with_calibration(
             self.parameters, self.evidence, self.settings, self.recording.driven_by
         )
-        parameters, told, sentences = with_stated(
-            parameters, self.settings.stated, self.valve, self.recording
-        )
-        if told:
-            evidence[CONTRADICTED] = told
-        new = (each for each in sentences if each not in self.warnings)
-        object.__setattr__(self, "warnings", (*new, *self.warnings))
+        if self.stated_by != self.settings:  # else a changed copy, of a result that has
+            parameters, told, sentences = with_stated(
+                parameters, self.settings.stated, self.settings.assumed, self.valve, self.recording
+            )
+            if told:
+                evidence[CONTRADICTED] = told
+            object.__setattr__(self, "warnings", (*sentences, *self.warnings))
+            object.__setattr__(self, "stated_by", self.settings)
         object.__setattr__(self, "parameters", frozen(parameters))
         object.__setattr__(self, "evidence", frozen(evidence))
 
@@ -155,6 +191,196 @@ class Result:
     def values(self) -> dict[str, float]:
         """The identified values by name; nan where a parameter is not identifiable."""
         return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    def difference(self, other: "Result") -> dict[str, tuple[float, float]]:
+        """Return this result less another one of the same sensors, by parameter.
+
+        Each is the difference and half the width of its 95 % interval, SI units. Errors of area and
+        sensor scales are common to both and left out; the others are taken as independent.
+        Parameters that one of the two does not know are not there.
+        """
+        found = {}
+        for name, one in self.parameters.items():
+            if name not in other.parameters:
+                continue
+            now, before = one.without_calibration, other.parameters[name].without_calibration
+            difference = now.value - before.value
+            width = math.hypot(now.half_width, before.half_width)
+            if math.isfinite(difference) and math.isfinite(width):
+                found[name] = (difference, width)
+        return found
+
+    def correlation(self) -> "pd.DataFrame":
+        """Return how the errors of the numbers go together, −1 to 1.
+
+        It is that of the most probable place, where the model is taken as linear.
+
+        Raises
+        ------
+        RefusalError
+            If the method tells none: the published one and the signature's judge each number alone.
+        """
+        import pandas as pd  # noqa: PLC0415 - slow to import
+
+        found: Any = self.evidence.get(CORRELATION)
+        if found is None:
+            raise RefusalError(
+                f"the method {self.method} tells no correlation: use the method plant or bench"
+            )
+        return pd.DataFrame(found["matrix"], found["names"], found["names"])
+
+    def covariance(self) -> "pd.DataFrame":
+        """Return the covariance of the numbers that are known, SI units.
+
+        The deviations are the standard errors of the parameters, which hold all that widens their
+        intervals, the correlation is that of `correlation`. A parameter that is fixed or not
+        identifiable is not there.
+
+        Raises
+        ------
+        RefusalError
+            If the method tells no correlation.
+        """
+        whole = self.correlation()
+        errors = {
+            name: one.standard_error
+            for name, one in self.parameters.items()
+            if name in whole.index and one.standard_error > 0
+        }
+        whole = whole.loc[list(errors), list(errors)]
+        deviation = np.array(list(errors.values()))
+        return whole * np.outer(deviation, deviation)
+
+    def against(self, other: "Result") -> ModelComparison:
+        """Return how much more probable this model is than that of another result of the record.
+
+        Parameters
+        ----------
+        other : Result
+            Another method, or other settings, with the same record.
+
+        Returns
+        -------
+        ModelComparison
+            The evidence ratio; ``str`` gives it in words.
+
+        Raises
+        ------
+        RefusalError
+            If one of the two simulated no stem.
+        ValueError
+            If they are of different records.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import valve_friction_ros as vf
+        >>> valve = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+        >>> packing = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+        >>> pressure = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
+        >>> stem = vf.simulate(valve, packing, pressure, sample_period=0.01)
+        >>> noise = vf.SensorNoise(position=5e-6, seed=1)
+        >>> record = noise.applied_to(vf.Recording(0.01, pressure, stem.position))
+        >>> whole = vf.identify(record, valve, "bench")
+        >>> dry = vf.IdentificationSettings(fixed={"viscous_friction": 0.0})
+        >>> compared = whole.against(vf.identify(record, valve, dry, "bench"))
+        >>> compared.support.name
+        'VERY_STRONG'
+        """
+        mine, others = self.stem, other.stem
+        if mine is None or others is None:
+            raise RefusalError("a model without a simulated stem cannot be compared: use bench")
+        if self.recording is not other.recording and not (
+            np.array_equal(self.recording.position, other.recording.position)
+            and np.array_equal(self.recording.drive, other.recording.drive)
+        ):
+            raise ValueError("the two results are of different records: compare models of one")
+        begin = max(mine.start, others.start)
+        end = min(float(mine.time[-1]), float(others.time[-1]))
+        grid = np.arange(begin, end, self.recording.sample_period)
+        residuals = tuple(np.interp(grid, one.time, one.residual) for one in (mine, others))
+        return models_compared(
+            (residuals[0], residuals[1]),
+            (_free_parameters(self), _free_parameters(other)),
+            (_describes(self), _describes(other)),
+        )
+
+    def stem_band(
+        self, drive: NDArray[np.float64], sample_period: float, draws: int = 40
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return between which positions the simulated stem lies, as far as its model is known.
+
+        Parameters
+        ----------
+        drive : ndarray of float, shape (n,)
+            Actuator pressure, Pa, or force, N, as in the record.
+        sample_period : float
+            Time between two samples, s.
+        draws : int
+            Models that are drawn by the covariance of the parameters.
+
+        Returns
+        -------
+        tuple of ndarray of float, shape (n,)
+            Ends of the 95 % interval at each sample, m. What the model leaves of the record, and
+            noise of the sensor, come on top.
+
+        Raises
+        ------
+        RefusalError
+            If there is no model, or the method tells no correlation.
+        """
+        model, spread = self.simulated_model(), self.covariance()
+        names = [one.name for one in fields(model) if one.name in spread.index]
+        errors = spread.loc[names, names].to_numpy()
+        centre = np.array([getattr(model, name) for name in names])
+        random = np.random.default_rng(0)
+        stems = []
+        for values in random.multivariate_normal(centre, errors, draws, check_valid="ignore"):
+            drawn = dict(zip(names, values.tolist(), strict=True))
+            least = {name: 0.0 for name in names if name != "spring_preload"}
+            drawn |= {name: max(drawn[name], bound) for name, bound in least.items()}
+            coulomb = drawn.get("coulomb_friction", model.coulomb_friction)
+            slip = model.static_friction - model.coulomb_friction
+            static = drawn.get("static_friction", coulomb + slip)
+            drawn["static_friction"] = max(static, coulomb)
+            one = replace(model, **drawn)
+            stems.append(simulate(self.valve, one, np.asarray(drive), sample_period).position)
+        low, high = np.quantile(stems, [0.025, 0.975], axis=0)
+        return low, high
+
+    def simulate(self, drive: NDArray[np.float64], sample_period: float) -> NDArray[np.float64]:
+        """Simulate the identified model under a drive, from rest.
+
+        Parameters
+        ----------
+        drive : ndarray of float, shape (n,)
+            Actuator pressure, Pa, or force, N, as in the record.
+        sample_period : float
+            Time between two samples, s.
+
+        Returns
+        -------
+        ndarray of float, shape (n,)
+            Stem position, m.
+
+        Raises
+        ------
+        RefusalError
+            If the record did not determine a model.
+        """
+        return simulate(
+            self.valve, self.simulated_model(), np.asarray(drive, np.float64), sample_period
+        ).position
+
+    def simulated_model(self) -> KarnoppParameters:
+        """Return the model to simulate; raises RefusalError if the record determined none."""
+        if self.model is None:
+            raise RefusalError(
+                "the record did not determine a model to simulate: identify another one, or fix "
+                "what it leaves open"
+            )
+        return self.model
 
     @property
     def estimate(self) -> Estimate | None:
@@ -168,10 +394,13 @@ class Result:
 
     @property
     def drawing(self) -> Drawing:
-        """What is drawn of the exhibit."""
-        if self.exhibit is None:
-            return Drawing()
-        return self.exhibit.drawing(self.parameters, self.valve)
+        """What is drawn of the evidence: the friction curve where there is one, or the exhibit."""
+        own = self.exhibit and self.exhibit.drawing(self.parameters, self.valve)
+        if FRICTION_CURVE not in self.evidence:
+            return own or Drawing()
+        return friction_drawing(
+            own or Drawing(), self.evidence, self.parameters, self.model, self.sliding_speed
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as a mapping of plain values, SI units; None replaces nan and infinity.
@@ -240,3 +469,14 @@ class Result:
         from valve_friction_ros.figures import identification_figure  # noqa: PLC0415 - drawn above
 
         return identification_figure(self)
+
+
+def _describes(result: Result) -> bool:
+    return result.misfit is None or result.misfit.describes
+
+
+def _free_parameters(result: Result) -> int:
+    """Count what the fit has chosen: what was not given, and imperfections that were tried."""
+    found: Any = result.evidence.get(IMPERFECTIONS_FOUND, {})
+    free = [name for name in result.parameters if name not in result.settings.fixed]
+    return len(set(free) - {SLIDING, "limit_velocity"}) + len(found)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Settings of an identification."""
 
 from collections.abc import Mapping
@@ -10,19 +19,6 @@ from valve_friction_ros.model.checks import (
     require_positive,
 )
 from valve_friction_ros.model.frozen import frozen
-
-__all__ = [
-    "CALIBRATION",
-    "DEFAULT_METHOD",
-    "FIXABLE",
-    "METHOD_NAMES",
-    "MOST_UNCERTAIN",
-    "PUBLISHED_WINDOW",
-    "REGRESSED",
-    "STATED",
-    "TIMING_UNCERTAINTY",
-    "IdentificationSettings",
-]
 
 PUBLISHED_WINDOW = 31
 """Derivative window d of the paper, samples (Appendix A)."""
@@ -51,10 +47,21 @@ CALIBRATION: Mapping[str, str] = MappingProxyType(
 )
 """Settings that are relative standard uncertainties, and of what."""
 
-METHOD_NAMES = ("best", "robust", "refined", "published", "signature")
+METHOD_NAMES = ("plant", "bench", "published", "signature")
 """What the methods are called, in the order in which they are offered."""
 
-DEFAULT_METHOD = "best"
+DEFAULT_METHOD = "plant"
+
+FORMER_METHODS: Mapping[str, str] = MappingProxyType(
+    {
+        "best": "plant",
+        "robust": "plant",
+        "refined": "bench",
+        "sweep": "bench",
+        "force_balance": "signature",
+    }
+)
+"""Names that files, settings and histories of earlier versions use, and what they are now."""
 
 TIMING_UNCERTAINTY = 0.04
 """Timing uncertainty without a setting, s.
@@ -89,17 +96,21 @@ class IdentificationSettings:
         ``limit_velocity`` sets the threshold δv instead of choosing it from the sweep.
     stated : mapping of str to float
         Values of a data sheet by name (see `STATED`). They take no part in the identification: a
-        found value that contradicts one gives a warning with the likely cause.
+        found value that contradicts one gives a warning with the likely cause. What is fixed is
+        not compared.
+    assumed : tuple of str
+        Names of fields of the `Valve` that nobody has stated: the result says so, and what depends
+        on an assumed area or pressure reference is weak at most.
     position_bias : float, optional
-        Bias x̄ of (10), m. Given, the regression takes the paper's form of four columns, and the
-        preload is F_0 = k·x̄; by default the preload is a regressor of its own.
+        Bias x̄ of (10), m. Given, the methods ``published`` and ``signature`` take the paper's form
+        of four columns, F_0 = k·x̄; by default, and in the other methods, the preload is found.
     assumed_mass : float
         Mass, kg, above zero; used where the record does not determine the mass.
     timing_uncertainty : float, optional
         Standard deviation, s, of the whole time by which one signal may lag the other: clocks,
-        damping of transmitters, a volume before the diaphragm. Only the method ``robust`` uses it,
-        by default 0.04 s, a plant without special care; zero, as on the bench, means that the
-        signals certainly belong together.
+        damping of transmitters, a volume before the diaphragm. The methods ``plant`` and ``bench``
+        use it, by default 0.04 s, a plant without special care, and zero: on a bench the signals
+        certainly belong together.
     area_uncertainty, drive_scale_uncertainty, position_scale_uncertainty : float
         Relative standard uncertainties (GUM), 0.02 for 2 %, of the diaphragm area, of the scale of
         the pressure sensor (for a drive that is a force: of the force sensor), and of the scale of
@@ -134,6 +145,7 @@ class IdentificationSettings:
     drive_scale_uncertainty: float = 0.0
     position_scale_uncertainty: float = 0.0
     stated: Mapping[str, float] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""
@@ -159,7 +171,9 @@ class IdentificationSettings:
                     f"{getattr(self, name):g}: give a share, 0.02 for 2 %"
                 )
         object.__setattr__(self, "fixed", frozen(_checked(self.fixed, FIXABLE, "fixed")))
-        object.__setattr__(self, "stated", frozen(_checked(self.stated, STATED, "stated")))
+        stated = _checked(self.stated, STATED, "stated")
+        stated = {name: value for name, value in stated.items() if name not in self.fixed}
+        object.__setattr__(self, "stated", frozen(stated))
         if self.position_bias is not None:
             require_finite("position_bias", self.position_bias)
             if "spring_preload" in self.fixed:
@@ -169,6 +183,11 @@ class IdentificationSettings:
     def published_window(self) -> int:
         """Derivative window of the published method, samples."""
         return PUBLISHED_WINDOW if self.derivative_window is None else self.derivative_window
+
+
+def current_name(method: str) -> str:
+    """Return what a method is called now, whatever it was called; other names as they are."""
+    return FORMER_METHODS.get(method, method)
 
 
 def _checked(values: Mapping[str, float], names: tuple[str, ...], what: str) -> dict[str, float]:

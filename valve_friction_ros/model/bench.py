@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The paper's bench valve with the three packings that every check uses.
 
 Sources: section 4 and Table 1 ("model 1") for the valve and its Teflon packing, lightly and
@@ -6,15 +15,6 @@ strongly tightened; the bias of 1.13 mm follows (16). The graphite set shows a s
 
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.valve import Valve
-
-__all__ = [
-    "BENCH_VALVE",
-    "GRAPHITE_PACKING",
-    "GRAPHITE_VALVE",
-    "HIGH_FRICTION",
-    "LOW_FRICTION",
-    "PRESSURE_RANGE",
-]
 
 PRESSURE_RANGE = (41740.0, 206840.0)
 """Input range of the bench, Pa: 0 % and 100 % of the paper's excitations."""

@@ -1,23 +1,33 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Compilation of numeric kernels, kept in one place.
 
 A kernel is an ordinary Python function on scalars, arrays and named tuples. Decorated with
 `compiled` it runs as machine code, compiled at its first call and cached on disk for the next
 process. A kernel may call kernels, and use numbers, of this folder and of its own: the cache is
 renewed when a file of either changes. Where no folder for a cache can be written, neither beside
-the sources nor at home, each process compiles anew. The environment variable
-``NUMBA_DISABLE_JIT=1`` runs kernels as plain Python instead, and leaves numba (110 MB) unloaded.
+the sources nor at home, each process compiles anew. numba (60 MB) is loaded by the first call of a
+kernel. The environment variable ``NUMBA_DISABLE_JIT=1`` runs kernels as plain Python instead.
 """
 
 import contextlib
 import hashlib
 import logging
 import os
+import sys
+import threading
 from collections.abc import Callable
-from functools import cache
+from functools import cache, update_wrapper
+from importlib import import_module
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
-
-__all__ = ["compiled", "compiled_products", "compiled_reductions", "kernels_are_cached"]
+from typing import Any, ParamSpec, TypeVar, cast
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -54,10 +64,36 @@ def _sources(folder: Path) -> str:
     return digest.hexdigest()
 
 
+class _Kernel:
+    """A kernel that is handed to numba by its first use: its call, or that of one that calls it."""
+
+    _making = threading.RLock()
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self._function, self._options = function, options
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._numba_kernel(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        """Give what numba's kernel has, which includes the type that numba knows a kernel by."""
+        if name != "_numba_kernel":
+            return getattr(self._numba_kernel, name)
+        with self._making:
+            if "_numba_kernel" not in self.__dict__:
+                self.__dict__[name] = _numba_kernel(self._function, **self._options)
+        return self.__dict__[name]
+
+
 def _kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
-    """Compile with a cache, if there is a place for one."""
     if os.environ.get("NUMBA_DISABLE_JIT") == "1":
         return function
+    return cast("Callable[_P, _R]", _Kernel(function, options))
+
+
+def _numba_kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
+    """Compile with a cache, if there is a place for one."""
     import numba  # noqa: PLC0415
 
     _tell_compilation()
@@ -68,6 +104,7 @@ def _kernel(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
         kernel = numba.njit(nogil=True, **options)(function)
         _without_cache.add(function.__name__)
     _forgive_a_full_disk(kernel)
+    _load_alone(kernel)
     folders = (Path(function.__code__.co_filename).parent, Path(__file__).parent)
     # Numba renews a cache when the kernel's own file changes, and has nothing public to widen that.
     # A plain function, and a kernel without a cache, have no such attribute.
@@ -90,9 +127,57 @@ def _forgive_a_full_disk(kernel: Any) -> None:
         kernel._cache.save_overload = save_if_possible  # noqa: SLF001
 
 
+def _load_alone(kernel: Any) -> None:
+    """Take machine code out of the cache without all that numba needs to compile some.
+
+    Numba would first register every function that it can compile, which takes longer than to load
+    the kernels of an identification. Compiling does that by itself.
+    """
+    from numba.core.runtime import rtsys  # noqa: PLC0415
+
+    with contextlib.suppress(AttributeError):
+        load, guard = kernel._cache._load_overload, kernel._cache._guard_against_spurious_io_errors  # noqa: SLF001
+
+        def load_alone(signature: object, target: object) -> object:
+            _without_scipy()
+            rtsys.initialize(target)
+            with guard():
+                return load(signature, target)
+
+        kernel._cache.load_overload = load_alone  # noqa: SLF001
+
+
+@cache
+def _without_scipy() -> None:
+    """Load what numba knows of arrays without `scipy.linalg`, as slow to load as numpy.
+
+    It asks for scipy's BLAS, and does without where that is missing. No kernel multiplies matrices.
+    """
+    name = "scipy.linalg.cython_blas"
+    if name in sys.modules:
+        return
+    sys.modules[name] = None  # type: ignore[assignment]
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        del sys.modules[name]
+
+
 def kernels_are_cached() -> bool:
     """Return whether there is a place where compiled kernels are kept for the next process."""
     return not _without_cache
+
+
+def find_cache() -> bool:
+    """Return whether there is such a place, before anything is compiled; needs numba."""
+    _numba_kernel(find_cache)
+    return kernels_are_cached()
+
+
+def note_cache(is_there: bool) -> None:
+    """Note whether another process, which is to compile, has found such a place."""
+    if not is_there:
+        _without_cache.add(find_cache.__name__)
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:

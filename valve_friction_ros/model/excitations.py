@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Pressure excitations of the paper's programme, before the V/P converter's lag.
 
 An excitation is a frozen description; `sample` evaluates it at any times, so that a node can
@@ -12,17 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.model.bench import PRESSURE_RANGE
 from valve_friction_ros.model.checks import require_finite, require_positive
-
-__all__ = [
-    "ISA_STEP_SIZES",
-    "Excitation",
-    "IsaSteps",
-    "SampledPressure",
-    "SineWave",
-    "SquareWave",
-    "TriangleWave",
-    "pressure_at",
-]
 
 ISA_STEP_SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 """Steps of the ISA test (section 5) as shares of the input range."""

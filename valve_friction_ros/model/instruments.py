@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Instruments of the bench: the V/P converter before the valve, the sensors behind it."""
 
 from dataclasses import dataclass
@@ -9,8 +18,6 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.model.drive import DEFAULT_LAG
 from valve_friction_ros.model.recording import Recording
-
-__all__ = ["SensorNoise", "converter_response"]
 
 
 def converter_response(

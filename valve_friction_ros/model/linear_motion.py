@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 r"""Exact motion of the sliding stem between two events.
 
 While the stem slides one way, (1) with the first line of (2) is linear,
@@ -26,16 +35,6 @@ import math
 from typing import NamedTuple
 
 from valve_friction_ros.model.compiled import compiled
-
-__all__ = [
-    "Motion",
-    "Response",
-    "first_turn",
-    "impulse_response",
-    "motion_after",
-    "self_convolution",
-]
-
 
 _MOST_TERMS = 64
 """Terms of a power series: where one is used, its terms fall faster than 2⁻ⁿ/n!, and some twenty

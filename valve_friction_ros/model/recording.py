@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A recording: drive and stem position on one uniform time grid."""
 
 from dataclasses import dataclass, field
@@ -8,8 +17,6 @@ from numpy.typing import NDArray
 from valve_friction_ros.model.checks import require_finite, require_positive
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.stamped import StampedRecord
-
-__all__ = ["Recording"]
 
 _LARGEST = 1e12
 """Largest value of a sample, Pa, N or m.

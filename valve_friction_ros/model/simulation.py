@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Simulation of a valve with Karnopp friction, driven by pressure samples.
 
 Equations (1) and (2), solved without discretisation: the pressure runs linearly from sample to
@@ -17,15 +26,6 @@ from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.stem_motion import advance_stem
 from valve_friction_ros.model.stem_run import run_stem
 from valve_friction_ros.model.valve import Valve
-
-__all__ = [
-    "StemState",
-    "Trajectory",
-    "advance",
-    "balanced_state",
-    "compile_kernels",
-    "simulate",
-]
 
 
 @dataclass(frozen=True)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One sample of sliding as a linear map, and the chords of a friction that falls with the speed."""
 
 import math
@@ -10,16 +19,6 @@ from valve_friction_ros.model.compiled import compiled, compiled_products
 from valve_friction_ros.model.dynamics import Dynamics, sliding_friction
 from valve_friction_ros.model.linear_motion import impulse_response, self_convolution
 from valve_friction_ros.model.stem_motion import STRIBECK_STEP
-
-__all__ = [
-    "ChordLadder",
-    "SlidingMap",
-    "chord_ladder",
-    "has_short_cut",
-    "map_slopes",
-    "slid",
-    "sliding_map",
-]
 
 _FALLEN = 6.0
 """Speed over the Stribeck velocity above which the remaining fall is below rounding: e⁻³⁶."""
@@ -147,6 +146,15 @@ class ChordLadder(NamedTuple):
     spacing: float
     chords: NDArray[np.float64]
     slides: NDArray[np.float64]
+
+
+@compiled_products
+def rung_at(ladder: ChordLadder, speed: float) -> tuple[int, float, float, SlidingMap]:
+    """Return the number of the range with a speed, Coulomb and viscous friction, and the map."""
+    rung = min(int(speed / ladder.spacing), ladder.slides.shape[0] - 1)
+    row = ladder.slides[rung]
+    slide = SlidingMap(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
+    return rung, ladder.chords[rung, 0], ladder.chords[rung, 1], slide
 
 
 @compiled

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One step of the Karnopp model: rest, breakaway, sliding, stopping, travel stops.
 
 The stem is described by position and velocity alone; a velocity of exactly zero means rest.
@@ -28,8 +37,6 @@ from valve_friction_ros.model.stem_tangent import (
     carry_slide,
     leave,
 )
-
-__all__ = ["STRIBECK_STEP", "advance_stem"]
 
 _NARROW = 1e-3
 """Least width of a chord over its largest change of speed. Chosen: avoids a division by
@@ -196,15 +203,19 @@ def _slide_one_way(
     slope: float,
     duration: float,
     stop: float,
-) -> tuple[float, float, float]:
-    """Slide upwards as `_slide_up`, at most while a chord of the friction is valid."""
+) -> tuple[float, float, float, Dynamics]:
+    """Slide upwards as `_slide_up`, at most while a chord of the friction is valid; return it, too.
+
+    Where friction does not fall with the speed, the chord is the friction itself.
+    """
     pull = force - dynamics.spring_constant * position
     if speed == 0.0:
         pull = max(pull, dynamics.static_friction)
     if dynamics.stribeck_velocity == 0.0:
         excess = pull - dynamics.coulomb_friction - dynamics.viscous_friction * speed
         start = Motion(position, speed, excess / dynamics.mass)
-        return _slide_up(start, dynamics, force, slope, duration, stop)
+        reached, final, time = _slide_up(start, dynamics, force, slope, duration, stop)
+        return reached, final, time, dynamics
     start = Motion(position, speed, (pull - sliding_friction(dynamics, speed)) / dynamics.mass)
     largest = _chord_reach(dynamics, speed)
     change = abs(start.acceleration) * duration
@@ -217,7 +228,7 @@ def _slide_one_way(
         strays = abs(final - speed)
         allowed = min(largest, _chord_reach(dynamics, final))
         if final == 0.0 or strays <= 1.5 * allowed or step < 1e-9 * duration:
-            return reached, final, time
+            return reached, final, time, local
         step *= max(allowed / strays, 0.01)
     raise ArithmeticError("the falling friction has no chord that is short enough")
 
@@ -279,8 +290,7 @@ def advance_stem(
     upward, downward : Dynamics
         Parameters of the model for either way.
     tangent : Tangent, optional
-        Derivatives of the stem, after `begin_step`; they are carried along. Friction must not fall
-        with the speed then.
+        Derivatives of the stem, after `begin_step`; they are carried along.
 
     Returns
     -------
@@ -306,13 +316,15 @@ def advance_stem(
                     side * (force + slope * elapsed - spring * position), way.static_friction
                 )
                 cause = WAITED if wait > 0.0 else TURNS if has_stopped else LET_GO
-                push = (pull - way.coulomb_friction) / way.mass
+                falls = way.stribeck_velocity > 0.0
+                held = way.static_friction if falls else way.coulomb_friction
+                push = (pull - held) / way.mass
                 leave(tangent, side, position, push, side * slope, spring, elapsed, cause)
         else:
             side = 1.0 if velocity > 0 else -1.0
         way = upward if side > 0 else downward
         stop = _stop_ahead(side, upward.travel)
-        reached, speed, time = _slide_one_way(
+        reached, speed, time, chord = _slide_one_way(
             side * position,
             abs(velocity),
             way,
@@ -338,6 +350,7 @@ def advance_stem(
                     pull,
                     side * slope,
                     way,
+                    chord,
                     end,
                 ),
             )

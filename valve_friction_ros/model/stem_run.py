@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The stem through all samples: short cuts without events, located events between them.
 
 Friction may be graded by the sample, and the stem set anew after a gap. numba leaves out the
@@ -8,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled, compiled_products
-from valve_friction_ros.model.dynamics import Dynamics
+from valve_friction_ros.model.dynamics import Dynamics, friction_fall
 from valve_friction_ros.model.sliding_map import (
     ChordLadder,
     SlidingMap,
     chord_ladder,
     has_short_cut,
     map_slopes,
+    rung_at,
     slid,
     sliding_map,
 )
@@ -26,8 +36,6 @@ from valve_friction_ros.model.stem_tangent import (
     keep,
     set_anew,
 )
-
-__all__ = ["run_stem"]
 
 _Signal = NDArray[np.float64] | None
 
@@ -142,10 +150,7 @@ def _slide_on_falling(
     for _ in range(sample, forces.size - 1):
         if _is_anew(anew, sample + 1):
             return sample
-        rung = min(int(side * velocity / ladder.spacing), top)
-        dry, viscous = ladder.chords[rung, 0], ladder.chords[rung, 1]
-        row = ladder.slides[rung]
-        slide = SlidingMap(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
+        rung, dry, viscous, slide = rung_at(ladder, side * velocity)
         excess = forces[sample] - side * (dry + _more(grip, sample))
         after = forces[sample + 1] - side * (dry + _more(grip, sample + 1))
         place, following = slid(slide, position, velocity, excess, after - excess)
@@ -215,6 +220,51 @@ def _carry(
             tangent.positions[sample + 1, one] = place
 
 
+@compiled_products
+def _carry_falling(
+    tangent: Tangent | None,
+    first: int,
+    last: int,
+    side: float,
+    way: Dynamics,
+    ladder: ChordLadder,
+    forces: NDArray[np.float64],
+    grip: _Signal,
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+) -> None:
+    """Carry the derivatives through the samples that `_slide_on_falling` has filled in.
+
+    What a parameter changes in the balance of forces at both ends of a sample is taken for linear
+    between them.
+    """
+    if tangent is None or first == last:
+        return
+    face(tangent, side)
+    signals, facing, state = tangent.signals, tangent.facing, tangent.state
+    for sample in range(first, last):
+        _, dry, viscous, slide = rung_at(ladder, side * velocities[sample])
+        x, v, w = positions[sample], velocities[sample], velocities[sample + 1]
+        y = positions[sample + 1]
+        a = forces[sample] - side * (dry + _more(grip, sample))
+        a = (a - way.spring_constant * x - viscous * v) / way.mass
+        b = forces[sample + 1] - side * (dry + _more(grip, sample + 1))
+        b = (b - way.spring_constant * y - viscous * w) / way.mass
+        now, then = friction_fall(way, side * v), friction_fall(way, side * w)
+        for one in range(facing.shape[1]):
+            slip, stribeck = side * tangent.slip_force[one], side * tangent.stribeck_velocity[one]
+            force = facing[0, one] * signals[sample, one] + facing[1, one]
+            force -= slip * now.share + stribeck * now.by_stribeck
+            force -= facing[2, one] * v + facing[3, one] * x + facing[4, one] * a
+            after = facing[0, one] * signals[sample + 1, one] + facing[1, one]
+            after -= slip * then.share + stribeck * then.by_stribeck
+            after -= facing[2, one] * w + facing[3, one] * y + facing[4, one] * b
+            state[0, one], state[1, one] = slid(
+                slide, state[0, one], state[1, one], force, after - force
+            )
+            tangent.positions[sample + 1, one] = state[0, one]
+
+
 @compiled
 def _graded(way: Dynamics, more: float) -> Dynamics:
     """Return the dynamics with `more` Coulomb and static friction."""
@@ -248,9 +298,8 @@ def run_stem(
     Rest and sliding over several samples take short cuts; `advance_stem` steps all samples between
     them, and so every sample with an event. `grip` (N) is added to the Coulomb and the static
     friction of each sample. Where `anew` is a number, the stem is set to that place (m) and to the
-    velocity `leaving` (m/s). A `tangent`, set up for the first sample, is carried along
-    if friction does not fall with the speed. The samples that took no short cut are counted and
-    returned.
+    velocity `leaving` (m/s). A `tangent`, set up for the first sample, is carried along. The
+    samples that took no short cut are counted and returned.
     """
     up, down = sliding_map(upward, period), sliding_map(downward, period)
     steps_up, steps_down = chord_ladder(upward, period), chord_ladder(downward, period)
@@ -276,6 +325,11 @@ def run_stem(
             sample = _slide_on(sample, side, way, slide, forces, grip, anew, positions, velocities)
         if velocity == 0.0:
             keep(tangent, first, sample)
+        elif falls:
+            ladder = steps_up if velocity > 0 else steps_down
+            _carry_falling(
+                tangent, first, sample, side, way, ladder, forces, grip, positions, velocities
+            )
         else:
             slide = up if velocity > 0 else down
             _carry(

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 r"""Derivatives of the simulated stem by its parameters, carried along with it.
 
 Between two events the motion is linear, and so is its derivative: a change of the start, of the
@@ -11,8 +20,8 @@ the event changes too (saltation). With the derivative δ at a fixed time and th
 - a stem that turns without a rest breaks away when it has stopped: both with the same dt;
 - at a travel stop both are 0.
 
-Friction that falls with the speed has no such derivative: chords approximate it, and where they
-begin and end depends on the motion.
+Friction that falls with the speed is a chord between two speeds there. At the second one it drops,
+later by dt = −δv/a, so that from then on δv is δv·a′/a with the acceleration a′ behind the drop.
 """
 
 from typing import NamedTuple
@@ -21,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.model.compiled import compiled
-from valve_friction_ros.model.dynamics import Dynamics
+from valve_friction_ros.model.dynamics import Dynamics, friction_fall, sliding_friction
 from valve_friction_ros.model.linear_motion import (
     Motion,
     impulse_response,
@@ -29,23 +38,9 @@ from valve_friction_ros.model.linear_motion import (
     self_convolution,
 )
 
-__all__ = [
-    "LET_GO",
-    "RESTS",
-    "SLIDES",
-    "STOPS",
-    "TURNS",
-    "WAITED",
-    "Phase",
-    "Tangent",
-    "begin_step",
-    "carry_slide",
-    "face",
-    "keep",
-    "leave",
-    "no_tangent",
-    "set_anew",
-]
+_STEEPEST = 4.0
+"""Largest ratio of the accelerations at the end of a chord: next to a steady speed, where a is
+zero, the time of the drop has no derivative."""
 
 
 class Tangent(NamedTuple):
@@ -53,7 +48,7 @@ class Tangent(NamedTuple):
 
     Attributes
     ----------
-    mass, spring_constant, coulomb_friction, slip_force, limit_velocity : ndarray
+    mass, spring_constant, coulomb_friction, slip_force, limit_velocity, stribeck_velocity : ndarray
         Of the constants of `Dynamics`, shape (p,) each; the slip force is F_s − F_c.
     upward, downward : ndarray of float, shape (p,)
         Of the viscous friction of either way.
@@ -78,6 +73,7 @@ class Tangent(NamedTuple):
     coulomb_friction: NDArray[np.float64]
     slip_force: NDArray[np.float64]
     limit_velocity: NDArray[np.float64]
+    stribeck_velocity: NDArray[np.float64]
     upward: NDArray[np.float64]
     downward: NDArray[np.float64]
     signals: NDArray[np.float64]
@@ -106,6 +102,9 @@ class Phase(NamedTuple):
         Rate of the force, N/s.
     way : Dynamics
         Parameters of that way.
+    chord : Dynamics
+        The same with the Coulomb and the viscous friction of the chord, where friction falls with
+        the speed.
     end : int
         How it ends: of `SLIDES`, `RESTS` and `STOPS`.
     """
@@ -118,6 +117,7 @@ class Phase(NamedTuple):
     pull: float
     slope: float
     way: Dynamics
+    chord: Dynamics
     end: int
 
 
@@ -136,6 +136,7 @@ def no_tangent(
     """Return derivatives that are zero, in the arrays of `signals` and `positions`."""
     signals[:] = 0.0
     return Tangent(
+        np.zeros(parameters),
         np.zeros(parameters),
         np.zeros(parameters),
         np.zeros(parameters),
@@ -233,19 +234,24 @@ def _come_to_rest(tangent: Tangent, side: float, end: Motion, limit_velocity: fl
 @compiled
 def carry_slide(tangent: Tangent, phase: Phase) -> None:
     """Carry the derivatives through a phase of sliding and the event that ends it."""
-    way, side, time, speed = phase.way, phase.side, phase.duration, phase.speed
+    way, side, time, speed = phase.chord, phase.side, phase.duration, phase.speed
     mass, spring, viscous = way.mass, way.spring_constant, way.viscous_friction
     damping, stiffness = viscous / mass, spring / mass
     acceleration = (phase.pull - way.coulomb_friction - viscous * speed) / mass
     jerk = phase.slope / mass - stiffness * speed
     response = impulse_response(damping, stiffness, time)
     lost = self_convolution(damping, stiffness, time, response)
+    end = motion_after(Motion(phase.position, speed, acceleration), jerk, response, time)
+    fall = friction_fall(phase.way, speed)
+    by_stribeck = 0.5 * (fall.by_stribeck + friction_fall(phase.way, end.velocity).by_stribeck)
     for one in range(tangent.late.size):
         place, motion = side * tangent.state[0, one], side * tangent.state[1, one]
         of_spring, of_mass = tangent.spring_constant[one], tangent.mass[one]
         of_viscous = tangent.upward[one] if side > 0.0 else tangent.downward[one]
         force = side * (tangent.pull[one] + tangent.rate[one] * phase.begin)
         force -= tangent.coulomb_friction[one] + tangent.grip[one]
+        force -= tangent.slip_force[one] * fall.share
+        force -= tangent.stribeck_velocity[one] * by_stribeck
         force -= of_spring * phase.position + spring * place
         of_push = (force - of_viscous * speed - viscous * motion - acceleration * of_mass) / mass
         of_jerk = side * tangent.rate[one] - of_spring * speed - spring * motion - jerk * of_mass
@@ -263,9 +269,11 @@ def carry_slide(tangent: Tangent, phase: Phase) -> None:
     if phase.end == STOPS:
         tangent.state[:] = 0.0
     elif phase.end == RESTS:
-        start = Motion(phase.position, speed, acceleration)
-        end = motion_after(start, jerk, response, time)
         _come_to_rest(tangent, side, end, way.limit_velocity)
+    elif phase.way.stribeck_velocity > 0.0 and end.acceleration != 0.0:
+        left = way.coulomb_friction + viscous * end.velocity
+        change = (left - sliding_friction(phase.way, end.velocity)) / mass
+        tangent.state[1] *= min(max(1.0 + change / end.acceleration, 1.0 / _STEEPEST), _STEEPEST)
 
 
 @compiled

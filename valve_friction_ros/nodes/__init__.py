@@ -1,6 +1,49 @@
-"""ROS 2 nodes: they translate messages and parameters, nothing else."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""ROS 2 nodes: they translate messages and parameters, nothing else.
+
+Each is a class that any executor of rclpy turns, also beside other nodes in a process of your own::
+
+    rclpy.init()
+    identifier = Identifier(namespace="/fv_101")
+    rclpy.spin(identifier)
+    identifier.destroy_node()  # writes what waits
+"""
+
+import importlib
 import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from valve_friction_ros.nodes.dashboard.node import Dashboard
+    from valve_friction_ros.nodes.identifier.node import Identifier
+    from valve_friction_ros.nodes.pressure_source import PressureSource
+    from valve_friction_ros.nodes.simulator import Simulator
+    from valve_friction_ros.nodes.stroke_player import StrokePlayer
+
+__all__ = ["Dashboard", "Identifier", "PressureSource", "Simulator", "StrokePlayer"]
 
 # Read when numpy is imported: more threads only wait for each other in matrices as small as these.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+_PLACES = {
+    "Dashboard": "dashboard.node",
+    "Identifier": "identifier.node",
+    "PressureSource": "pressure_source",
+    "Simulator": "simulator",
+    "StrokePlayer": "stroke_player",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a node when it is asked for."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

@@ -1,9 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Identifiers of many valves in one process, each in its valve's namespace."""
 
+import contextlib
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -13,50 +22,25 @@ from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.identification.preparation import compile_methods
-from valve_friction_ros.nodes.identifier import parameters
 from valve_friction_ros.nodes.identifier.node import Identifier
+from valve_friction_ros.nodes.identifier.results import EstimateTopic
 from valve_friction_ros.nodes.identifier.status import stuck_status
-from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
+from valve_friction_ros.nodes.identifier.workers import running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
-from valve_friction_ros.nodes.plumbing.parameters import ParameterSpec, declare_parameters
+from valve_friction_ros.nodes.plumbing.parameters import declare_parameters
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
-from valve_friction_ros.nodes.plumbing.process_worker import ProcessWorker
-from valve_friction_ros.nodes.plumbing.qos import LATCHED
+from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES, parameter_overrides
 from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, join_graph, run_nodes
+from valve_friction_ros.settings import HOST
 
-__all__ = ["PARAMETERS", "FaultyValve", "identifiers_of_valves", "main"]
-
-_VALVES = ParameterSpec(
-    "valves", [""], "Namespaces of the valves, an identifier each [-]", read_only=True
-)
-_FEW = 4
-"""Valves up to which each number has a topic of its own. Chosen: some 100 topics, which joining
-programs meet within a second or two."""
-_PROCESSES = ParameterSpec(
-    "identification_processes",
-    0,
-    "Processes beside this one that identify, each on a core of its own [-]; 0: a thread of it",
-    (0, 64),
-    read_only=True,
-)
-_PARAMETER_SERVICES = ParameterSpec(
-    "parameter_services",
-    True,
-    "Whether the parameters of the valves can be read and changed while they run [-]; not for more "
-    "than 100 valves unless told: it doubles what a process costs at its start",
-    read_only=True,
-)
-_OWN = (_VALVES, _PROCESSES, _PARAMETER_SERVICES)
-_MANY = 100
-"""Valves up to which parameters have services. Chosen: a start of some seconds."""
+_FEW = 20
+"""Valves up to which parameters have services, which with those of alarms are 25 of 43 endpoints of
+a valve. Chosen: a host that joins some hundred valves meets thousands of endpoints already."""
 _TOGETHER = 50
 """Valves that share a participant of the graph. The middleware compares each reader of a
 participant with all its writers, so that the start would take the square of their number; a
 participant takes 2 MB and eight threads."""
 _PROFILE = Path(__file__).with_name("many_valves.xml")
-PARAMETERS = (*_OWN, *parameters.PARAMETERS)
-"""Its own, and those of its identifiers."""
 
 
 class FaultyValve(PolledNode):
@@ -74,14 +58,18 @@ class FaultyValve(PolledNode):
 
     def __init__(self, place: str, problem: str, context: Context) -> None:
         super().__init__(
-            "identifier", namespace=place, context=context, start_parameter_services=False
+            "identifier",
+            namespace=place,
+            context=context,
+            start_parameter_services=False,
+            start_type_description_service=False,
         )
-        overrides = getattr(self, "_parameter_overrides", {})  # rclpy offers no other way to them
-        given = overrides.get(parameters.VALVE_TAG.name)
+        overrides = parameter_overrides(self)
+        given, is_asked = overrides.get("valve_tag"), overrides.get("estimate_topic")
         self._tag = str(given.value) if given is not None and given.value else place.strip("/")
         self._problem = f"cannot start, so nobody watches this valve: {problem}"
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_publisher(DiagnosticStatus, "~/estimate", LATCHED).publish(self._status())
+        self._estimate = EstimateTopic(self, is_asked is None or is_asked.value)
         self.create_timer(1.0, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def stuck_status(self, problem: str) -> DiagnosticStatus:
@@ -94,6 +82,7 @@ class FaultyValve(PolledNode):
 
     def _tell(self) -> None:
         message = DiagnosticArray(status=[self._status()])
+        self._estimate.publish(message.status[0])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
@@ -112,11 +101,12 @@ def _places(valves: Sequence[str]) -> list[str]:
 
 
 def identifiers_of_valves(
-    workers: Workers, arguments: Sequence[str] | None = None
+    opened: contextlib.ExitStack, arguments: Sequence[str] | None = None
 ) -> Iterator[Node]:
     """Create the node `identifiers`, and an identifier for each valve of its parameter.
 
-    One that cannot start is logged, and a `FaultyValve` stands in for it.
+    One that cannot start is logged, and a `FaultyValve` stands in for it. What they share is closed
+    with `opened`.
 
     Raises
     ------
@@ -128,13 +118,12 @@ def identifiers_of_valves(
     """
     host = PolledNode("identifiers")
     yield host
-    declare_parameters(host, (_VALVES, _PROCESSES))
-    places = _places(host.get_parameter(_VALVES.name).value)
-    if processes := host.get_parameter(_PROCESSES.name).value:
-        identify = ProcessWorker("identify", processes, compile_methods)
-        workers = workers._replace(identify=identify)
-    services = replace(_PARAMETER_SERVICES, default=len(places) <= _MANY)
-    declare_parameters(host, (services,))
+    *of_plant, services = HOST
+    declare_parameters(host, of_plant)
+    places = _places(host.get_parameter("valves").value)
+    processes = host.get_parameter("identification_processes").value
+    workers = opened.enter_context(running_workers(processes))
+    declare_parameters(host, (services,), parameter_services=len(places) <= _FEW)
     context, faults = host.context, dict[str, str]()
     for number, place in enumerate(places):
         if number and number % _TOGETHER == 0:
@@ -145,9 +134,9 @@ def identifiers_of_valves(
                 identifier = Identifier(
                     workers,
                     place,
-                    number_topics=len(places) <= _FEW,
                     context=context,
-                    start_parameter_services=host.get_parameter(services.name).value,
+                    start_parameter_services=(tells := host.get_parameter(services.name).value),
+                    start_type_description_service=tells,
                 )
         except (*WRONG_REQUESTS, InternalError, RefusalError) as error:
             faults[place] = " ".join(str(error).split())
@@ -170,9 +159,10 @@ def identifiers_of_valves(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the nodes."""
-    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(_PROFILE))
-    with running_workers() as workers:
-        return run_nodes(lambda: identifiers_of_valves(workers, arguments), arguments)
+    if "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ:  # Kilted knows it still
+        os.environ.setdefault(PROFILES, str(_PROFILE))
+    with contextlib.ExitStack() as opened:
+        return run_nodes(lambda: identifiers_of_valves(opened, arguments), arguments)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Node `pressure_source`: a bench's pressure signal on a topic."""
 
+import math
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +21,6 @@ import numpy as np
 from sensor_msgs.msg import FluidPressure
 
 from valve_friction_ros.model import (
-    DEFAULT_LAG,
     Excitation,
     IsaSteps,
     SampledPressure,
@@ -20,86 +30,33 @@ from valve_friction_ros.model import (
     converter_response,
 )
 from valve_friction_ros.nodes.plumbing.messages import time_message
-from valve_friction_ros.nodes.plumbing.parameters import (
-    ParameterSpec,
-    declare_parameters,
-    values_of,
-)
+from valve_friction_ros.nodes.plumbing.pace import PacedSteps
+from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.running import run_node
-from valve_friction_ros.records.tables.table import read_columns
+from valve_friction_ros.records.table import read_columns
+from valve_friction_ros.settings import NODES
 
-__all__ = ["PARAMETERS", "PressureSource", "main"]
-
-_PAUSE = 0.02
-"""Time between two blocks of samples, s."""
-
+_TICK = 1e-3
+"""Shortest time from one publishing to the next, s: at higher rates several samples go together."""
+_CATCHING_UP = 2
+"""Times the usual rate at which samples that are late are sent: a burst would overrun the queues of
+subscribers."""
+_WAITING = 0.02
+"""Time between two looks at a clock that has not begun, s."""
 _BLOCK = 50
-_LONGEST = 0.5
-"""Samples published together, and time, s, after which the rest waits for the next turn: a reliable
-subscription that is not emptied holds its publisher up, and the node must end when it is asked."""
+"""Samples that are computed together."""
 
-_SQUARE = SquareWave()
-
-PARAMETERS = (
-    ParameterSpec(
-        "excitation",
-        "square",
-        "Signal: square, triangle, sine, isa_steps or file [-]",
-        read_only=True,
-    ),
-    ParameterSpec("low", _SQUARE.low, "Lowest pressure of the signal [Pa]", (-1e9, 1e9), True),
-    ParameterSpec("high", _SQUARE.high, "Highest pressure of the signal [Pa]", (-1e9, 1e9), True),
-    ParameterSpec(
-        "period",
-        _SQUARE.period,
-        "Period of square, triangle and sine; hold time of each isa_steps level [s]",
-        (1e-3, 1e6),
-        True,
-    ),
-    ParameterSpec(
-        "file",
-        "",
-        "CSV file with the columns time_s and pressure_pa, for the excitation file [-]",
-        read_only=True,
-    ),
-    ParameterSpec("file_minimum", -1e9, "Lowest pressure in the file [Pa]", (-1e9, 1e9), True),
-    ParameterSpec("file_maximum", 1e9, "Highest pressure in the file [Pa]", (-1e9, 1e9), True),
-    ParameterSpec(
-        "file_rate", 1e12, "Largest rate of the pressure in the file [Pa/s]", (0.0, 1e12), True
-    ),
-    ParameterSpec("sample_rate", 1000.0, "Samples per second of signal [Hz]", (0.1, 1e5), True),
-    ParameterSpec(
-        "speed", 1.0, "Seconds of signal published in a second of real time [-]", (1e-3, 1e3), True
-    ),
-    ParameterSpec(
-        "converter_lag", DEFAULT_LAG, "Time constant of the V/P converter [s]", (0.0, 1e3), True
-    ),
-    ParameterSpec(
-        "pressure_noise",
-        0.0,
-        "Standard deviation of white noise on the pressure, which the stem feels too [Pa]",
-        (0.0, 1e9),
-        True,
-    ),
-    ParameterSpec(
-        "time_jitter",
-        0.0,
-        "Largest deviation of a sample's time, either way; below half of a period [s]",
-        (0.0, 1.0),
-        True,
-    ),
-    ParameterSpec("noise_seed", 0, "Seed of the noise and the jitter [-]", (0, 2**31 - 1), True),
-)
+_PARAMETERS = NODES["pressure_source"]
 
 
-def _from_file(values: Mapping[str, Any]) -> SampledPressure:
-    """Read a pressure, linear between its rows; raises ValueError where it breaks a limit."""
-    path = values["file"]
-    if not path:
-        raise ValueError("excitation is 'file' but the parameter file is empty")
-    columns = read_columns(Path(path), ("time_s", "pressure_pa"))
+def pressure_from_file(path: Path, values: Mapping[str, Any]) -> SampledPressure:
+    """Read a pressure, linear between its rows; raises ValueError where it breaks a limit.
+
+    The limits are the parameters ``file_minimum``, ``file_maximum`` and ``file_rate``.
+    """
+    columns = read_columns(path, ("time_s", "pressure_pa"))
     signal = SampledPressure(columns["time_s"], columns["pressure_pa"])
     lowest, highest = float(signal.pressures.min()), float(signal.pressures.max())
     for name, breaks, found, unit in (
@@ -124,7 +81,9 @@ def _excitation(values: Mapping[str, Any]) -> Excitation:
     """Build the signal; raises ValueError for an unknown kind or impossible numbers."""
     kind, low, high, period = (values[name] for name in ("excitation", "low", "high", "period"))
     if kind == "file":
-        return _from_file(values)
+        if not values["file"]:
+            raise ValueError("excitation is 'file' but the parameter file is empty")
+        return pressure_from_file(Path(values["file"]), values)
     if kind == "isa_steps":
         return IsaSteps((low + high) / 2, high - low, hold=period)
     waves: dict[str, Callable[[float, float, float], Excitation]] = {
@@ -139,12 +98,20 @@ def _excitation(values: Mapping[str, Any]) -> Excitation:
 
 
 class PressureSource(PolledNode):
-    """Publishes the signal in blocks, each sample with its own stamp."""
+    """Publishes the signal, each sample in time and with its own stamp.
 
-    def __init__(self) -> None:
-        super().__init__("pressure_source")
-        declare_parameters(self, PARAMETERS)
-        values = values_of(self, PARAMETERS)
+    Add it to any executor of rclpy. Raises ValueError for an unknown signal or impossible numbers.
+
+    Parameters
+    ----------
+    **named
+        What `rclpy.node.Node` takes, such as `namespace` and `parameter_overrides`.
+    """
+
+    def __init__(self, **named: Any) -> None:
+        super().__init__("pressure_source", **named)
+        declare_parameters(self, _PARAMETERS)
+        values = values_of(self, _PARAMETERS)
         self._excitation = _excitation(values)
         self._period = 1.0 / values["sample_rate"]
         self._speed = values["speed"]
@@ -156,45 +123,68 @@ class PressureSource(PolledNode):
                 f"time_jitter ({self._jitter:g} s) must be below half of the sampling period "
                 f"({self._period:g} s): stamps would not rise"
             )
+        self._tick = max(self._period / self._speed, _TICK)
+        self._most = _CATCHING_UP * math.ceil(self._tick * self._speed / self._period)
         self._random = np.random.default_rng(values["noise_seed"])
-        self._sent = 0
+        self._ready: deque[tuple[int, float]] = deque()
+        self._computed = self._sent = 0
         self._before: tuple[float, float] | None = None
         self._start: int | None = None
+        self._message = FluidPressure(variance=self._noise**2)
+        self._message.header.frame_id = "actuator"
         self._publisher = self.create_publisher(
             FluidPressure, "actuator_pressure", stream(), qos_overriding_options=qos_overrides()
         )
+        self._pace = PacedSteps(self, "signal", self._step)
         self.get_logger().info(f"ready: publishes {self._publisher.topic_name}")
 
     def poll(self) -> None:
-        """Publish all samples whose time has come since the last block."""
-        now = self.get_clock().now().nanoseconds
+        """Begin to publish."""
+        self._pace.begin()
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._pace.end()
+
+    def _step(self) -> float:
+        """Publish the samples whose time has come; return the time of the next step."""
+        begun, now = time.monotonic(), self.get_clock().now().nanoseconds
         if not now:  # use_sim_time, and the clock has not come yet
-            return
+            return begun + _WAITING
         if self._start is None or now < self._start:
             self._start = now
-            self._sent = 0
-        elapsed = (now - self._start) / 1e9 * self._speed
-        due = int(elapsed / self._period) + 1
-        until = time.monotonic() + _LONGEST
-        while self._sent < due and time.monotonic() < until:
-            self._publish(min(due - self._sent, _BLOCK), self._start)
+            self._computed = self._sent = 0
+            self._ready.clear()
+        elapsed = (now - self._start) / 1e9
+        due = int(elapsed * self._speed / self._period) + 1
+        for _ in range(min(due - self._sent, self._most)):
+            self._publish()
+        if self._sent < due:
+            return begun + self._tick
+        following = self._sent * self._period / self._speed - elapsed
+        return begun + min(max(following, _TICK), _WAITING)
 
-    def _publish(self, count: int, start: int) -> None:
-        """Publish the next `count` samples of a signal that began at `start`, ns."""
-        sample = self._sent + np.arange(count)
+    def _publish(self) -> None:
+        """Publish the next sample."""
+        if not self._ready:
+            self._compute()
+        nanoseconds, self._message.fluid_pressure = self._ready.popleft()
+        self._message.header.stamp = time_message((self._start or 0) + nanoseconds)
+        self._publisher.publish(self._message)
+        self._sent += 1
+
+    def _compute(self) -> None:
+        """Compute the next block: times from the start, ns, and pressures."""
+        sample = self._computed + np.arange(_BLOCK)
         pressure = self._response(self._excitation.sample(sample * self._period))
         if self._noise > 0:
-            pressure = pressure + self._noise * self._random.standard_normal(count)
+            pressure = pressure + self._noise * self._random.standard_normal(_BLOCK)
         times = sample * self._period
         if self._jitter > 0:
-            times = times + self._random.uniform(-self._jitter, self._jitter, count)
-        message = FluidPressure(variance=self._noise**2)
-        message.header.frame_id = "actuator"
-        for seconds, value in zip(times, pressure, strict=True):
-            message.header.stamp = time_message(start + round(seconds * 1e9))
-            message.fluid_pressure = float(value)
-            self._publisher.publish(message)
-        self._sent += count
+            times = times + self._random.uniform(-self._jitter, self._jitter, _BLOCK)
+        nanoseconds = np.rint(times * 1e9).astype(np.int64)
+        self._ready.extend(zip(nanoseconds.tolist(), pressure.tolist(), strict=True))
+        self._computed += _BLOCK
 
     def _response(self, command: np.ndarray) -> np.ndarray:
         """Pass a block through the converter, continuing from the block before."""
@@ -211,7 +201,7 @@ class PressureSource(PolledNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(PressureSource, arguments, _PAUSE)
+    return run_node(PressureSource, arguments)
 
 
 if __name__ == "__main__":

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A call of an identifier's service, for people without the command `ros2`."""
 
 import os
@@ -21,14 +30,12 @@ from valve_friction_ros.nodes.service_request import (
     set_parameters_request,
 )
 
-__all__ = ["Answer", "Caller", "caller"]
-
 _TURN = 0.05
 _LAST_WORD = 1.5
 """Time for the diagnosis that follows an answer, s: it is published each second."""
 
 
-class Answer(NamedTuple):
+class ServiceAnswer(NamedTuple):
     """What a service said; `level` is that of the diagnosis, where it was asked for and came."""
 
     success: bool
@@ -100,7 +107,7 @@ class Caller:
             if level <= Level.ERROR:
                 self._levels[status.name] = Level(level)
 
-    def call(self, identifier: str, service: str, patience: float) -> Answer | None:
+    def call(self, identifier: str, service: str, patience: float) -> ServiceAnswer | None:
         """Call a service and wait for its answer; None where it is not wanted any more.
 
         Raises RefusalError if there is no answer in time, or the identifier has ended.
@@ -128,7 +135,7 @@ class Caller:
         status = f"{identifier}: friction"
         if wants_level:
             self._wait(lambda: status in self._levels, _LAST_WORD)
-        return Answer(one.answer.success, one.answer.message, self._levels.get(status))
+        return ServiceAnswer(one.answer.success, one.answer.message, self._levels.get(status))
 
     def set_parameters(self, node: str, values: Mapping[str, float], patience: float) -> None:
         """Set parameters of a node, all at once.
@@ -147,7 +154,12 @@ class Caller:
 
 @contextmanager
 def caller(is_wanted: Callable[[], bool]) -> Iterator[Caller]:
-    """Provide a client, which gives up waiting once `is_wanted()` is false."""
+    """Provide a client, which gives up waiting once `is_wanted()` is false.
+
+    It looks for identifiers, so that a discovery server has to tell it of all that there is.
+    """
+    if os.environ.get("ROS_DISCOVERY_SERVER"):
+        os.environ.setdefault("ROS_SUPER_CLIENT", "TRUE")
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node(

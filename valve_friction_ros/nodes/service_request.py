@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Requests to the services of other nodes, of which none is lost; whoever asks turns the executor.
 
 A node that has not met a new client yet answers it in vain, however ready its service is: DDS tells
@@ -14,15 +23,7 @@ from typing import Any
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
-
-__all__ = [
-    "LateError",
-    "PatientRequest",
-    "TriggerCall",
-    "UnansweredError",
-    "set_parameters_request",
-]
+from std_srvs.srv import SetBool, Trigger
 
 _AGAIN = 0.5
 """Time without an answer, s, after which a harmless request is made again."""
@@ -84,7 +85,7 @@ class PatientRequest:
         self._node.destroy_client(self._client)
 
 
-def set_parameters_request(node: Node, target: str, values: Mapping[str, float]) -> PatientRequest:
+def set_parameters_request(node: Node, target: str, values: Mapping[str, Any]) -> PatientRequest:
     """Return the request that sets parameters of the node `target`, all at once."""
     request = SetParametersAtomically.Request(
         parameters=[
@@ -96,7 +97,7 @@ def set_parameters_request(node: Node, target: str, values: Mapping[str, float])
 
 
 class TriggerCall:
-    """One call of a std_srvs/Trigger service, which is made once.
+    """One call of a std_srvs/Trigger service, or of a SetBool one, which is made once.
 
     Parameters
     ----------
@@ -110,6 +111,10 @@ class TriggerCall:
         Longest time until the service is met, s.
     patience : float
         Longest time until the answer, s.
+    values : mapping of str to object, optional
+        Parameters of the node that are set before, all at once; they hold for this call.
+    switch : bool, optional
+        What a SetBool service is given; None: the service takes nothing.
 
     Attributes
     ----------
@@ -118,9 +123,17 @@ class TriggerCall:
     """
 
     def __init__(
-        self, node: Node, identifier: str, service: str, meeting: float, patience: float
+        self,
+        node: Node,
+        identifier: str,
+        service: str,
+        meeting: float,
+        patience: float,
+        values: Mapping[str, Any] | None = None,
+        switch: bool | None = None,
     ) -> None:
         self.answer: Any = None
+        self._values, self._switch = values, switch
         self._node, self._identifier = node, identifier
         self._name = f"{identifier}/{service}"
         self._meeting, self._patience = meeting, patience
@@ -145,7 +158,10 @@ class TriggerCall:
         is_there = self._client.service_is_ready()
         if self._future is None:
             if is_there and self._is_known(waited):
-                self._future = self._client.call_async(Trigger.Request())
+                request = Trigger.Request()
+                if self._switch is not None:
+                    request = SetBool.Request(data=self._switch)
+                self._future = self._client.call_async(request)
             elif not is_there and waited > self._meeting:
                 raise UnansweredError(
                     f"{self._name} is not there: start the identifier of this valve"
@@ -164,10 +180,14 @@ class TriggerCall:
     def _begin(self) -> None:
         """Make the client, and after it the one whose answer shows that both are known."""
         try:
-            self._client = self._node.create_client(Trigger, self._name)
+            kind = Trigger if self._switch is None else SetBool
+            self._client = self._node.create_client(kind, self._name)
         except Exception as error:  # noqa: BLE001 - rclpy's, where the name is no name of a service
             about = str(error).partition("\n")[0]
             raise UnansweredError(f"{self._name} cannot be called: {about}") from None
+        if self._values:
+            self._greeting = set_parameters_request(self._node, self._identifier, self._values)
+            return
         self._greeting = PatientRequest(
             self._node,
             GetParameters,
@@ -178,9 +198,13 @@ class TriggerCall:
     def _is_known(self, waited: float) -> bool:
         """Return whether the node has met this client; True where it has no parameters to ask."""
         greeting = self._greeting
-        if greeting is None or greeting.step():
+        if greeting is None:
             return True
-        return not greeting.is_met() and waited > _NO_PARAMETERS
+        if greeting.step():
+            if self._values and not greeting.answer.result.successful:
+                raise UnansweredError(greeting.answer.result.reason)
+            return True
+        return not self._values and not greeting.is_met() and waited > _NO_PARAMETERS
 
     def close(self) -> None:
         """Forget it; a call that was made goes on."""

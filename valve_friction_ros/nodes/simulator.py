@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Node `simulator`: a valve with Karnopp friction on real topics."""
 
 import sys
@@ -19,33 +28,30 @@ from valve_friction_ros.model import (
 )
 from valve_friction_ros.model.checks import require_non_negative
 from valve_friction_ros.nodes.plumbing.messages import stamp_of
+from valve_friction_ros.nodes.plumbing.pace import PacedSteps
 from valve_friction_ros.nodes.plumbing.parameters import (
-    ParameterSpec,
     declare_parameters,
+    karnopp_parameters_from,
     reject_invalid,
     values_of,
+    valve_from,
 )
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides, stream
 from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
-from valve_friction_ros.nodes.plumbing.valve_parameters import (
-    JOINT,
-    KARNOPP_PARAMETERS,
-    VALVE_PARAMETERS,
-    karnopp_parameters_from,
-    valve_from,
-)
 from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.settings import NODES
 
-__all__ = ["PARAMETERS", "Simulator", "main"]
-
-_PAUSE = 0.02
-"""Time between two looks for pressures, s: as often as `pressure_source` sends some."""
+_TICK = 1e-3
+_SELDOM = 0.02
+"""Times between two looks for pressures, s: while they come, and when none has come for a while."""
+_WHILE = 1.0
+"""Time, s, after which pressures no longer come."""
 
 _LONGEST = 0.5
-"""Time, s, for which the stem follows pressures in one turn: a reliable subscription that is not
+"""Time, s, for which the stem follows pressures in one step: a reliable subscription that is not
 emptied holds its publisher up, and the node must end when it is asked."""
 
 _MOST_WAITING = 20_000
@@ -54,14 +60,8 @@ _MOST_WAITING = 20_000
 _HIGHEST_PRESSURE = 1e9
 """Pressure, Pa, beyond any valve: a larger number may overflow the model."""
 
-_NOISE_PARAMETERS = (
-    ParameterSpec(
-        "position_noise", 0.0, "Standard deviation of the stem sensor's noise [m]", (0.0, 1.0)
-    ),
-    ParameterSpec("noise_seed", 0, "Seed of the noise [-]", (0, 2**31 - 1), read_only=True),
-)
-_CHANGEABLE = (*VALVE_PARAMETERS, *KARNOPP_PARAMETERS, *_NOISE_PARAMETERS)
-PARAMETERS = (*_CHANGEABLE, JOINT)
+_PARAMETERS = NODES["simulator"]
+_CHANGEABLE = tuple(one for one in _PARAMETERS if not one.read_only)
 
 
 class _Plant(NamedTuple):
@@ -79,15 +79,23 @@ def _plant(values: Mapping[str, Any]) -> _Plant:
 
 
 class Simulator(PolledNode):
-    """Steps the model by the stamps of the pressure and publishes the stem at the same stamps."""
+    """Steps the model by the stamps of the pressure and publishes the stem at the same stamps.
 
-    def __init__(self) -> None:
-        super().__init__("simulator")
-        declare_parameters(self, PARAMETERS)
+    Add it to any executor of rclpy. Raises ValueError for an impossible valve.
+
+    Parameters
+    ----------
+    **named
+        What `rclpy.node.Node` takes, such as `namespace` and `parameter_overrides`.
+    """
+
+    def __init__(self, **named: Any) -> None:
+        super().__init__("simulator", **named)
+        declare_parameters(self, _PARAMETERS)
         self._plant = _plant(values_of(self, _CHANGEABLE))
         reject_invalid(self, _CHANGEABLE, _plant)
         self.add_post_set_parameters_callback(self._take_parameters)
-        self._joint = self.get_parameter(JOINT.name).value or "stem"
+        self._joint = self.get_parameter("joint").value or "stem"
         self._random = np.random.default_rng(self.get_parameter("noise_seed").value)
         self._stamp: int | None = None
         self._pressure = 0.0
@@ -98,19 +106,29 @@ class Simulator(PolledNode):
         )
         self._waiting: deque[FluidPressure] = deque(maxlen=_MOST_WAITING)
         self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
+        self._pace = PacedSteps(self, "stem", self._step)
 
     def _take_parameters(self, _: object) -> None:
         self._plant = _plant(values_of(self, _CHANGEABLE))
 
     def poll(self) -> None:
-        """Let the stem follow the pressures that have arrived."""
+        """Begin to follow the pressure."""
+        self._pace.begin()
+
+    def close(self) -> None:
+        """Follow it no more."""
+        self._pace.end()
+
+    def _step(self) -> float:
+        """Let the stem follow the pressures that have arrived; return the time of the next step."""
+        begun = time.monotonic()
         # Taken at once: a reliable subscription that is not emptied slows its publishers down.
         self._waiting.extend(taken.message for taken in self._pressures.take())
-        if not self._readiness.look():
-            return
-        until = time.monotonic() + _LONGEST
-        while self._waiting and time.monotonic() < until:
-            self._follow(self._waiting.popleft())
+        if self._readiness.look():
+            until = begun + _LONGEST
+            while self._waiting and time.monotonic() < until:
+                self._follow(self._waiting.popleft())
+        return begun + (_TICK if begun - self.last_heard < _WHILE else _SELDOM)
 
     def _follow(self, message: FluidPressure) -> None:
         stamp, pressure = stamp_of(message.header.stamp), message.fluid_pressure
@@ -149,7 +167,7 @@ class Simulator(PolledNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    return run_node(Simulator, arguments, _PAUSE)
+    return run_node(Simulator, arguments)
 
 
 if __name__ == "__main__":

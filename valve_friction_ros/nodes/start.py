@@ -1,11 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Entry points of the nodes, light enough to be interrupted before a node is imported."""
 
 import importlib
 import os
 import signal
 import sys
-
-__all__ = ["dashboard", "identifier", "identifiers", "pressure_source", "simulator"]
 
 
 def _end(*_: object) -> None:
@@ -21,8 +28,7 @@ def _start(node: str) -> int:
     if {"-h", "--help"} & set(sys.argv[1:]):
         # Whoever stops reading, as `head` does, ends it without a word.
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-        words = importlib.import_module("valve_friction_ros.nodes.plumbing.help_text")
-        print(words.help_text(node.split(".", maxsplit=1)[0], module.__doc__, module.PARAMETERS))  # noqa: T201
+        print(_help_text(node.split(".", maxsplit=1)[0], str(module.__doc__)))  # noqa: T201
         return 0
     exit_code: int = module.main()
     # All is closed: Python would take a second more to take its modules apart.
@@ -31,9 +37,31 @@ def _start(node: str) -> int:
     os._exit(exit_code)
 
 
+def _help_text(name: str, purpose: str) -> str:
+    """Say how the executable `name` is run, and what its parameters mean."""
+    import yaml  # noqa: PLC0415 - slow to import
+
+    from valve_friction_ros.settings import NODES  # noqa: PLC0415
+
+    lines = [
+        f"usage: {name} [--ros-args [-r __ns:=/fv_101] [-p NAME:=VALUE] [--params-file FILE]]",
+        "",
+        purpose,
+        "",
+        "Ctrl-C stops it. Parameters and their defaults, as they are written in a FILE:",
+    ]
+    for one in NODES[name]:
+        if one.default is None:
+            taken = "" if one.assumed is None else f"; {one.assumed:g} is assumed, and said so"
+            lines.append(f"  # {one.name}:  # {one.description}; unset{taken}")
+            continue
+        default = yaml.safe_dump(one.default, default_flow_style=True).splitlines()[0]
+        lines.append(f"  {one.name}: {default}  # {one.description}")
+    return "\n".join(lines)
+
+
 def dashboard() -> int:
-    """Run the node `dashboard`, which computes nothing that is compiled."""
-    os.environ["NUMBA_DISABLE_JIT"] = "1"  # numba takes 110 MB
+    """Run the node `dashboard`."""
     return _start("dashboard.node")
 
 
@@ -50,6 +78,11 @@ def identifiers() -> int:
 def simulator() -> int:
     """Run the node `simulator`."""
     return _start("simulator")
+
+
+def stroke_player() -> int:
+    """Run the node `stroke_player`."""
+    return _start("stroke_player")
 
 
 def pressure_source() -> int:

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The stroke test from which the friction of a valve will be known best; no ROS."""
 
 from typing import TYPE_CHECKING
@@ -6,14 +15,15 @@ from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
     from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
-    from valve_friction_ros.planning.friction_range import (
+    from valve_friction_ros.planning.search import StrokePlan, plan_remarks, plan_test
+    from valve_friction_ros.planning.steps import SetPoint, set_points, signal_range
+    from valve_friction_ros.planning.stroke_test import (
         FrictionRange,
+        Pattern,
+        StrokeTest,
         known_friction,
         unknown_friction,
     )
-    from valve_friction_ros.planning.remarks import plan_remarks
-    from valve_friction_ros.planning.search import StrokePlan, plan_test
-    from valve_friction_ros.planning.stroke_test import Pattern, StrokeTest
 else:
     __getattr__ = names_on_demand(__name__)
 
@@ -23,10 +33,13 @@ __all__ = [
     "FrictionRange",
     "Limits",
     "Pattern",
+    "SetPoint",
     "StrokePlan",
     "StrokeTest",
     "known_friction",
     "plan_remarks",
     "plan_test",
+    "set_points",
+    "signal_range",
     "unknown_friction",
 ]

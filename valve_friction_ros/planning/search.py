@@ -1,19 +1,176 @@
-"""The search for the stroke test with the smallest predicted intervals."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The search for the stroke test with the smallest predicted intervals.
+
+A forecast says what a test will do to a valve and what will be known after it; remarks say what the
+people who play the test must know.
+"""
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from valve_friction_ros.identification import IdentificationSettings, RefusalError
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification import (
+    IdentificationSettings,
+    RefusalError,
+    expected_half_widths,
+    percentage,
+)
+from valve_friction_ros.identification.trust.limits import FALL_SPEED
+from valve_friction_ros.identification.trust.sliding import mean_sliding_friction
+from valve_friction_ros.identification.units import SLIDING
+from valve_friction_ros.model.excitations import Excitation
+from valve_friction_ros.model.instruments import SensorNoise, converter_response
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.simulation import Trajectory, simulate
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.planning.conditions import AIMS, Conditions, Limits
-from valve_friction_ros.planning.forecast import Forecast, forecast, moved
-from valve_friction_ros.planning.friction_range import FrictionRange
-from valve_friction_ros.planning.pressure_band import PressureBand, pressure_band
-from valve_friction_ros.planning.stroke_test import SHAPES, Pattern, StrokeTest, stroke_test
+from valve_friction_ros.planning.stroke_test import (
+    LEAST_STROKE,
+    SHAPES,
+    FrictionRange,
+    Pattern,
+    PressureBand,
+    StrokeTest,
+    frictionless_reach,
+    lowest_pressure,
+    pressure_band,
+    stroke,
+    stroke_test,
+)
 
-__all__ = ["StrokePlan", "plan_test"]
+_MOST_SAMPLES = 12_000
+"""Samples that a forecast simulates: of more, so many with as much less noise tell the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTest:
+    """A simulated test.
+
+    Attributes
+    ----------
+    sample_period : float
+        Time between two samples, s.
+    pressure : ndarray of float, shape (n,)
+        Behind the converter, Pa.
+    stem : Trajectory
+        Position and velocity of the stem.
+    """
+
+    sample_period: float
+    pressure: NDArray[np.float64] = field(repr=False)
+    stem: Trajectory = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What will be known of one valve.
+
+    Attributes
+    ----------
+    parameters : KarnoppParameters
+        The valve.
+    values, half_widths : mapping of str to float
+        True values, and half the widths of their 95 % intervals; SI units. No widths if refused.
+    reach : tuple of float
+        Lowest and highest position, m.
+    top_speed : float
+        Largest speed, m/s.
+    breakaways : int
+        How often the stem breaks away.
+    refusal : str
+        Why the identification would refuse the record; empty if it would not.
+    """
+
+    parameters: KarnoppParameters
+    values: Mapping[str, float]
+    half_widths: Mapping[str, float]
+    reach: tuple[float, float]
+    top_speed: float
+    breakaways: int
+    refusal: str = ""
+
+    def relative(self, name: str) -> float:
+        """Half width over the value, inf where either is not there."""
+        value = abs(self.values.get(name, 0.0))
+        return self.half_widths[name] / value if value and name in self.half_widths else math.inf
+
+
+def moved(
+    excitation: Excitation,
+    duration: float,
+    valve: Valve,
+    parameters: KarnoppParameters,
+    conditions: Conditions,
+) -> SimulatedTest:
+    """Simulate a valve under a signal of a converter, without noise."""
+    samples = duration * conditions.sample_rate
+    stride = max(math.ceil(samples / _MOST_SAMPLES), 1)
+    period = stride / conditions.sample_rate
+    time = np.arange(math.floor(duration / period + 1e-9) + 1) * period
+    pressure = converter_response(excitation.sample(time), period, conditions.converter_lag)
+    return SimulatedTest(period, pressure, simulate(valve, parameters, pressure, period))
+
+
+def _breakaways(velocity: NDArray[np.float64]) -> int:
+    return int(np.count_nonzero((velocity[1:] != 0) & (velocity[:-1] == 0)))
+
+
+def forecast(
+    motion: SimulatedTest,
+    valve: Valve,
+    parameters: KarnoppParameters,
+    conditions: Conditions,
+    settings: IdentificationSettings,
+    *,
+    with_competitors: bool = False,
+) -> Forecast:
+    """Tell what the identification will know from a simulated test.
+
+    The noise is one sample of what the sensors have, the same for each test: the width of an
+    interval hardly depends on it.
+    """
+    period, pressure, stem = motion.sample_period, motion.pressure, motion.stem
+    fewer = math.sqrt(1.0 / (period * conditions.sample_rate))
+    noise = SensorNoise(conditions.position_noise * fewer, conditions.pressure_noise * fewer, 0)
+    record = noise.applied_to(Recording(period, pressure, stem.position))
+    refusal, widths = "", {}
+    try:
+        widths = dict(
+            expected_half_widths(
+                record,
+                valve,
+                parameters,
+                settings,
+                start=float(stem.position[0]),
+                with_competitors=with_competitors,
+            )
+        )
+    except RefusalError as error:
+        refusal = str(error)
+    values = {**vars(parameters), SLIDING: mean_sliding_friction(parameters, stem.velocity)}
+    return Forecast(
+        parameters,
+        values,
+        widths,
+        (float(stem.position.min()), float(stem.position.max())),
+        float(np.max(np.abs(stem.velocity))),
+        _breakaways(stem.velocity),
+        refusal,
+    )
+
 
 _SHAPES = (("full",), ("stairs",), ("turning",), ("full", "stairs"))
 _SPEEDS = ((1.0,), (0.4,), (0.15,), (1.0, 0.4), (1.0, 0.15), (1.0, 0.3, 0.1))
@@ -29,7 +186,7 @@ _MIXES = tuple(one for count in (1, 2) for one in itertools.permutations(SHAPES,
 
 _LONGEST_HOLD = 5.0
 
-_REFUSED = 3.0
+_REFUSAL_LOSS = 3.0
 """Loss of a refused record: as of one whose intervals are e³ times wider than those of another."""
 
 
@@ -124,12 +281,12 @@ class _Search:
         that tells nothing of a valve is worse than one that tells little.
         """
         if (pattern, place) not in self.known:
-            test, found = self.test(pattern), _REFUSED
+            test, found = self.test(pattern), _REFUSAL_LOSS
             if test is not None:
                 expected = self.forecast(test, place)
                 shares = [expected.relative(name) for name in self.names]
                 found = sum(-math.log1p(1 / one) for one in shares if one > 0) / len(shares)
-                found += _REFUSED * bool(expected.refusal)
+                found += _REFUSAL_LOSS * bool(expected.refusal)
             self.known[pattern, place] = found
         return self.known[pattern, place]
 
@@ -202,7 +359,7 @@ def plan_test(
     """Find the stroke test with the smallest predicted intervals.
 
     Patterns of strokes, with speeds, turns, stairs and holds, are simulated with each valve of the
-    range; the posterior of the method robust tells the half widths (`expected_half_widths`). The
+    range; the posterior of the method ``plant`` tells the half widths (`expected_half_widths`). The
     mean logarithm of their shares of the values, over the numbers of the aim and over the valves,
     decides: it is the D-criterion of these numbers if they are taken as independent.
 
@@ -276,3 +433,99 @@ def plan_test(
     if plan.likely.refusal:
         raise RefusalError(f"no test within these limits tells the friction: {plan.likely.refusal}")
     return plan
+
+
+_OVERTRAVEL = 5e-3
+"""Share of the travel by which a simulated stem may leave its part before it is said."""
+
+_FASTER_RATIO = 1.05
+_UNKNOWN_REL_HALF_WIDTH = 0.5
+"""Half width over the value from which on a number is called unknown."""
+
+
+def _resting(plan: StrokePlan) -> Iterator[str]:
+    """Yield the valves of the range that will not move."""
+    for name, one, draw in zip(
+        plan.frictions.names, plan.forecasts, plan.frictions.draws, strict=True
+    ):
+        if stroke(plan.valve, draw, plan.band) < LEAST_STROKE * plan.valve.travel:
+            yield (
+                f"a friction {name} (F_s {draw.static_friction:.4g} N) may hold the stem: if it "
+                "does not move, friction has grown at least so far; widen its part of the travel"
+            )
+        elif one.refusal:
+            yield f"friction {name}: the identification would refuse the record: {one.refusal}"
+
+
+def _reaches(plan: StrokePlan) -> Iterator[str]:
+    """Yield that the stem may leave its part of the travel."""
+    valve, limits = plan.valve, plan.limits
+    if plan.band.low <= lowest_pressure(valve):
+        yield (
+            f"the lower end is the atmosphere, {plan.band.low / 1e3:.4g} kPa (pressure_reference): "
+            "the stem may not reach the lower end of its part of the travel"
+        )
+    low, high = frictionless_reach(valve, plan.frictions, plan.band)
+    if low < limits.lowest * valve.travel or high > limits.highest * valve.travel:
+        yield (
+            f"with less friction than was assumed the stem goes further, at most from "
+            f"{100 * max(low, 0.0) / valve.travel:.0f} to "
+            f"{100 * min(high, valve.travel) / valve.travel:.0f} % of the travel"
+        )
+    if low <= 0 or high >= valve.travel:
+        yield "the stem may reach seat or stop: there its pressure tells nothing of friction"
+    lowest = min(one.reach[0] for one in plan.forecasts)
+    highest = max(one.reach[1] for one in plan.forecasts)
+    over = max(limits.lowest * valve.travel - lowest, highest - limits.highest * valve.travel)
+    if over > _OVERTRAVEL * valve.travel:
+        yield (
+            f"after a breakaway the stem may overshoot its part of the travel by "
+            f"{over * 1e3:.2g} mm"
+        )
+
+
+def _speeds(plan: StrokePlan) -> Iterator[str]:
+    fastest = max(one.top_speed for one in plan.forecasts)
+    if fastest > _FASTER_RATIO * plan.limits.speed:
+        yield (
+            f"as it breaks away the stem may jump, at up to {fastest * 1e3:.2g} mm/s, whatever the "
+            "pressure does"
+        )
+    if plan.likely.top_speed < FALL_SPEED:
+        yield (
+            f"the stem moves at {plan.likely.top_speed * 1e3:.2g} mm/s at most: what friction is "
+            f"above that, up to {FALL_SPEED * 1e3:.2g} mm/s, remains unknown; allow more speed or "
+            "travel"
+        )
+
+
+def _unknown_parameters(plan: StrokePlan) -> Iterator[str]:
+    for name in AIMS[plan.aim]:
+        share = plan.likely.relative(name)
+        if share <= _UNKNOWN_REL_HALF_WIDTH:
+            continue
+        why = f"is known to ±{percentage(share)} only" if math.isfinite(share) else "is not told"
+        remedy = "allow more time, speed or travel"
+        if name == "viscous_friction":
+            remedy = "its delay F_v/k cannot be told from a lag of the signals: state a smaller "
+            remedy += "timing_uncertainty if the clocks allow it"
+        yield f"{name} {why}: {remedy}"
+
+
+def _model(one: Forecast) -> Iterator[str]:
+    if one.parameters.static_friction > one.parameters.coulomb_friction:
+        yield (
+            "if friction falls gradually with speed (Stribeck), the intervals of F_c, F_v and F_s "
+            "will be several times wider than predicted"
+        )
+
+
+def plan_remarks(plan: StrokePlan) -> tuple[str, ...]:
+    """Return a sentence for each thing to be known before a test is played."""
+    return (
+        *_resting(plan),
+        *_reaches(plan),
+        *_speeds(plan),
+        *_unknown_parameters(plan),
+        *_model(plan.likely),
+    )

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """How a table of samples is written: its columns, their units, and its layout."""
 
 import codecs
@@ -12,19 +21,19 @@ from valve_friction_ros.records.spelling import nearest
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
     NANOSECONDS,
-    PERCENT,
     POSITION_UNITS,
+    PRESSURE,
     PRESSURE_UNITS,
+    SHARES,
+    span,
     unit_named,
 )
-
-__all__ = ["KNOWN_UNITS", "Columns"]
 
 KNOWN_UNITS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "time": (*NANOSECONDS,),
-        "position": (*POSITION_UNITS, PERCENT),
-        "pressure": (*PRESSURE_UNITS,),
+        "position": (*POSITION_UNITS, *SHARES),
+        "pressure": (*PRESSURE_UNITS, *SHARES),
         "force": (*FORCE_UNITS,),
     }
 )
@@ -44,46 +53,54 @@ def _units(quantity: str) -> str:
 
 @dataclass(frozen=True)
 class Columns:
-    """What a table holds and how it is written, in the words of the options of the commands.
+    """What is said of a table that it does not tell itself, in the words of the options.
 
-    The same words are the keys of the section ``columns:`` of a valve file. Units are those of
-    `records.units`; an empty text leaves out what it describes.
+    The same words are the keys of the section ``columns:`` of a valve file. What is empty is
+    recognized from the table. Units are those of `records.units`; a column that is named here, and
+    whose unit nobody says, is in its SI unit.
 
     Raises ValueError, which names the word, if a value is impossible.
     """
 
-    time_column: str = _described("time_s", "header of the time", "HEADER")
-    time_unit: str = _described(
-        "s", f"{_units('time')}; ISO 8601 is recognized, whatever the unit", "UNIT"
-    )
+    time_column: str = _described("", "header of the time", "HEADER")
+    time_unit: str = _described("", f"{_units('time')}; dates are recognized", "UNIT")
     time_zone: str = _described(
         "", "zone of local times that name none, as Europe/Berlin; without it: UTC", "ZONE"
     )
     time_format: str = _described(
-        "", "form of other dates, as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
+        "", "form of the dates, as '%%d.%%m.%%Y %%H:%%M:%%S.%%f' (strptime)", "FORM"
     )
-    position_column: str = _described("position_m", "header of the stem position", "HEADER")
-    position_unit: str = _described("m", _units("position"), "UNIT")
+    position_column: str = _described("", "header, or tag, of the stem position", "HEADER")
+    position_unit: str = _described("", _units("position"), "UNIT")
     inverted_position: bool = _described(
         False,
         "the position falls while the pressure pushes the stem, as the opening of an air-to-close "
         "valve: take the travel (100 %%) less the position",
     )
-    pressure_column: str = _described("pressure_pa", "header of the pressure", "HEADER")
-    pressure_unit: str = _described("Pa", _units("pressure"), "UNIT")
+    pressure_column: str = _described("", "header, or tag, of the pressure", "HEADER")
+    pressure_unit: str = _described("", _units("pressure"), "UNIT")
+    pressure_range: str = _described(
+        "", "range of a transmitter in mA or percent, as '0..2.5 bar'", "RANGE"
+    )
     opposing_pressure_column: str = _described(
         "", "header of the pressure on the other side of a double-acting actuator", "HEADER"
     )
     opposing_area_ratio: float = _described(
         1.0, "area of the other side (that of the rod) over diaphragm_area", "RATIO"
     )
-    force_column: str = _described("force_n", "header of the force", "HEADER")
-    force_unit: str = _described("N", _units("force"), "UNIT")
-    delimiter: str = _described(",", "between the entries of a row: , ; tab …", "MARK")
-    decimal: str = _described(".", "decimal mark, . or ,", "MARK")
-    encoding: str = _described(
-        "", "as utf-16 or cp1252; without it: by its first bytes, else UTF-8", "NAME"
+    force_column: str = _described("", "header, or tag, of the force", "HEADER")
+    force_unit: str = _described("", _units("force"), "UNIT")
+    tag_column: str = _described("", "header of the tags, where each row is one value", "HEADER")
+    value_column: str = _described("", "header of the values, where each row is one", "HEADER")
+    good_quality: str = _described(
+        "", "what a column of qualities says of good values, with commas between them", "WORDS"
     )
+    maximum_bad_share: float = _described(
+        0.05, "largest share of a signal's values that may be bad; those are left out", "SHARE"
+    )
+    delimiter: str = _described("", "between the entries of a row: , ; tab …", "MARK")
+    decimal: str = _described("", "decimal mark, . or ,", "MARK")
+    encoding: str = _described("", "as utf-16 or cp1252", "NAME")
     skip_rows: int = _described(
         0, "rows to skip at the top; those above the headers are found without it", "N"
     )
@@ -99,7 +116,7 @@ class Columns:
         for quantity, known in KNOWN_UNITS.items():
             name = f"{quantity}_unit"
             unit = unit_named(getattr(self, name))
-            if unit not in known:
+            if unit and unit not in known:
                 raise ValueError(
                     f"unknown unit of {quantity} {unit[:40]!r}; known are {', '.join(known)}"
                 )
@@ -110,20 +127,27 @@ class Columns:
             raise ValueError(
                 f"opposing_area_ratio must be above 0 and at most 2, got {self.opposing_area_ratio}"
             )
+        if self.pressure_range:
+            span(self.pressure_range, PRESSURE)
+        if not 0 <= self.maximum_bad_share < 1:
+            raise ValueError(
+                f"maximum_bad_share must be from 0 to below 1, got {self.maximum_bad_share:g}"
+            )
         if not self.maximum_rows > 0 or not self.maximum_megabytes > 0 or self.skip_rows < 0:
             raise ValueError(
                 "maximum_rows and maximum_megabytes must be above zero, and skip_rows not negative"
             )
 
     def _require_layout(self) -> None:
-        if len(self.delimiter) != 1 or self.delimiter in '"\r\n+-.' or self.delimiter.isalnum():
+        mark = self.delimiter
+        if mark and (len(mark) != 1 or mark in '"\r\n+-.' or mark.isalnum()):
             raise ValueError(
                 f"the delimiter must be one character such as ',', ';' or a tab, got "
                 f"{self.delimiter[:40]!r}"
             )
-        if self.decimal not in (".", ","):
+        if self.decimal not in ("", ".", ","):
             raise ValueError(f"the decimal mark must be '.' or ',', got {self.decimal[:40]!r}")
-        if self.decimal == self.delimiter:
+        if self.decimal and self.decimal == self.delimiter:
             raise ValueError(f"delimiter and decimal mark are both {self.decimal!r}")
         try:
             if self.encoding:

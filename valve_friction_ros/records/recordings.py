@@ -1,19 +1,25 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Recorded files of any kind, read by one function."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.kind import is_bag
-from valve_friction_ros.records.bags.libraries import bag_libraries
+from valve_friction_ros.records.bags.storage import bag_libraries, is_bag
 from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.table_recording import drive_column, read_table
-from valve_friction_ros.records.tables.pipes import readable
-
-__all__ = ["ReadingOptions", "holds_force", "read_recordings"]
+from valve_friction_ros.records.table_recording import holds_a_force, read_table
+from valve_friction_ros.records.table_rows import readable
 
 
 @dataclass(frozen=True)
@@ -43,9 +49,7 @@ def holds_force(path: Path, options: ReadingOptions) -> bool:
     ValueError
         If it is a table that cannot be read, or has neither pressure nor force.
     """
-    return not _is_bag(path, options) and (
-        drive_column(path, options.columns) != options.columns.pressure_column
-    )
+    return not _is_bag(path, options) and holds_a_force(path, options.columns)
 
 
 def _is_bag(path: Path, options: ReadingOptions) -> bool:
@@ -94,4 +98,4 @@ def read_recordings(
         with bag_libraries():
             from valve_friction_ros.records.bags.reading import read_bag  # noqa: PLC0415
         return read_bag(path, valve, options.topics, options.stretch)
-    return (read_table(path, valve, options.columns, options.stretch),)
+    return read_table(path, valve, options.columns, options.stretch, options.topics.valve)

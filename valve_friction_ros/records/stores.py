@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Folders and files in object stores, named as fsspec names them: ``s3://bucket/folder``.
 
 Keys and addresses of the stores are fsspec's own business: its variables of the environment, and
@@ -12,9 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.records.unreadable import cause_of
-
-__all__ = ["explained", "on_disk", "place", "state_of", "walk"]
+from valve_friction_ros.records.whole_file import cause_of
 
 _REMEDY = "S3 needs `pip install s3fs 'universal_pathlib>=0.3.10,<0.4'` (the extra `stores`)"
 _LONGEST_CAUSE = 200

@@ -1,7 +1,16 @@
-"""Recordings in tables: CSV files, gzipped or not, Excel and Parquet."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Recordings in tables: CSV files, gzipped or not, Excel, Parquet and MATLAB."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,193 +22,106 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.tables.table import (
-    OpenTable,
-    Table,
-    joined,
-    open_table,
-    require_room,
-)
+from valve_friction_ros.records.table import OpenTable, ReadSignal, left_out, require_good
 from valve_friction_ros.records.units import (
     FORCE_UNITS,
-    NANOSECONDS,
-    PERCENT,
     POSITION_UNITS,
+    PRESSURE,
     PRESSURE_UNITS,
-    Unit,
+    SHARES,
+    span,
 )
-from valve_friction_ros.streams.samples import Samples
-from valve_friction_ros.streams.uniform_grid import uniform_recording
-
-__all__ = ["drive_column", "read_table"]
-
-_LATEST_TIME = 9e9
-"""Latest time whose nanoseconds a signed 64-bit number holds, s, rounded down."""
-
-_FAR = 1e200
-"""Times beyond this overflow as nanoseconds, and are too late in any unit."""
-
-_Times = NDArray[np.float64] | NDArray[np.int64]
+from valve_friction_ros.streams.samples import Samples, uniform_recording
 
 
-def _on_clock(times: _Times, unit: str) -> _Times:
-    """Return times in ns, finite ones also where they are refused; those of dates are."""
-    if times.dtype == np.int64:
-        return times
-    far = np.isfinite(times) & (np.abs(times) > _FAR)
-    return np.where(far, np.copysign(_FAR, times), times) * NANOSECONDS[unit]
+def _share(read: ReadSignal) -> NDArray[np.float64]:
+    low, high = SHARES[read.signal.unit]
+    return (read.values - low) / (high - low)
 
 
-def _stamps(table: Table, name: str, unit: str) -> NDArray[np.int64]:
-    """Round times to nanoseconds; refuse times that are too large, repeat or go back."""
-    times = table.columns[name]
-    is_date = times.dtype == np.int64
-    on_clock = _on_clock(times, unit)
-    if not is_date and np.abs(on_clock).max() > _LATEST_TIME * 1e9:
-        sample = int(np.argmax(np.abs(times)))
-        raise ValueError(
-            f"{table.place(sample, name)}: {times[sample]:g} {unit} is too large for a time: "
-            "name the unit of the column, or convert it to seconds"
-        )
-    stamps = np.rint(on_clock).astype(np.int64) if not is_date else np.asarray(times, np.int64)
-    steps = np.diff(stamps)
-    if (steps <= 0).any():
-        sample = int(np.argmax(steps <= 0)) + 1
-        what, remedy = (
-            ("repeats", "delete one of the rows")
-            if steps[sample - 1] == 0
-            else ("goes back", "sort the rows, or use the record before or after it")
-        )
-        now, before = (
-            str(np.datetime64(int(time), "ns")) if is_date else f"{time:.12g}"
-            for time in (times[sample], times[sample - 1])
-        )
-        raise ValueError(f"{table.place(sample, name)} {what} ({now} after {before}): {remedy}")
-    return stamps
-
-
-def _require_rising(block: Table, form: Columns, stretch: Stretch, start: float) -> None:
-    """Refuse times of a block that are finite and do not rise, before the rest is read."""
-    if stretch.last < math.inf:
-        return  # the block may yet be left out
-    times = _on_clock(block.columns[form.time_column], form.time_unit)
-    chosen = block.where(stretch.select(times, start))
-    if chosen.rows.size and np.isfinite(times).all():
-        _stamps(chosen, form.time_column, form.time_unit)
-
-
-def _position(table: Table, form: Columns, valve: Valve) -> NDArray[np.float64]:
+def _position(path: Path, read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float64]:
     """Return the position in m, rising the way in which the pressure pushes the stem."""
-    unit = form.position_unit
-    needs = "a position in percent" if unit == PERCENT else "an inverted position"
-    if (unit == PERCENT or form.inverted_position) and not math.isfinite(valve.travel):
+    is_share = read.signal.unit in SHARES
+    if (is_share or form.inverted_position) and not math.isfinite(valve.travel):
+        needs = f"a position in {read.signal.unit}" if is_share else "an inverted position"
         raise ValueError(
-            f"{table.path}: {needs} is a share of the travel: name the travel in the valve file"
+            f"{path}: {needs} is a share of the travel: name the travel in the valve file"
         )
-    size = Unit(valve.travel, 100) if unit == PERCENT else POSITION_UNITS[unit]
-    position = size.to_si(np.asarray(table.columns[form.position_column], np.float64))
+    if is_share and read.signal.unit != "percent":
+        position = _share(read) * valve.travel
+    elif is_share:
+        position = read.values * valve.travel / 100
+    else:
+        position = POSITION_UNITS[read.signal.unit].to_si(read.values)
     return valve.travel - position if form.inverted_position else position
 
 
-def _opened(path: Path, form: Columns) -> tuple[OpenTable, str]:
-    """Open a table; return the header of its drive too: the pressure, or else the force."""
-    either = (form.pressure_column, form.force_column)
-    table = open_table(path, form, [[form.time_column], [form.position_column], either])
-    for name in either:
-        if name in table.header:
-            return table, name
-    wanted = f"{either[0]!r} (or {either[1]!r})"
-    raise ValueError(table.no_column(wanted, ("pressure", "force")))
-
-
-def drive_column(path: Path, form: Columns) -> str:
-    """Return the header of the signal that drives the stem: the pressure, or else the force.
-
-    Raises ValueError if the file cannot be read or has neither pressure nor force.
-    """
-    return _opened(path, form)[1]
-
-
-def _pressure(table: Table, name: str, valve: Valve, form: Columns) -> NDArray[np.float64]:
+def _pressure(path: Path, read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float64]:
     """Return a pressure in Pa; refuse one outside the sensor's range."""
-    values, unit = np.asarray(table.columns[name], np.float64), form.pressure_unit
-    pressure = PRESSURE_UNITS[unit].to_si(values)
-    _require_readable(table, name, valve, pressure, f"{{:g}} {unit}", values)
+    unit = read.signal.unit
+    if unit in SHARES:
+        low, high = (
+            span(form.pressure_range, PRESSURE)
+            if form.pressure_range
+            else (valve.pressure_minimum, valve.pressure_maximum)
+        )
+        if not math.isfinite(high - low):
+            raise ValueError(
+                f"{path}: a pressure in {unit} is a share of the transmitter's range: name it "
+                "(--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum of the "
+                "valve file)"
+            )
+        pressure = low + _share(read) * (high - low)
+    else:
+        pressure = PRESSURE_UNITS[unit].to_si(read.values)
+    _require_readable(path, read, valve, pressure)
     return pressure
 
 
 def _require_readable(
-    table: Table,
-    name: str,
-    valve: Valve,
-    pressure: NDArray[np.float64],
-    words: str,
-    values: NDArray[np.float64],
+    path: Path, read: ReadSignal, valve: Valve, pressure: NDArray[np.float64]
 ) -> None:
     readable = valve.sensor_reads(pressure)
     if not readable.all():
         sample = int(np.argmin(readable))
         raise ValueError(
-            f"{table.place(sample, name)}: {words.format(values[sample])} is outside the sensor's "
-            f"range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use a stretch "
-            "of the record without it, name its unit, or correct the range"
+            f"{path}: {read.place(sample)}: {read.values[sample]:g} {read.signal.unit} is outside "
+            f"the sensor's range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use "
+            "a stretch of the record without it, name its unit, or correct the range"
         )
 
 
 def _drive(
-    table: Table, name: str, valve: Valve, form: Columns
+    path: Path, reads: Sequence[ReadSignal], valve: Valve, form: Columns
 ) -> tuple[NDArray[np.float64], Drive]:
     """Return the drive in its SI unit.
 
     A force on the diaphragm of a valve becomes the pressure that exerts it. Of a double-acting
     actuator it is the pressure that alone would exert the force of both.
     """
-    if name == form.pressure_column:
-        drive = _pressure(table, name, valve, form)
-        if form.opposing_pressure_column:
-            opposing = _pressure(table, form.opposing_pressure_column, valve, form)
-            drive = drive - form.opposing_area_ratio * (opposing - valve.pressure_reference)
-        return drive, Drive.PRESSURE
-    values = np.asarray(table.columns[name], np.float64)
-    drive = valve.actuator_drive(FORCE_UNITS[form.force_unit].to_si(values))
-    _require_readable(table, name, valve, drive, f"{{:g}} {form.force_unit}", values)
-    return drive, valve.driven_by
+    read, *others = reads
+    if read.signal.quantity == "force":
+        force = FORCE_UNITS[read.signal.unit].to_si(read.values)
+        drive = valve.actuator_drive(force)
+        _require_readable(path, read, valve, drive)
+        return drive, valve.driven_by
+    drive = _pressure(path, read, valve, form)
+    for other in others:
+        opposing = _pressure(path, other, valve, form)
+        own = np.interp(read.stamps, other.stamps, opposing)
+        drive = drive - form.opposing_area_ratio * (own - valve.pressure_reference)
+    return drive, Drive.PRESSURE
 
 
-def _chosen(opened: OpenTable, names: Mapping[str, str], stretch: Stretch) -> Table:
-    """Read the stretch, and keep no more of the table than that."""
-    form = opened.form
-    kept: list[Table] = []
-    start: float | None = None
-    for block in opened.blocks(names, form.time_column):
-        times = _on_clock(block.columns[form.time_column], form.time_unit)
-        if start is None:
-            start = float(times[0]) if times.dtype == np.float64 else int(times[0])
-        since = times - start
-        if (since > stretch.end * 1e9).all():
-            break
-        if (since < stretch.begin * 1e9).all():
-            continue
-        _require_rising(block, form, stretch, start)
-        kept.append(block)
-        newest = min(float(since[-1]), stretch.end * 1e9)
-        while len(kept) > 1 and math.isfinite(newest):
-            oldest = _on_clock(kept[0].columns[form.time_column], form.time_unit)[-1] - start
-            if not newest - oldest > (stretch.last + 1) * 1e9:
-                break
-            del kept[0]
-        require_room(opened.path, form, sum(each.rows.size for each in kept))
-    if start is None:
-        raise ValueError(f"{opened.path}: there are no rows under the header")
-    if kept:
-        table = joined(kept)
-        times = _on_clock(table.columns[form.time_column], form.time_unit)
-        table = table.where(stretch.select(times, start))
-    if not kept or table.rows.size == 0:
-        raise RefusalError(
-            f"{opened.path}: the chosen stretch holds no rows: choose another begin or end"
-        )
-    return table
+def holds_a_force(path: Path, form: Columns) -> bool:
+    """Return whether a force, and no pressure, drives the stem in a table.
+
+    Raises ValueError if the file cannot be read, or leaves something open.
+    """
+    table = OpenTable(path, form)
+    table.require_settled()
+    signals = (signal for group in table.layout.valves.values() for signal in group)
+    return any(signal.quantity == "force" for signal in signals)
 
 
 def read_table(
@@ -207,8 +129,9 @@ def read_table(
     valve: Valve,
     form: Columns | None = None,
     stretch: Stretch | None = None,
-) -> RecordedValve:
-    """Read a recording of pressure, or force, and stem position.
+    name: str | None = None,
+) -> tuple[RecordedValve, ...]:
+    """Read the recordings of pressure, or force, and stem position of all valves of a table.
 
     Its samples pass through the same resampling as the samples of topics, with stamps in whole
     nanoseconds, so that a recording gives the same numbers from a file and from topics.
@@ -221,53 +144,84 @@ def read_table(
         With a diaphragm it converts a force in the file into a pressure; it gives the sensor's
         range, and the travel for positions in percent.
     form : Columns, optional
-        Columns, units and layout. Pressure is read from a file with both pressure and force.
+        What the file does not say itself. Pressure is read from a file with both pressure and
+        force.
     stretch : Stretch, optional
         The part to read; errors outside it do not matter.
+    name : str, optional
+        Only this valve of several.
 
     Returns
     -------
-    RecordedValve
-        The recording on a uniform grid.
+    tuple of RecordedValve
+        The recordings on a uniform grid; the first of their notes says how the table was read.
 
     Raises
     ------
     ValueError
-        If the file cannot be read or holds an impossible value: file, row, cause and remedy.
+        If the file cannot be read, leaves something open, holds an impossible value, or more bad
+        values than `form` allows: file, row, cause and remedy.
     RefusalError
         If there is only one sample, or gaps take more than half of the time.
     """
-    form, stretch = form or Columns(), stretch or Stretch()
-    opened, name = _opened(path, form)
-    names = {
-        form.time_column: "time",
-        form.position_column: "position",
-        name: "pressure" if name == form.pressure_column else "force",
-    }
-    if form.opposing_pressure_column:
-        if name != form.pressure_column:
-            raise ValueError(
-                f"{path}: a double-acting actuator has two pressures, and there is no column "
-                f"{form.pressure_column!r}: name the pressure that pushes the stem to larger "
-                "positions"
-            )
-        names[form.opposing_pressure_column] = "pressure"
-    table = _chosen(opened, names, stretch)
-    table.require_finite()
-    stamps = _stamps(table, form.time_column, form.time_unit)
-    drive, driven_by = _drive(table, name, valve, form)
-    position = _position(table, form, valve)
+    table = OpenTable(path, form)
+    table.require_settled()
+    valves = table.layout.valves
+    if name is not None and len(valves) > 1:
+        wanted = name.strip("/").casefold()
+        chosen = {one: each for one, each in valves.items() if _plain(one) == _plain(wanted)}
+        if not chosen:
+            known = ", ".join(valves)
+            raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
+        valves = chosen
+    every = [signal for signals in valves.values() for signal in signals]
+    read = dict(zip(every, table.read(every, stretch), strict=True))
+    form = table.layout.form
+    if len(valves) == 1:
+        ((label, signals),) = valves.items()
+        return (_recorded(table, label, [read[one] for one in signals], valve, form),)
+    found = []
+    for label, signals in valves.items():
+        try:
+            one = _recorded(table, label, [read[each] for each in signals], valve, form)
+        except (ValueError, RefusalError) as error:
+            reason = str(error).removeprefix(f"{path}: ")
+            one = RecordedValve(path, label, RefusalError(reason))
+        found.append(one)
+    return tuple(found)
+
+
+def _plain(text: str) -> str:
+    return "".join(filter(str.isalnum, text.casefold()))
+
+
+def _recorded(
+    table: OpenTable, label: str, reads: Sequence[ReadSignal], valve: Valve, form: Columns
+) -> RecordedValve:
+    """Make the recording of one valve: what drives it, its position, what opposes it."""
+    path = table.path
+    for each in reads:
+        require_good(path, each, form)
+    drives = [each for each in reads if each.signal.quantity != "position"]
+    (stem,) = (each for each in reads if each.signal.quantity == "position")
+    drive, driven_by = _drive(path, drives, valve, form)
+    position = _position(path, stem, form, valve)
+    names = (drives[0].signal.name, stem.signal.name)
+    by_name = dict(zip(names, (drives[0], stem), strict=True))
     try:
         recording = uniform_recording(
-            Samples(stamps, drive),
-            Samples(stamps, position),
-            (name, form.position_column),
+            Samples(drives[0].stamps, drive),
+            Samples(stem.stamps, position),
+            names,
             driven_by,
             lambda gap: (
-                f"{table.entry(gap.sample, form.time_column)}: gap of {gap.seconds:.3g} s: use a "
-                "stretch of the record without it"
+                f"row {by_name[gap.name].rows[gap.sample]}, column "
+                f"{table.layout.headers[by_name[gap.name].signal.time[0]]!r}: gap of "
+                f"{gap.seconds:.3g} s: use a stretch of the record without it"
             ),
         )
     except RefusalError as refusal:
         raise RefusalError(f"{path}: {refusal}") from None
-    return RecordedValve(path, "", recording, table.notes)
+    notes = [] if table.layout.is_own else [table.layout.words]
+    notes += [told for each in reads if (told := left_out(each))]
+    return RecordedValve(path, label, recording, tuple(notes))

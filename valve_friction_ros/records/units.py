@@ -1,21 +1,22 @@
-"""Units of recorded files, and their sizes in SI units."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""Units of recorded numbers, and quantities as people write them: a number and its unit."""
+
+import re
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-__all__ = [
-    "FORCE_UNITS",
-    "NANOSECONDS",
-    "PERCENT",
-    "POSITION_UNITS",
-    "PRESSURE_UNITS",
-    "Unit",
-    "unit_named",
-]
 
 
 class Unit(NamedTuple):
@@ -68,7 +69,8 @@ POSITION_UNITS = MappingProxyType(
 )
 
 PERCENT = "percent"
-"""Unit of a position as a share of the travel; the valve gives its size."""
+SHARES = MappingProxyType({PERCENT: (0.0, 100.0), "fraction": (0.0, 1.0), "mA": (4.0, 20.0)})
+"""Units of a share: of the travel, or of the range of the pressure sensor; both ends of it."""
 
 FORCE_UNITS = MappingProxyType(
     {
@@ -80,24 +82,64 @@ FORCE_UNITS = MappingProxyType(
 )
 
 NANOSECONDS = MappingProxyType(
-    {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000, "min": 60_000_000_000}
+    {
+        "ns": 1,
+        "us": 1_000,
+        "ms": 1_000_000,
+        "s": 1_000_000_000,
+        "min": 60_000_000_000,
+        "h": 3_600_000_000_000,
+        "d": 86_400_000_000_000,
+        "microdays": 86_400_000,
+    }
 )
 """Units of time in nanoseconds, the unit of all stamps."""
 
 _OTHER_NAMES = MappingProxyType(
     {
         "%": PERCENT,
+        "pct": PERCENT,
+        "prozent": PERCENT,
+        "0-1": "fraction",
+        "0..1": "fraction",
+        "p.u.": "fraction",
+        "pu": "fraction",
+        "ratio": "fraction",
+        "4-20 mA": "mA",
+        "4..20 mA": "mA",
         "µm": "um",
         "μm": "um",
         "µs": "us",
         "μs": "us",
         "sec": "s",
+        "secs": "s",
+        "second": "s",
+        "seconds": "s",
+        "sek": "s",
+        "millisecond": "ms",
+        "milliseconds": "ms",
+        "msec": "ms",
+        "minute": "min",
+        "minutes": "min",
+        "hours": "h",
+        "days": "d",
         '"': "in",
         "inch": "in",
+        "inches": "in",
+        "meter": "m",
+        "metre": "m",
+        "millimeter": "mm",
+        "millimetre": "mm",
+        "micron": "um",
+        "newton": "N",
+        "pascal": "Pa",
         "psig": "psi",
         "psia": "psi",
         "barg": "bar",
         "bara": "bar",
+        "kPag": "kPa",
+        "kPaa": "kPa",
+        "mbarg": "mbar",
         "kg/cm2": "kgf/cm2",
         "kg/cm²": "kgf/cm2",
         "kgf/cm²": "kgf/cm2",
@@ -105,6 +147,70 @@ _OTHER_NAMES = MappingProxyType(
 )
 
 
+_GAUGE_OR_ABSOLUTE = re.compile(r"\s*(?:\((?:g|a|abs|gauge|Ü|ü)\)|\s(?:abs|gauge|absolute|Ü|ü))$")
+"""What follows a unit of pressure; the `pressure_reference` of the valve says the same."""
+
+
 def unit_named(name: str) -> str:
-    """Return the name that this module has for a unit; an unknown one as it is."""
-    return _OTHER_NAMES.get(name, name)
+    """Return the name that this module has for a unit, whatever its case; else it as it is."""
+    plain = _GAUGE_OR_ABSOLUTE.sub("", name.strip())
+    return _OTHER_NAMES.get(plain) or _BY_CASE.get(plain.casefold(), name)
+
+
+AREA: Mapping[str, Unit] = {
+    "m2": Unit(1),
+    "cm2": Unit(1, 1e4),
+    "mm2": Unit(1, 1e6),
+    "in2": Unit(6.4516, 1e4),
+}
+LENGTH, PRESSURE = POSITION_UNITS, PRESSURE_UNITS
+MASS: Mapping[str, Unit] = {"kg": Unit(1), "g": Unit(1, 1e3), "lb": Unit(0.45359237)}
+
+_KNOWN = (*NANOSECONDS, *POSITION_UNITS, *PRESSURE_UNITS, *FORCE_UNITS, *SHARES)
+_BY_CASE = {name.casefold(): name for name in _KNOWN} | {
+    name.casefold(): known for name, known in _OTHER_NAMES.items()
+}
+
+_EXAMPLES = ((AREA, "690 cm2"), (LENGTH, "28.6 mm"), (MASS, "1.6 kg"))
+
+_NUMBER = r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
+_SINGLE = re.compile(rf"\s*{_NUMBER}\s*(\D.*?)?\s*", re.ASCII)
+_SPAN = re.compile(rf"\s*{_NUMBER}\s*(?:\.\.|…|–|-|to)\s*{_NUMBER}\s*(\D.*?)?\s*", re.ASCII)
+
+
+def _unit(text: str, name: str | None, units: Mapping[str, Unit]) -> Unit:
+    plain = unit_named((name or "").replace("²", "2").replace("^2", "2").replace("sq in", "in2"))
+    by_name = {known.lower(): size for known, size in units.items()}
+    if plain.lower() not in by_name:
+        what = f"unknown unit {plain[:20]!r}" if plain else "there is no unit"
+        raise ValueError(f"{text[:60]!r}: {what}; known are {', '.join(units)}")
+    return units[plain] if plain in units else by_name[plain.lower()]
+
+
+def _si(number: str, unit: Unit) -> float:
+    import numpy as np  # noqa: PLC0415 - slow to import
+
+    return float(unit.to_si(np.array([float(number.replace(",", "."))]))[0])
+
+
+def quantity(text: str, units: Mapping[str, Unit]) -> float:
+    """Read a number with its unit, as ``690 cm2``, in its SI unit; raises ValueError."""
+    found = _SINGLE.fullmatch(text) if len(text) < 100 else None
+    if found is None:
+        example = next(each for known, each in _EXAMPLES if known is units)
+        raise ValueError(f"{text[:60]!r} is no number with its unit, as {example}")
+    number, name = found.groups()
+    return _si(number, _unit(text, name, units))
+
+
+def span(text: str, units: Mapping[str, Unit]) -> tuple[float, float]:
+    """Read a range with its unit, as ``0.2..1.0 bar``, in its SI unit; raises ValueError."""
+    found = _SPAN.fullmatch(text) if len(text) < 100 else None
+    if found is None:
+        raise ValueError(f"{text[:60]!r} is no range with its unit, as 0.2..1.0 bar")
+    low, high, name = found.groups()
+    unit = _unit(text, name, units)
+    begin, end = _si(low, unit), _si(high, unit)
+    if not begin < end:
+        raise ValueError(f"{text[:60]!r}: the range must rise")
+    return begin, end

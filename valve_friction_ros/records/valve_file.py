@@ -1,39 +1,84 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The YAML file that describes a valve: plain, or as a node's parameters."""
 
-import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import yaml
+
 from valve_friction_ros.identification import (
     FIXABLE,
-    METHODS,
     STATED,
-    IdentificationSettings,
     require_valve_units,
 )
 from valve_friction_ros.model import KarnoppParameters, Valve
 from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.spelling import nearest, resembling
-from valve_friction_ros.records.valve_keys import (
+from valve_friction_ros.records.whole_file import cause_of
+from valve_friction_ros.settings import (
     COLUMNS,
-    GEOMETRY,
+    IDENTIFICATION,
     NODE_NAMES,
-    SETTINGS,
+    SURVEY,
+    VALVE,
     VALVE_KEYS,
+    Setting,
+    identification_from,
     is_known,
 )
-from valve_friction_ros.records.yaml_file import read_yaml
 
-__all__ = ["ValveFile", "read_valve_file", "valve_file_of"]
+_LARGEST = 1_000_000
+"""Most bytes of a file. Chosen: a valve file has some hundred; PyYAML reads 0.1 MB a second."""
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Refuses a repeated key; YAML would silently take the last value."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Build a mapping; refuse a repeated key."""
+        seen = set()
+        keys = (key for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+        for key in keys:
+            if key.value in seen:
+                raise yaml.MarkedYAMLError(
+                    problem=f"{key.value[:60]} is given twice", problem_mark=key.start_mark
+                )
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> Any:
+    """Read a YAML file; raises ValueError, with the file and the cause, if that fails."""
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(_LARGEST + 1)
+        if len(content) > _LARGEST:
+            raise ValueError(f"more than {_LARGEST // 1000} kB: give the file of one valve")
+        return yaml.load(content.decode("utf-8-sig"), _StrictLoader)  # noqa: S506 - is safe
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: not YAML: {' '.join(str(error).split())[:300]}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: not YAML of a valve: it is nested too deeply") from None
+    except (OSError, ValueError) as error:
+        cause = cause_of(error)
+        raise ValueError(f"{path}: cannot be read: {cause}") from None
+
 
 _BLOCK = "ros__parameters"
 _OUR_NODE = "identifier"
-_WHOLE = ("derivative_window", "polynomial_order")
 
 
 @dataclass(frozen=True)
@@ -52,12 +97,18 @@ class ValveFile:
     settings : mapping of str to object
         Settings of the identification by the names of the node's parameters, as
         ``timing_uncertainty`` or ``fixed.mass``; without those that are not given.
+    survey : mapping of str to object
+        Settings of a first survey that are given, as ``packing``.
+    assumed : tuple of str
+        Fields of the valve on which forces depend, and which the file does not state.
     """
 
     valve: Valve
     known: MappingProxyType[str, float]
     columns: Columns = field(default_factory=Columns)
     settings: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    assumed: tuple[str, ...] = ()
+    survey: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def stated(self) -> dict[str, float]:
@@ -158,41 +209,40 @@ def _flat(content: Mapping[Any, Any], is_shared: bool) -> dict[str, Any]:
     return values
 
 
-def _settings(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that are given: nan and a window of 0 stand for none."""
-    settings: dict[str, Any] = {}
-    for name in SETTINGS:
-        if name not in values:
-            continue
-        if name == "method":
-            if values[name] not in METHODS:
-                raise ValueError(f"method {values[name]!r:.60} is unknown: {', '.join(METHODS)}")
-            settings[name] = values[name]
-            continue
-        number = _number(name, values[name])
-        if name in _WHOLE and not number.is_integer():
-            raise ValueError(f"{name} must be a whole number, got {values[name]!r:.60}")
-        if not math.isnan(number) and (name != "derivative_window" or number):
-            settings[name] = int(number) if name in _WHOLE else number
-    return settings
+def _read(setting: Setting, value: object) -> Any:
+    """Return a value as its setting demands it; None where it stands for "not given"."""
+    if setting.choices:
+        text = setting.spell(str(value))
+        if text not in setting.choices:
+            choices = ", ".join(setting.choices)
+            raise ValueError(f"{setting.name} {value!r:.60} is unknown: {choices}")
+        return text
+    number = _number(setting.name, value)
+    if isinstance(setting.default, int):
+        if not number.is_integer():
+            raise ValueError(f"{setting.name} must be a whole number, got {value!r:.60}")
+        number = int(number)
+    return number if setting.is_given(number) else None
 
 
 def _described(values: Mapping[str, Any]) -> ValveFile:
     columns = Columns.section(values[COLUMNS]) if COLUMNS in values else Columns()
-    settings = _settings(values)
+    there = (each for each in IDENTIFICATION if each.name in values)
+    read = {each.name: _read(each, values[each.name]) for each in there}
+    settings = {name: value for name, value in read.items() if value is not None}
     known = {name: _number(name, values[name]) for name in FIXABLE if name in values}
     if "assumed_mass" in settings:
         known.setdefault("mass", settings["assumed_mass"])
-    known.update(
-        (name, settings[f"fixed.{name}"]) for name in FIXABLE if f"fixed.{name}" in settings
-    )
+    fixed = {name: settings[name] for name in settings if name.startswith("fixed.")}
+    known.update((name.removeprefix("fixed."), value) for name, value in fixed.items())
     _require_possible(known)
-    IdentificationSettings(
-        fixed={name: known[name] for name in FIXABLE if f"fixed.{name}" in settings}
-    )
-    valve = Valve(**{name: _number(name, values[name]) for name in GEOMETRY if name in values})
+    identification_from(fixed)
+    geometry = {each.name: values[each.name] for each in VALVE if each.name in values}
+    valve = Valve(**{name: _number(name, value) for name, value in geometry.items()})
     require_valve_units(valve, known)
-    return ValveFile(valve, frozen(known), columns, frozen(settings))
+    assumed = tuple(name for name in ("pressure_reference",) if name not in values)
+    survey = {each.name: _read(each, values[each.name]) for each in SURVEY if each.name in values}
+    return ValveFile(valve, frozen(known), columns, frozen(settings), assumed, frozen(survey))
 
 
 def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> ValveFile:
@@ -231,6 +281,56 @@ def read_valve_file(path: str | os.PathLike[str], valve: str | None = None) -> V
     """
     path = Path(path)
     return valve_file_of(read_yaml(path), path, valve)
+
+
+def with_columns(text: str, columns: Columns) -> str:
+    """Return the text of a valve file with another section ``columns:``; its comments stay.
+
+    Raises ValueError if the text is no YAML of a valve.
+    """
+    try:
+        root = yaml.compose(text, yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        raise ValueError(f"not YAML: {' '.join(str(error).split())[:300]}") from None
+    said = {
+        each.name: getattr(columns, each.name)
+        for each in fields(columns)
+        if getattr(columns, each.name) != each.default and not each.name.startswith("maximum_m")
+    }
+    section = yaml.safe_dump({COLUMNS: said}, allow_unicode=True, sort_keys=False, width=1000)
+    lines = text.splitlines(keepends=True)
+    place, indent = len(lines), 0
+    for key, value in _pairs(root):
+        indent = key.start_mark.column
+        if key.value == COLUMNS:
+            place = key.start_mark.line
+            del lines[place : _last_line(value) + 1]
+            break
+        place = _last_line(value) + 1
+    own = [" " * indent + line for line in section.splitlines(keepends=True)]
+    if place and not lines[place - 1].endswith("\n"):
+        lines[place - 1] += "\n"
+    return "".join([*lines[:place], *own, *lines[place:]])
+
+
+def _last_line(node: yaml.Node) -> int:
+    """Return the last line of a node; the end mark of a block is beyond it."""
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        return _last_line(last[1] if isinstance(last, tuple) else last)
+    return int(node.end_mark.line)
+
+
+def _pairs(node: yaml.Node | None) -> list[tuple[yaml.Node, yaml.Node]]:
+    """Return the keys of a valve file with their values, those of its first node's parameters."""
+    if not isinstance(node, yaml.MappingNode):
+        raise ValueError("expected lines such as 'diaphragm_area: 0.0445'")
+    for key, value in node.value:
+        if isinstance(value, yaml.MappingNode) and key.value != COLUMNS:
+            inner = _pairs(value)
+            if key.value == _BLOCK or any(each.value == _BLOCK for each, _ in value.value):
+                return inner
+    return list(node.value)
 
 
 def valve_file_of(content: object, path: Path, valve: str | None = None) -> ValveFile:

@@ -1,10 +1,17 @@
-"""Files that are written whole or not at all."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Files: written whole or not at all; and why one cannot be read."""
 
 import contextlib
 import os
 from pathlib import Path
-
-__all__ = ["write_whole"]
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -26,3 +33,8 @@ def write_whole(path: Path, content: bytes) -> None:
         if not is_special:
             with contextlib.suppress(OSError):  # a read-only folder holds no draft
                 draft.unlink(missing_ok=True)
+
+
+def cause_of(error: Exception) -> str:
+    """Return the system's words for an error of its own; else the error's."""
+    return str((isinstance(error, OSError) and error.strerror) or error)

@@ -1,36 +1,49 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Reports for people: pages that stand in one file; no ROS."""
 
-from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
-from valve_friction_ros.reports.identification_report import identification_report
-from valve_friction_ros.reports.identified_record import IdentifiedRecord
+from valve_friction_ros.reports.identification_report import (
+    identification_report,
+    write_identification_report,
+)
+from valve_friction_ros.reports.identified_record import IdentifiedRecord, diagnosis_sentence
 from valve_friction_ros.reports.page import (
     Block,
     Colour,
     Column,
+    Conclusion,
     Page,
+    PageTable,
     Paragraph,
     Picture,
     Section,
-    Status,
-    Table,
     render,
+    require_report_file,
+    write_report,
 )
-from valve_friction_ros.reports.report_file import require_report_file, write_report
 
 __all__ = [
     "Block",
     "Colour",
     "Column",
+    "Conclusion",
     "IdentifiedRecord",
     "Page",
+    "PageTable",
     "Paragraph",
     "Picture",
     "Section",
-    "Status",
-    "Table",
     "diagnosis_sentence",
     "identification_report",
     "render",
     "require_report_file",
+    "write_identification_report",
     "write_report",
 ]

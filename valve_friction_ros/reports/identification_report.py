@@ -1,10 +1,23 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The report of one identification: a page from the diagnosis to the settings."""
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
-from valve_friction_ros.figures.report_figures import (
+from valve_friction_ros.figures.history_figures import report_trend_figure, usage_figure
+from valve_friction_ros.figures.record_figures import (
     comparison_figure,
     evidence_figure,
     noise_figures,
@@ -12,29 +25,39 @@ from valve_friction_ros.figures.report_figures import (
     residual_figure,
     signature_loop_figure,
 )
-from valve_friction_ros.figures.trend_figure import drift_text, report_trend_figure
-from valve_friction_ros.health import percentage
-from valve_friction_ros.history import ValveHistory
+from valve_friction_ros.history import ValveHistory, drift_text
 from valve_friction_ros.history.trend import DAY
 from valve_friction_ros.identification import StemComparison
 from valve_friction_ros.identification.trust.misfit import Misfit
-from valve_friction_ros.reports.diagnosis_sentence import diagnosis_sentence
+from valve_friction_ros.model import Valve
 from valve_friction_ros.reports.identification_tables import (
     budget_table,
     friction_table,
     parameter_table,
+    published_words,
     record_table,
     settings_table,
+    valve_table,
 )
-from valve_friction_ros.reports.identified_record import IdentifiedRecord
-from valve_friction_ros.reports.page import Page, Paragraph, Picture, Section
-from valve_friction_ros.reports.published_words import published_words
-from valve_friction_ros.reports.response_section import response_section
-from valve_friction_ros.reports.usage_section import usage_section
-from valve_friction_ros.reports.valve_status import date_line, valve_status
-from valve_friction_ros.reports.valve_table import valve_table
-
-__all__ = ["identification_report"]
+from valve_friction_ros.reports.identified_record import (
+    IdentifiedRecord,
+    date_line,
+    diagnosis_sentence,
+    valve_status,
+)
+from valve_friction_ros.reports.page import (
+    Column,
+    Page,
+    PageTable,
+    Paragraph,
+    Picture,
+    Section,
+    write_report,
+)
+from valve_friction_ros.response import SIZES, ResponseSummary, Spread, StepAnswer
+from valve_friction_ros.streams import utc, utc_day
+from valve_friction_ros.usage import LimitState, Usage, ValveUsage
+from valve_friction_ros.wording import member_words, percentage
 
 _VERDICTS = (
     "Identified: half the interval is at most 5 % of the value, and no doubt is known. Weak: the "
@@ -76,6 +99,17 @@ def identification_report(record: IdentifiedRecord) -> Page:
         valve_status(record),
         date_line(record),
     )
+
+
+def write_identification_report(path: Path, facts: Mapping[str, Any]) -> None:
+    """Write the page on an `IdentifiedRecord`, given by its attributes, to a file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    write_report(identification_report(IdentifiedRecord(**facts)), path)
 
 
 def _sections(record: IdentifiedRecord) -> Iterator[Section]:
@@ -212,3 +246,153 @@ def _noise_words(misfit: Misfit | None) -> str:
         f" Of {misfit.rms * 1e6:.3g} µm rms, {misfit.systematic * 1e6:.3g} µm are more than noise, "
         f"which {'does not put' if misfit.describes else 'puts'} the model in doubt."
     )
+
+
+_MEANING = (
+    "A stroke counts where it is longer than the counting dead band, so noise counts nothing; a "
+    "breakaway is a start after a rest of a whole second of the stamps. Time that was "
+    "not watched counts nowhere."
+)
+
+
+_UNITS = {"travel_limit": "m", "reversal_limit": "reversals"}
+_NO_LIMIT = (
+    "The life of the packing has no limit: set the parameter travel_limit or reversal_limit to be "
+    "warned a month ahead."
+)
+
+
+def usage_section(
+    usage: ValveUsage, valve: Valve, limits: Sequence[LimitState] | None = None
+) -> Section | None:
+    """Return the table of the usage, since the packing was renewed and in all, and its figure.
+
+    With the `limits` of the packing, if they are known, beside when each is expected to be reached.
+    None for a valve that was not watched.
+    """
+    used, everything = usage.since_renewal, usage.total
+    if not everything.time_watched:
+        return None
+    since = "since the first sample"
+    if usage.renewal:
+        date = utc(usage.renewal)
+        since = f"since the packing was renewed, {date:%Y-%m-%d}"
+    columns = (Column("usage"), Column(since, is_number=True), Column("in all", is_number=True))
+    old, new = _usage_cells(used, valve), _usage_cells(everything, valve)
+    table = PageTable(columns, tuple((name, old[name], new[name]) for name in old))
+    life = () if limits is None else _life(limits)
+    words, pace = _MEANING, usage.pace()
+    if pace is not None:
+        words += (
+            f" Pace of the last days: {pace.distance:.3g} m and {pace.reversals:.3g} reversals in "
+            "a day of watching."
+        )
+    if not used.time_watched:
+        return Section("Use", (table, *life, Paragraph(words)))
+    picture = Picture(
+        usage_figure(usage),
+        "Time at each 5 % of the travel, and the travelled distance of each day.",
+        "A histogram of the stem position, and the distance of each day.",
+        usage_figure(usage, is_narrow=True),
+    )
+    return Section("Use", (table, *life, picture, Paragraph(words)))
+
+
+def _life(limits: Sequence[LimitState]) -> tuple[PageTable | Paragraph, ...]:
+    """Return how far the packing is from its limits, and what to do."""
+    if not limits:
+        return (Paragraph(_NO_LIMIT),)
+    titles = ("limit of the packing", "used", "limit", "share", "expected")
+    columns = tuple(Column(title, is_number=title != titles[0]) for title in titles)
+    rows = tuple(
+        (
+            f"{one.name} [{_UNITS[one.name]}]",
+            f"{one.used:.5g}",
+            f"{one.limit:.6g}",
+            percentage(one.used / one.limit),
+            _expected(one),
+        )
+        for one in limits
+    )
+    warnings = (f"{one.message[0].upper()}{one.message[1:]}." for one in limits if one.warns)
+    return PageTable(columns, rows), *map(Paragraph, warnings)
+
+
+def _expected(state: LimitState) -> str:
+    if state.is_reached:
+        return "reached"
+    if state.expected is None:
+        return "not known before a day of watching"
+    return utc_day(state.expected)
+
+
+def _usage_cells(usage: Usage, valve: Valve) -> dict[str, str]:
+    return {
+        "travelled distance [m]": f"{usage.distance:.5g}",
+        "strokes of the whole travel": f"{usage.strokes(valve.travel):.5g}",
+        "reversals": f"{usage.reversals}",
+        "breakaways": f"{usage.breakaways}",
+        "time watched [h]": f"{usage.time_watched / 3600e9:.4g}",
+        "time near 0 % of the travel [h]": f"{usage.time_near_seat() / 3600e9:.4g}",
+        "time near 100 % of the travel [h]": f"{usage.time_near_seat(True) / 3600e9:.4g}",
+    }
+
+
+_FIGURES = (
+    ("dead time [s]", "dead_time", 1.0),
+    ("T63 [s]", "t63", 1.0),
+    ("T86 [s]", "t86", 1.0),
+    ("overshoot [% of the move]", "overshoot", 100.0),
+    ("steady error [% of the travel]", "steady_error", 100.0),
+)
+_CAUSES = (("dead time", "dead_time"), ("T86", "t86"), ("steady error", "deviation"))
+
+
+def response_section(response: ResponseSummary) -> Section | None:
+    """Return the table of the figures of the latest steps; None without any."""
+    if not response.moves:
+        return None
+    columns = ("median", "10 %", "90 %", "steps")
+    table = PageTable(
+        (Column("answer"), *(Column(name, is_number=True) for name in columns)),
+        tuple(
+            (words, *_spread_cells(getattr(response, name), scale))
+            for words, name, scale in _FIGURES
+        ),
+    )
+    sizes = PageTable(
+        (Column("step [% of the travel]"), Column("moved the stem", is_number=True)),
+        tuple(
+            (_bounds(*bounds), f"{moved} of {count}")
+            for bounds, (moved, count) in zip(pairwise(SIZES), response.by_size, strict=True)
+            if count
+        ),
+    )
+    causes = " ".join(
+        f"{name[0].upper()}{name[1:]}: {member_words(response.cause(which), 'cause')}."
+        for name, which in _CAUSES
+    )
+    words = (
+        "The figures, after ANSI/ISA-75.25, are those of the latest "
+        f"{len(response.moves)} steps of stem_command, {_dates(response.moves)}; "
+        f"{len(response.ignored)} of them did not move the stem. "
+        "Steady error is command less position."
+    )
+    return Section("Answer to the command", (table, sizes, Paragraph(words), Paragraph(causes)))
+
+
+def _spread_cells(spread: Spread, scale: float) -> tuple[str, ...]:
+    if not spread.number:
+        return ("–", "–", "–", "0")
+    values = (f"{scale * one:.3g}" for one in (spread.median, spread.low, spread.high))
+    return (*values, str(spread.number))
+
+
+def _bounds(low: float, high: float) -> str:
+    return f"{100 * low:g} to {100 * high:g}" if high < 1 else f"above {100 * low:g}"
+
+
+def _dates(moves: tuple[StepAnswer, ...]) -> str:
+    stamps = [one.stamp for one in moves]
+    first, last = (f"{utc(stamp):%Y-%m-%d %H:%M}" for stamp in (min(stamps), max(stamps)))
+    return f"from {first} to {last} UTC"

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The tables of a report of an identification."""
 
 import math
@@ -12,27 +21,27 @@ import numpy as np
 import scipy
 
 import valve_friction_ros
-from valve_friction_ros.health import Level, compared, dead_band, percentage
+from valve_friction_ros.health import (
+    Level,
+    Measured,
+    compared,
+    dead_band,
+    valve_changes,
+)
+from valve_friction_ros.health.valve_changes import DIFFERENCES
+from valve_friction_ros.health.valve_numbers import comparable_numbers
 from valve_friction_ros.identification import (
     CALIBRATION,
+    PARAMETER_UNITS,
     TIMING_UNCERTAINTY,
+    Parameter,
+    Result,
     Verdict,
     two_digits,
 )
-from valve_friction_ros.reports.identified_record import IdentifiedRecord
-from valve_friction_ros.reports.page import Column, Table
-from valve_friction_ros.reports.typography import Verbatim
-from valve_friction_ros.reports.valve_status import began
-
-__all__ = [
-    "budget_table",
-    "friction_table",
-    "parameter_table",
-    "record_table",
-    "settings_table",
-    "words_of",
-    "written",
-]
+from valve_friction_ros.reports.identified_record import IdentifiedRecord, began
+from valve_friction_ros.reports.page import Column, PageTable, Verbatim
+from valve_friction_ros.wording import percentage
 
 _WORDS = {
     "mass": "moving mass m",
@@ -83,7 +92,7 @@ def _cells(name: str, one: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def parameter_table(record: IdentifiedRecord) -> Table:
+def parameter_table(record: IdentifiedRecord) -> PageTable:
     """Return each parameter with interval and verdict, and its published value if known."""
     shown = record.result.to_dict()["parameters"]
     columns = (
@@ -96,10 +105,10 @@ def parameter_table(record: IdentifiedRecord) -> Table:
     rows = [_cells(name, one) for name, one in shown.items()]
     marked = ([*shown].index("coulomb_friction"),)
     count = 4 + any(one["published"] is not None for one in shown.values())
-    return Table(columns[:count], tuple(row[:count] for row in rows), marked=marked)
+    return PageTable(columns[:count], tuple(row[:count] for row in rows), marked=marked)
 
 
-def budget_table(record: IdentifiedRecord) -> Table | None:
+def budget_table(record: IdentifiedRecord) -> PageTable | None:
     """Return the standard uncertainty of each estimate by its sources.
 
     It is None for a method whose evidence holds no ``uncertainty_budget``.
@@ -122,7 +131,7 @@ def budget_table(record: IdentifiedRecord) -> Table | None:
         (_heading(name, parameters[name]), *map(two_digits, values[: len(headings)]))
         for name, values in parts.items()
     )
-    return Table(columns, tuple(rows))
+    return PageTable(columns, tuple(rows))
 
 
 def _left(whole: float, parts: Iterable[float]) -> float:
@@ -131,17 +140,19 @@ def _left(whole: float, parts: Iterable[float]) -> float:
     return math.sqrt(left) if left > _ROUNDED * whole**2 else 0.0
 
 
-def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> Table:
-    return Table((Column(first), Column(second)), tuple(rows))
+def _pairs(rows: list[tuple[str, str]], first: str, second: str) -> PageTable:
+    return PageTable((Column(first), Column(second)), tuple(rows))
 
 
-def friction_table(record: IdentifiedRecord) -> Table:
+def friction_table(record: IdentifiedRecord) -> PageTable:
     """Return the friction beside its baseline, and the diagnosis."""
     baseline, diagnosis, limits = record.baseline, record.diagnosis, record.limits
     rows, found = [], None
     if baseline is not None:
         rows.append(("friction of the healthy valve (baseline)", str(baseline)))
-        found = compared(record.result.parameters, record.result.sliding_speed, baseline)
+        result = record.result
+        numbers = comparable_numbers(result.evidence)
+        found = compared(result.parameters, result.sliding_speed, baseline, numbers)
     if found is not None and (ratio := diagnosis.ratio) is not None:
         excess, width = found.excess
         if any(one.uncalibrated for one in record.result.parameters.values()):
@@ -181,13 +192,13 @@ def _level(record: IdentifiedRecord) -> str:
     return diagnosis.level.name + (f", NE 107 status signal {signal}" if signal else "")
 
 
-def record_table(record: IdentifiedRecord) -> Table:
+def record_table(record: IdentifiedRecord) -> PageTable:
     """Return the source of the record, and its extent."""
     recording, drive = record.recording, record.recording.driven_by
     shown, position = recording.drive / drive.size, recording.position * 1e3
     rows: list[tuple[str, str]] = [("source", Verbatim(record.source))]
-    if begin := began(recording):
-        rows.append(("began", f"{begin:%Y-%m-%d %H:%M:%S} UTC"))
+    if begin := began(record):
+        rows.append(("began", f"{begin:%Y-%m-%d %H:%M:%S} {record.zone or 'UTC'}"))
     rows += [
         ("duration", f"{recording.duration:.4g} s"),
         ("samples", f"{len(recording)}, sampled every {recording.sample_period * 1e3:.4g} ms"),
@@ -197,7 +208,7 @@ def record_table(record: IdentifiedRecord) -> Table:
     return _pairs(rows, "record", "extent")
 
 
-def settings_table(record: IdentifiedRecord) -> Table:
+def settings_table(record: IdentifiedRecord) -> PageTable:
     """Return settings, valve and software of the identification."""
     result, valve = record.result, record.valve
     shown = result.to_dict()
@@ -248,7 +259,8 @@ def _timing(shown: Mapping[str, Any]) -> list[tuple[str, str]]:
     if not any("timing" in sources for sources in budget.values()):
         return []
     given = shown["settings"]["timing_uncertainty"]
-    told = f"{TIMING_UNCERTAINTY:g} s, by default" if given is None else f"{given:g} s, as given"
+    usual = 0.0 if shown["method"] == "bench" else TIMING_UNCERTAINTY
+    told = f"{usual:g} s, by default" if given is None else f"{given:g} s, as given"
     return [("timing uncertainty, standard deviation of the lag between the signals", told)]
 
 
@@ -272,3 +284,81 @@ def _versions() -> str:
         "Python": platform.python_version(),
     }
     return ", ".join(f"{name} {version}" for name, version in versions.items())
+
+
+def valve_table(record: IdentifiedRecord) -> PageTable | None:
+    """Return each number that result and baseline both have, with its change; None without one."""
+    if record.baseline is None:
+        return None
+    drive = "Pa" if record.recording.driven_by.unit == "kPa" else "N"
+    units = {**PARAMETER_UNITS, **DIFFERENCES, "drive_noise": drive, "stem_noise": "m"}
+    now, healthy = record.numbers, record.baseline.numbers
+    rows = tuple(
+        (
+            f"{name.replace('_', ' ')} [{units[name]}]",
+            _size(healthy[name]),
+            _size(now[name]),
+            _change(change, is_ratio=name not in DIFFERENCES),
+        )
+        for name, change in valve_changes(now, healthy).items()
+    )
+    titles = ("number", "healthy valve (baseline)", "now", "change, 95 % interval")
+    return PageTable(tuple(map(Column, titles)), rows) if rows else None
+
+
+def _size(one: Measured) -> str:
+    return f"{one.value:.5g} ± {two_digits(one.half_width)}"
+
+
+def _change(change: Measured, is_ratio: bool) -> str:
+    if is_ratio:
+        return f"{change.value:.3g} times, {change.low:.3g} to {change.high:.3g}"
+    return f"{change.value:+.3g}, {change.low:+.3g} to {change.high:+.3g}"
+
+
+_UNKNOWN_THRESHOLD = "samples faster than a threshold δv"
+
+
+def published_words(result: Result) -> str:
+    """Return why published values and values differ, and where they do; empty without any."""
+    beside = [one for one in result.parameters.values() if not math.isnan(one.published)]
+    if not beside or result.method in ("published", "signature"):
+        return ""
+    evidence = result.evidence
+    samples = _UNKNOWN_THRESHOLD
+    if "threshold" in evidence:
+        samples = f"samples faster than δv = {evidence['threshold']:.3g} m/s"
+    words = (
+        "Published method: the regression of the paper, for comparison. It uses derivatives of "
+        f"the smoothed position, and only {samples}. Noise, smoothing, lags and slow sliding bias "
+        f"it; it has no interval, and gives a number also where the record determines none. "
+        f"{_how_else(result)}Where the two differ, use the value."
+    )
+    outside = [one for one in beside if _differs(one)]
+    if not outside:
+        return f"{words} Here every published value that has an interval lies within it."
+    told = "; ".join(
+        f"{words_of(one.name)}: {written(one.published)} against {written(one.value)} {one.unit}"
+        for one in outside
+    )
+    return f"{words} Published values beyond the interval here: {told}."
+
+
+def _how_else(result: Result) -> str:
+    """Say how the value is found, where that is known of the method."""
+    if result.stem is not None:
+        samples = f"over all samples{_counts_with(result)}"
+        return f"The value fits the simulated stem to the measured one, {samples}. "
+    if result.method in ("plant", "bench"):
+        return "The value averages force and friction as the acceleration, over all samples. "
+    return ""
+
+
+def _counts_with(result: Result) -> str:
+    if "uncertainty_budget" not in result.evidence:
+        return ""
+    return " and at rest too, and counts with lags, noise and imperfections of the sensors"
+
+
+def _differs(one: Parameter) -> bool:
+    return one.half_width > 0 and abs(one.published - one.value) > one.half_width

@@ -1,30 +1,49 @@
-"""The content of a report of an identification."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
+"""The content of a report of an identification; its status, and its diagnosis in one sentence."""
+
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timezone
 from functools import cached_property
+from typing import NamedTuple
+from zoneinfo import ZoneInfo
 
 from valve_friction_ros.health import (
     Baseline,
-    Change,
     Diagnosis,
     Finding,
     FrictionLimits,
+    FrictionState,
     KnownNumbers,
+    Level,
     Measured,
+    StatusSignal,
+    Survey,
     ValveLimits,
     by_severity,
+    dead_band,
     diagnose,
+    drive_scale,
     explains,
     qualified,
     valve_numbers,
 )
 from valve_friction_ros.history import ValveHistory
-from valve_friction_ros.identification import Result
+from valve_friction_ros.identification import SLIDING, Parameter, Result, Verdict, two_digits
 from valve_friction_ros.model import Recording, Valve
+from valve_friction_ros.reports.page import Colour, Conclusion
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import LimitState, ValveUsage
-
-__all__ = ["IdentifiedRecord"]
+from valve_friction_ros.wording import percentage
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +80,8 @@ class IdentifiedRecord:
         Bounds of what else may change on the valve.
     known : KnownNumbers or None
         What is known of the valve, also by earlier records; None: by the result alone.
+    zone : str
+        Zone of the time of the record, an IANA name; empty: UTC.
     """
 
     name: str
@@ -77,6 +98,7 @@ class IdentifiedRecord:
     usage_limits: tuple[LimitState, ...] | None = None
     valve_limits: ValveLimits = field(default_factory=ValveLimits)
     known: KnownNumbers | None = field(default=None, repr=False)
+    zone: str = ""
 
     @property
     def recording(self) -> Recording:
@@ -93,7 +115,7 @@ class IdentifiedRecord:
         return diagnose(self.result, self.valve, self.baseline, self.limits)
 
     @property
-    def _factor(self) -> Change | None:
+    def _factor(self) -> Measured | None:
         return self._known.common_factor(self.baseline, self.valve_limits)
 
     @property
@@ -121,3 +143,229 @@ class IdentifiedRecord:
         return tuple(
             by_severity(self._known.findings(self.baseline, self.valve, self.valve_limits))
         )
+
+
+_DATED = (1e9, 1e11)
+"""Start times, s, that count from 1970: they lie between the years 2001 and 5138."""
+
+_ALARM_STATUS = {
+    FrictionState.EXCESS: Conclusion(Colour.RED, "Excess friction", "failure (NE 107: F)"),
+    FrictionState.COLLAPSED: Conclusion(
+        Colour.RED, "Friction has collapsed", "out of specification (NE 107: S)"
+    ),
+    FrictionState.GROWN: Conclusion(
+        Colour.AMBER, "Friction has grown", "maintenance required (NE 107: M)"
+    ),
+    FrictionState.FALLEN: Conclusion(
+        Colour.AMBER, "Friction has fallen", "maintenance required (NE 107: M)"
+    ),
+}
+
+
+def valve_status(record: IdentifiedRecord) -> Conclusion:
+    """Return the status; green only where a comparison with a baseline found nothing."""
+    diagnosis = record.diagnosis
+    worst = next(iter(record.findings), None)
+    if worst is not None and worst.level > diagnosis.level:
+        colour = Colour.RED if worst.level is Level.ERROR else Colour.AMBER
+        if record.is_scaled and worst.status_signal is StatusSignal.CHECK_FUNCTION:
+            return Conclusion(colour, "Check the sensors' scales", "check function (NE 107: C)")
+        return Conclusion(colour, "The valve has changed", f"NE 107: {worst.status_signal.value}")
+    if record.is_scaled:
+        return Conclusion(Colour.AMBER, "Check the sensors' scales", "check function (NE 107: C)")
+    return _of_friction(record)
+
+
+def _of_friction(record: IdentifiedRecord) -> Conclusion:
+    diagnosis = record.diagnosis
+    if diagnosis.state in _ALARM_STATUS:
+        return _ALARM_STATUS[diagnosis.state]
+    if diagnosis.level >= Level.WARN:
+        return Conclusion(Colour.AMBER, "Check sensors and model", "check function (NE 107: C)")
+    if diagnosis.ratio is None:
+        return Conclusion(Colour.GREY, "Unknown", _why_unknown(record))
+    return Conclusion(Colour.GREEN, "Friction normal", "compared with the healthy valve")
+
+
+def _why_unknown(record: IdentifiedRecord) -> str:
+    values = record.result.values
+    frictions = [values.get(name, math.nan) for name in ("coulomb_friction", SLIDING)]
+    if all(map(math.isnan, frictions)):
+        return "this record does not determine the friction"
+    if record.baseline is None:
+        return "no baseline to compare the friction with"
+    return "not comparable with the baseline"
+
+
+def began(record: IdentifiedRecord) -> datetime | None:
+    """Return when a record began, in its zone; None where its time does not count from 1970."""
+    start = record.recording.start_time
+    if not _DATED[0] < start < _DATED[1]:
+        return None
+    return datetime.fromtimestamp(start, ZoneInfo(record.zone) if record.zone else timezone.utc)
+
+
+def date_line(record: IdentifiedRecord) -> str:
+    """Return the date of the record in one sentence."""
+    known, begin = "The record has no date", began(record)
+    if begin is not None:
+        known = f"Recorded {begin:%Y-%m-%d %H:%M} {record.zone or 'UTC'}"
+    return "; ".join(filter(None, (known, record.dated))) + "."
+
+
+class _Finding(NamedTuple):
+    what: str
+    advice: str
+
+
+_AGAIN = "before any work, identify it again from a longer record with more strokes"
+_CHECK = "check the sensors and their mounting, then identify it again"
+
+_ALARM_SENTENCES = {
+    FrictionState.EXCESS: _Finding(
+        "the friction is excessive, {ratio}",
+        "plan work on the packing now, and expect the loop to oscillate until then",
+    ),
+    FrictionState.COLLAPSED: _Finding(
+        "the friction has collapsed, {ratio}", "check the packing for leakage now"
+    ),
+    FrictionState.GROWN: _Finding(
+        "the friction has grown, {ratio}", "plan work on the packing for the next stop"
+    ),
+    FrictionState.FALLEN: _Finding(
+        "the friction has fallen, {ratio}", "look at the packing at the next stop: it may be worn"
+    ),
+    FrictionState.UNCLEAR: _Finding("the friction cannot be told from before, {ratio}", _AGAIN),
+}
+
+
+_SURVEY_ADVICE = {
+    Survey.BAD: "plan work on the packing: its loop will oscillate; set a baseline afterwards",
+    Survey.WATCH: "record it again within three months, and set a baseline",
+    Survey.GOOD: "set a baseline: this record may be one",
+}
+
+
+def what_to_do(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> str:
+    """Return the advice that goes with a diagnosis, in a few words for a list of valves.
+
+    Without a comparison it is that of the first survey, by absolute limits.
+    """
+    alarm = _ALARM_SENTENCES.get(diagnosis.state)
+    if alarm is not None:
+        return alarm.advice
+    if findings:
+        return str(by_severity(findings)[0].message).rpartition(": ")[2]
+    if diagnosis.state is FrictionState.IMPOSSIBLE:
+        return "check the direction of both signals and identify it again"
+    if diagnosis.ratio is None:
+        return _SURVEY_ADVICE.get(
+            diagnosis.survey, "set a baseline, the friction of the healthy valve"
+        )
+    return "no action is needed"
+
+
+def diagnosis_sentence(record: IdentifiedRecord) -> str:
+    """Return one sentence: finding, certainty, consequence and advice.
+
+    What else has changed on the valve follows, one sentence each. It states the diagnosis of the
+    monitor in words for readers outside control engineering.
+    """
+    friction = _friction(record)
+    alarm = _ALARM_SENTENCES.get(record.diagnosis.state)
+    if record.diagnosis.ratio is None and alarm is not None:
+        vanished = next(one for one in _frictions(record) if math.isnan(one.value))
+        size = f"at most {vanished.magnitude_bound:.2g} N, too small to be identified"
+        finding = _Finding(alarm.what.format(ratio=size), alarm.advice)
+    elif math.isnan(friction.value):
+        finding = _Finding(
+            f"this record does not determine the friction ({friction.reason})",
+            "move the valve through several fast strokes in both directions and identify it again",
+        )
+    elif friction.value < 0:
+        finding = _Finding(
+            f"the identified friction is {friction.value:.4g} N, and friction is above zero",
+            "check the direction of both signals and identify it again",
+        )
+    else:
+        finding = _found(record)
+    doubt = _doubt(record)
+    told = f"{doubt}{finding.what}{_consequence(record)}: {finding.advice}"
+    sentences = (told, *(one.message for one in record.findings))
+    return " ".join(f"{one[0].upper()}{one[1:]}." for one in sentences)
+
+
+def _frictions(record: IdentifiedRecord) -> list[Parameter]:
+    parameters = record.result.parameters
+    return [parameters[name] for name in ("coulomb_friction", SLIDING) if name in parameters]
+
+
+def _friction(record: IdentifiedRecord) -> Parameter:
+    """Return the friction that was compared; without a comparison one that is known, F_c if it is.
+
+    One below zero comes first: it is a fault of the signals.
+    """
+    ratio, frictions = record.diagnosis.ratio, _frictions(record)
+    if ratio is not None:
+        return record.result.parameters[ratio.of]
+    below = [one for one in frictions if one.value < 0]
+    known = [one for one in frictions if not math.isnan(one.value)]
+    return [*below, *known, *frictions][0]
+
+
+def _found(record: IdentifiedRecord) -> _Finding:
+    friction, diagnosis = _friction(record), record.diagnosis
+    if diagnosis.ratio is None:
+        size = f"{friction.value:.4g}"
+        if friction.verdict is not Verdict.FIXED:
+            size += f" ± {two_digits(friction.half_width)}"
+        advice = "set a baseline, the friction of the healthy valve"
+        if record.baseline is not None:
+            advice = "move the valve as its baseline was taken, and identify it again"
+        return _Finding(
+            f"the friction is {size} N{_sureness(friction)}",
+            f"to find out whether it has grown, {advice}",
+        )
+    ratio = (
+        f"{diagnosis.ratio.value:.2f} times that of the healthy valve (95 % interval: "
+        f"{diagnosis.ratio.low:.2f} to {diagnosis.ratio.high:.2f}){_sureness(friction)}"
+    )
+    if record.is_scaled:
+        advice = (
+            f"before any work on the packing, check {drive_scale(record.valve)}, as the spring "
+            "constant has changed by the same factor"
+        )
+        return _Finding(f"the friction seems to have changed, {ratio}", advice)
+    if diagnosis.state in _ALARM_SENTENCES:
+        alarm = _ALARM_SENTENCES[diagnosis.state]
+        return _Finding(alarm.what.format(ratio=ratio), alarm.advice)
+    advice = _CHECK if _doubt(record) else "no action is needed"
+    return _Finding(f"the friction is normal, {ratio}", advice)
+
+
+def _sureness(friction: Parameter) -> str:
+    """Return the limitation of the number, or an empty string if it is identified."""
+    words = {
+        Verdict.IDENTIFIED: "",
+        Verdict.WEAK: f", with the verdict weak ({friction.reason})",
+        Verdict.FIXED: ", which was given and not identified",
+    }
+    return words[friction.verdict]
+
+
+def _doubt(record: IdentifiedRecord) -> str:
+    misfit = record.result.misfit
+    if misfit is None or misfit.describes:
+        return ""
+    explained = "force" if math.isnan(misfit.of_stem) else "stem's motion"
+    return (
+        "use this with caution, because the model does not describe this valve "
+        f"({misfit.words} of the {explained} remain unexplained): "
+    )
+
+
+def _consequence(record: IdentifiedRecord) -> str:
+    share = dead_band(record.result, record.valve)
+    if math.isnan(share) or share < 0:
+        return ""
+    return f", and the stem ignores reversals smaller than {percentage(share)} of its travel"

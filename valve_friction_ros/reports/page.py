@@ -1,30 +1,49 @@
-"""A report page: its content, and its rendering as one self-contained HTML file."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A report page: its content, its rendering as one self-contained HTML file, and that file."""
 
 import base64
+import html
 import io
+import re
+import tempfile
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from pathlib import Path
 from typing import ClassVar, NamedTuple
 
+from jinja2.filters import do_mark_safe
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from valve_friction_ros.page_template import page_environment
-from valve_friction_ros.reports.typography import typeset
+from valve_friction_ros.records.whole_file import write_whole
 
-__all__ = [
-    "Block",
-    "Colour",
-    "Column",
-    "Page",
-    "Paragraph",
-    "Picture",
-    "Section",
-    "Status",
-    "Table",
-    "render",
-]
+_SYMBOL = re.compile(r"(?<![\w.])([FPRSTakv]|σ|R²)_(ref|[a-z0-9])(?!\w|\.\w)")
+_MINUS = re.compile(r"(?<![\w.-])-(?=\d)")
+
+
+class Verbatim(str):
+    """Text from outside, such as the name of a file: it is shown as it is."""
+
+    __slots__ = ()
+
+
+def typeset(text: str) -> str:
+    """Escape a text, and set F_c with a subscript and -1 with a minus sign."""
+    escaped = html.escape(text)
+    if not isinstance(text, Verbatim):
+        escaped = _MINUS.sub("−", _SYMBOL.sub(r"\1<sub>\2</sub>", escaped))
+    return do_mark_safe(escaped)
+
 
 _DOTS_PER_INCH = 150
 """Resolution of the pictures. Chosen: sharp on paper, and about 100 kB each."""
@@ -54,7 +73,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """Rows of text under headings, as many cells each as there are columns.
 
     The caption stands above the table; `marked` rows, counted from 0, are highlighted. Raises
@@ -140,7 +159,7 @@ def _address(png: bytes) -> str:
     return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
 
 
-Block = Paragraph | Table | Picture
+Block = Paragraph | PageTable | Picture
 """Part of a section."""
 
 
@@ -161,7 +180,7 @@ class Colour(Enum):
     RED = "✗"
 
 
-class Status(NamedTuple):
+class Conclusion(NamedTuple):
     """The conclusion in a few words, and what it is called elsewhere."""
 
     colour: Colour
@@ -176,7 +195,7 @@ class Page:
     title: str
     lead: str
     sections: tuple[Section, ...]
-    status: Status | None = None
+    status: Conclusion | None = None
     date: str = ""
 
 
@@ -188,3 +207,34 @@ def render(page: Page) -> str:
     environment = page_environment("valve_friction_ros.reports")
     environment.filters["typeset"] = typeset
     return environment.get_template("page.html").render(page=page)
+
+
+_ENDINGS = (".html", ".htm")
+
+
+def require_report_file(path: Path) -> None:
+    """Refuse a file that a report cannot be written to, before the work begins.
+
+    Raises ValueError if the ending is not .html, or the folder does not exist or cannot be written;
+    the message names it.
+    """
+    if path.suffix.lower() not in _ENDINGS:
+        raise ValueError(f"{path}: a report is an HTML page: give it a name that ends in .html")
+    if not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}: create it, or name another")
+    if path.is_dir():
+        raise ValueError(f"{path}: this is a folder: give the report another name")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        cause = error.strerror or error
+        raise ValueError(f"{path}: cannot write into {path.parent}: {cause}") from None
+
+
+def write_report(page: Page, path: Path) -> None:
+    """Write a page as one HTML file, at once: a reader never finds part of it.
+
+    Raises OSError if it cannot be written; an existing file stays unchanged.
+    """
+    write_whole(path, render(page).encode())

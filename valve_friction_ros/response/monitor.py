@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The answers of one valve in service: from samples to moves."""
 
 import math
@@ -7,14 +16,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.response.command_steps import Change, CommandHolds
-from valve_friction_ros.response.hunting import Hunting, hunting
-from valve_friction_ros.response.move import Move, evaluated
+from valve_friction_ros.response.moves import (
+    CommandHolds,
+    CommandStep,
+    Hunting,
+    StepAnswer,
+    evaluated,
+    hunting,
+)
 from valve_friction_ros.response.summary import ResponseSummary, Spread, summarised
 from valve_friction_ros.streams import Arrivals, Kind, Samples
 from valve_friction_ros.streams.samples import SampleBuffer
-
-__all__ = ["ResponseMonitor"]
 
 _SECOND = 1_000_000_000
 
@@ -59,16 +71,16 @@ class ResponseMonitor:
     ----------
     travel : float
         Travel of the stem, m; finite.
-    earlier : sequence of Move
+    earlier : sequence of StepAnswer
         Moves from before, oldest first; the latest count.
     """
 
-    def __init__(self, travel: float, earlier: Sequence[Move] = ()) -> None:
+    def __init__(self, travel: float, earlier: Sequence[StepAnswer] = ()) -> None:
         if not 0 < travel < math.inf:
             raise ValueError("the travel must be finite")
         self._travel = travel
-        self._moves: deque[Move] = deque(earlier, maxlen=_RECENT)
-        self._ended: deque[Move] = deque(maxlen=_RECENT)
+        self._moves: deque[StepAnswer] = deque(earlier, maxlen=_RECENT)
+        self._ended: deque[StepAnswer] = deque(maxlen=_RECENT)
         self.left_out = 0
         self._summary = summarised(tuple(self._moves))
         self.forget()
@@ -83,7 +95,7 @@ class ResponseMonitor:
         self._offset = 0.0
         self._command = math.nan
         self._steady_since: int | None = None
-        self._change: Change | None = None
+        self._change: CommandStep | None = None
         self._look_at = 0
         self._hunting_at = 0
         self._hunting: Hunting | None = None
@@ -114,7 +126,7 @@ class ResponseMonitor:
         """The latest 200 moves."""
         return self._summary
 
-    def drain(self) -> tuple[Move, ...]:
+    def drain(self) -> tuple[StepAnswer, ...]:
         """Return the moves that have ended since the last call, the latest 200."""
         ended = tuple(self._ended)
         self._ended.clear()
@@ -160,12 +172,12 @@ class ResponseMonitor:
             behind = (before - int(command.stamps[-1])) / 1e9
         self._offset = ahead if ahead > _AHEAD else -behind if behind > _BEHIND else 0.0
 
-    def _taken_command(self, newest: int | None) -> list[Change]:
+    def _taken_command(self, newest: int | None) -> list[CommandStep]:
         """Take the command up to the newest sample of the stem; what is ahead of it waits."""
         due: list[tuple[int, float]] = []
         while newest is not None and self._ahead and self._ahead[0][0] <= newest:
             due.append(self._ahead.popleft())
-        changes: list[Change] = []
+        changes: list[CommandStep] = []
         if due:
             stamps, values = (np.array(part) for part in zip(*due, strict=True))
             inside = np.clip(values, 0.0, self._travel)
@@ -209,7 +221,7 @@ class ResponseMonitor:
             self._second_of = stamp // _SECOND
             self._second.append((self._command - value) / self._travel)
 
-    def _follow(self, change: Change) -> None:
+    def _follow(self, change: CommandStep) -> None:
         """End the move under way, and begin another one."""
         self._end(change.stamp)
         self._steady_since, self._hunting = change.stamp, None
@@ -232,7 +244,7 @@ class ResponseMonitor:
         self._ended.append(move)
         self._summary = summarised(tuple(self._moves))
 
-    def _move(self, change: Change, end: int) -> Move | None:
+    def _move(self, change: CommandStep, end: int) -> StepAnswer | None:
         stem, pressure = (self._fast[kind].samples() for kind in (Kind.POSITION, Kind.PRESSURE))
         return evaluated(change, stem, pressure, end, self._travel)
 

@@ -1,13 +1,23 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Whether the samples of a valve can be used: faults of the data, with their numbers.
 
 `DataQuality` sees each arrival, what became of it, and the clocks. It judges by arrivals alone: a
 sensor that reports seldom, and a stem that stands still, are no faults. What a signal advances from
 one look to the next is allowed between both, so a recording may be played at any speed.
+`LossCounter` counts messages that never arrived, by the numbers that their publishers gave them.
 """
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -17,10 +27,130 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.trust.plausible_units import position_question
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams.arrivals import MOST_POSITION, Arrivals, Kind
 from valve_friction_ros.streams.record_buffer import Intake, SampleFault, Signal
+from valve_friction_ros.streams.samples import MOST_POSITION, Arrivals, Kind
+from valve_friction_ros.wording import Code, Statement, said
 
-__all__ = ["DataFault", "DataQuality", "FaultKind"]
+_LOSS_HORIZON = 60.0
+"""Time, s, over which the share of lost messages is told."""
+_MOST_A_SECOND = 1e6
+"""Messages a second of one publisher beyond which a jump of the numbers is another publisher's."""
+_MOST_PUBLISHERS = 16
+"""Publishers of a stream that are told apart; then the one that was silent longest is forgotten."""
+
+
+class Losses(NamedTuple):
+    """Messages of a stream.
+
+    Attributes
+    ----------
+    lost : int
+        Those that were published and never taken, in all.
+    recently_lost, recently_taken : int
+        Those of the last minute.
+    silence : float
+        Time since the last loss was seen, s; infinite without any.
+    """
+
+    lost: int = 0
+    recently_lost: int = 0
+    recently_taken: int = 0
+    silence: float = float("inf")
+
+    @property
+    def share(self) -> float:
+        """Lost messages over all that were published in the last minute; 0 without any."""
+        published = self.recently_lost + self.recently_taken
+        return self.recently_lost / published if published else 0.0
+
+
+@dataclass
+class _Publisher:
+    """The next number that is expected of a publisher, and when the last one was seen, s."""
+
+    expected: int
+    seen: float
+
+
+class LossCounter:
+    """Counts the messages that are missing between those that were taken.
+
+    Each publisher numbers its messages one by one. Which publisher a message is of is not told, so
+    a number is that of the publisher which comes closest below it; one that no publisher could have
+    reached, or that lies below all, is the first of another publisher.
+    """
+
+    def __init__(self) -> None:
+        self._publishers: list[_Publisher] = []
+        self._recent: deque[list[float]] = deque()
+        """Of each second of the last minute: its begin, s, and the lost and the taken messages."""
+        self._lost = 0
+        self._last_loss: float | None = None
+
+    def take(self, numbers: Sequence[int], now: float) -> None:
+        """Take the numbers of messages in the order in which they came, at the time `now`, s."""
+        if not numbers:
+            return
+        lost = 0
+        if not self._are_next(numbers, now):
+            found = np.asarray(numbers, dtype=np.int64)
+            begin = 0
+            for end in (*np.flatnonzero(np.diff(found) != 1).tolist(), found.size - 1):
+                lost += self._followed(int(found[begin]), int(found[end]), now)
+                begin = end + 1
+        if not self._recent or now - self._recent[-1][0] >= 1.0:
+            self._recent.append([now, 0, 0])
+            self._drop_old(now)
+        self._recent[-1][1] += lost
+        self._recent[-1][2] += len(numbers)
+        if lost:
+            self._lost, self._last_loss = self._lost + lost, now
+
+    def _are_next(self, numbers: Sequence[int], now: float) -> bool:
+        """Take the numbers of a single publisher without a loss; tell if that is what they are."""
+        one = self._publishers[0] if len(self._publishers) == 1 else None
+        if (
+            one is None
+            or numbers[0] != one.expected
+            or numbers[-1] - one.expected != len(numbers) - 1
+        ):
+            return False
+        one.expected, one.seen = numbers[-1] + 1, now
+        return True
+
+    def _drop_old(self, now: float) -> None:
+        while self._recent and now - self._recent[0][0] > _LOSS_HORIZON:
+            self._recent.popleft()
+
+    def _followed(self, first: int, last: int, now: float) -> int:
+        """Take a piece of numbers; return how many are missing before it."""
+        known = [one for one in self._publishers if one.expected <= first]
+        one = max(known, key=lambda one: one.expected, default=None)
+        # What comes within one look was sent since the look before.
+        if one is None or first - one.expected > _MOST_A_SECOND * max(now - one.seen, 1e-3):
+            if len(self._publishers) >= _MOST_PUBLISHERS:
+                self._publishers.remove(min(self._publishers, key=lambda one: one.seen))
+            self._publishers.append(_Publisher(last + 1, now))
+            return 0
+        missing, one.expected, one.seen = first - one.expected, last + 1, now
+        return missing
+
+    def forget(self) -> None:
+        """Forget the publishers: what comes next is the first of each; the counts stay."""
+        self._publishers.clear()
+
+    def losses(self, now: float) -> Losses:
+        """Return the counts at the time `now`, s."""
+        if self._last_loss is None:
+            return Losses()
+        self._drop_old(now)
+        return Losses(
+            self._lost,
+            round(sum(lost for _, lost, _ in self._recent)),
+            round(sum(taken for _, _, taken in self._recent)),
+            now - self._last_loss,
+        )
+
 
 _HORIZON = 2.0
 """Time, s, over which shares of samples are taken. Chosen: a fault is known within it, and over
@@ -94,73 +224,54 @@ class DataFault:
         return self.kind is FaultKind.CLOCK
 
     @property
-    def what(self) -> str:
-        """What is wrong, in words that do not change while it lasts."""
-        subject = "the stamps" if self.signal is None else self.signal.value
-        return (
-            f"{subject}: {'' if self.cause is None else f'{self.cause.value}, '}{self.kind.value}"
-        )
+    def what(self) -> Statement:
+        """What is wrong, which does not change while it lasts."""
+        signal = None if self.signal is None else self.signal.value
+        cause = None if self.cause is None else self.cause.name
+        return said(Code.DATA_FAULT, signal=signal, cause=cause, kind=self.kind.name)
 
-    def message(self, valve: Valve, joint: str = "") -> str:
-        """Return one sentence: what is wrong, where, and the remedy.
+    def statement(self, valve: Valve, joint: str = "") -> Statement:
+        """Return what is wrong, where, and the remedy.
 
         An empty `joint` is the first one.
         """
+        signal = None if self.signal is None else self.signal.value
         if self.kind is FaultKind.REJECTED:
             return self._rejected(valve, joint)
         if self.kind is FaultKind.OUTSIDE_TRAVEL:
-            question = position_question(abs(self.reading), valve.travel)
-            return (
-                f"stem_state: {_percent(self.share)} of its samples lie outside the travel, as at "
-                f"{self.reading:.4g} m, and the travel is 0 to {valve.travel:.4g} m: check unit "
-                "(m), zero and travel"
-                f"{question and f': {question}'}"
+            return said(
+                Code.OUTSIDE_TRAVEL,
+                share=self.share,
+                reading=self.reading,
+                travel=valve.travel,
+                question=position_question(abs(self.reading), valve.travel) or None,
             )
-        if self.kind is FaultKind.SKEW:
-            way = "later" if self.seconds > 0 else "earlier"
-            return (
-                f"stem_state is stamped {abs(self.seconds):.3g} s {way} than actuator_pressure: "
-                "synchronise the clocks of both sensors, and check delays on the way"
-            )
-        way = "ahead of" if self.seconds > 0 else "behind"
-        subject = "both inputs" if self.signal is None else self.signal.value
-        return (
-            f"the stamps of {subject} are {abs(self.seconds):.3g} s {way} the clock of this node: "
-            "synchronise the clocks; for a recording set use_sim_time and play it with --clock, "
-            "or set clock_tolerance to 0"
-        )
+        code = Code.STAMPS_APART if self.kind is FaultKind.SKEW else Code.STAMPS_OFF_CLOCK
+        return said(code, signal=signal, seconds=abs(self.seconds), is_ahead=self.seconds > 0)
 
-    def _rejected(self, valve: Valve, joint: str) -> str:
+    def _rejected(self, valve: Valve, joint: str) -> Statement:
         signal, cause = self.signal or Signal.POSITION, self.cause or SampleFault.NOT_FINITE
-        named = f"joint '{joint}'" if joint else "joint"
-        unit = "Pa" if signal is Signal.PRESSURE else "m"
-        if signal is Signal.PRESSURE:
-            span = f"the sensor's range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa"
-            remedy = "check sensor and unit (Pa), or correct pressure_minimum and pressure_maximum"
-        else:
-            span = f"the range of any valve, up to {MOST_POSITION:g} m"
-            remedy = "check sensor and unit (m)"
-        why = {
-            SampleFault.DAMAGED: "they are damaged messages: check the publisher",
-            SampleFault.NO_JOINT: f"they have no position of the {named}: name it in the messages, "
-            "or set joint",
-            SampleFault.NOT_FINITE: "not finite: check sensor, cable and driver",
-            SampleFault.OUT_OF_RANGE: f"{self.reading:.4g} {unit} is outside {span}: {remedy}",
-            SampleFault.REPEATED: "they repeat a stamp: give each sample the time at which it was "
-            "measured",
-            SampleFault.OVERTAKEN: "they arrive out of order: look at the network between them",
-            SampleFault.BACK: "their stamps go back: check for a second publisher, and the clock "
-            "of the sensor",
-        }[cause]
-        known = "no sample was usable yet"
+        facts: dict[str, object] = {"cause": cause.name}
+        code = Code.REJECTED_FOR
+        if cause is SampleFault.NO_JOINT:
+            code, facts = Code.REJECTED_WITHOUT_JOINT, {"joint": joint or None}
+        elif cause is SampleFault.OUT_OF_RANGE:
+            is_pressure = signal is Signal.PRESSURE
+            low, high = valve.pressure_minimum, valve.pressure_maximum
+            code = Code.PRESSURE_OUT_OF_RANGE if is_pressure else Code.POSITION_OUT_OF_RANGE
+            facts = {"reading": self.reading, "lowest": low, "highest": high}
+            if not is_pressure:
+                facts = {"reading": self.reading, "highest": MOST_POSITION}
+        usable = said(Code.NONE_USABLE)
         if math.isfinite(self.unusable):
-            known = f"the last usable one came {self.unusable:.0f} s ago"
-        only = f", {known}" if self.share == 1.0 else ""
-        return f"{signal.value}: {_percent(self.share)} of its samples are rejected{only}: {why}"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= _BEGINS else f"{100 * share:.1f} %"
+            usable = said(Code.LAST_USABLE, seconds=self.unusable)
+        return said(
+            Code.REJECTED,
+            signal=signal.value,
+            share=self.share,
+            usable=usable if self.share == 1.0 else None,
+            why=said(code, **facts),
+        )
 
 
 class _Batch(NamedTuple):

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The buffer of an identifier: both signals of a valve, and the rejected samples."""
 
 import math
@@ -12,18 +21,20 @@ import numpy as np
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.streams.arrivals import MOST_POSITION, Arrivals, Kind
-from valve_friction_ros.streams.samples import SampleBuffer, Samples, nanoseconds
-from valve_friction_ros.streams.uniform_grid import uniform_recording
-
-__all__ = ["Intake", "RecordBuffer", "Rejection", "SampleFault", "Signal", "Snapshot"]
+from valve_friction_ros.streams.samples import (
+    MOST_POSITION,
+    Arrivals,
+    Kind,
+    SampleBuffer,
+    Samples,
+    nanoseconds,
+    uniform_recording,
+)
+from valve_friction_ros.wording import Code, Statement, said
 
 _REJECTIONS_KEPT = 10_000
 """Rejections in memory. Chosen: ten seconds at 1 kHz, so a broken sensor does not fill the
 memory."""
-
-_OVERTAKEN = "{} was overtaken on its way: its stamp is a little before the last one"
-_CLEARED = ": the buffer was cleared"
 
 
 class Signal(Enum):
@@ -57,7 +68,7 @@ class Rejection(NamedTuple):
     """A rejected sample: its stamp (ns) and the cause."""
 
     stamp: int
-    cause: str
+    cause: Statement
 
 
 class Intake(NamedTuple):
@@ -67,12 +78,12 @@ class Intake(NamedTuple):
     ----------
     rejected : mapping of (Signal, SampleFault) to int
         Samples that were rejected.
-    cleared : str or None
+    cleared : Statement or None
         Cause of the first clearing of the buffer.
     """
 
     rejected: Mapping[tuple[Signal, SampleFault], int] = MappingProxyType({})
-    cleared: str | None = None
+    cleared: Statement | None = None
 
 
 class Snapshot(NamedTuple):
@@ -84,7 +95,7 @@ class Snapshot(NamedTuple):
     pressure: Samples
     position: Samples
     rejections: tuple[Rejection, ...]
-    cleared_because: str | None
+    cleared_because: Statement | None
 
     def causes(self) -> str:
         """Return the causes of the rejections, with the number of samples of each."""
@@ -135,6 +146,10 @@ def _are_good(last_stamp: int | None, samples: Samples) -> bool:
     return follows and bool((stamps[1:] > stamps[:-1]).all() and np.isfinite(values).all())
 
 
+def _cause(signal: Signal, fault: SampleFault, **facts: Statement) -> Statement:
+    return said(Code[f"SAMPLE_{fault.name}"], signal=signal.value, **facts)
+
+
 class RecordBuffer:
     """The last `window` seconds of pressure and stem position of one valve.
 
@@ -150,9 +165,9 @@ class RecordBuffer:
         self._position = SampleBuffer(window)
         self._rejections: deque[Rejection] = deque(maxlen=_REJECTIONS_KEPT)
         self._first_stamp: int | None = None
-        self._cleared_because: str | None = None
+        self._cleared_because: Statement | None = None
         self._taken = 0
-        self._rejected: Counter[str] = Counter()
+        self._rejected: Counter[Statement] = Counter()
 
     def __len__(self) -> int:
         """Count the samples of both signals."""
@@ -169,7 +184,7 @@ class RecordBuffer:
         return self._taken
 
     @property
-    def rejected(self) -> Mapping[str, int]:
+    def rejected(self) -> Mapping[Statement, int]:
         """Samples that were rejected in all, by their cause."""
         return MappingProxyType(self._rejected)
 
@@ -188,12 +203,12 @@ class RecordBuffer:
         """Stamp of the newest sample of either signal, ns, or None."""
         return max((stamp for stamp in self.last_stamps if stamp is not None), default=None)
 
-    def add_pressure(self, stamp: int, pressure: float) -> str | None:
+    def add_pressure(self, stamp: int, pressure: float) -> Statement | None:
         """Take a pressure (Pa) stamped `stamp` (ns); return the cause of a rejection."""
         _, cause = self._add(Signal.PRESSURE, stamp, pressure)
         return cause
 
-    def add_position(self, stamp: int, position: float | None) -> str | None:
+    def add_position(self, stamp: int, position: float | None) -> Statement | None:
         """Take a stem position (m) stamped `stamp` (ns); return the cause of a rejection.
 
         None means a message without a position.
@@ -204,14 +219,14 @@ class RecordBuffer:
     def in_order(self, arrivals: Arrivals) -> Arrivals:
         """Leave out the samples that were overtaken on their way, and count them as rejected."""
         found = np.zeros(arrivals.stamps.size, np.bool_)
-        for kind, name, buffer in (
-            (Kind.PRESSURE, Signal.PRESSURE.value, self._pressure),
-            (Kind.POSITION, Signal.POSITION.value, self._position),
+        for kind, signal, buffer in (
+            (Kind.PRESSURE, Signal.PRESSURE, self._pressure),
+            (Kind.POSITION, Signal.POSITION, self._position),
         ):
             places = np.flatnonzero(arrivals.kinds == kind)
             found[places] = overtaken = buffer.overtaken(arrivals.stamps[places])
             if overtaken.any():
-                self._rejected[_OVERTAKEN.format(name)] += int(overtaken.sum())
+                self._rejected[_cause(signal, SampleFault.OVERTAKEN)] += int(overtaken.sum())
         if not found.any():
             return arrivals
         kinds, stamps, values = arrivals
@@ -242,7 +257,7 @@ class RecordBuffer:
 
     def _add_one_by_one(self, arrivals: Arrivals) -> Intake:
         rejected: Counter[tuple[Signal, SampleFault]] = Counter()
-        cleared: str | None = None
+        cleared: Statement | None = None
         for kind, stamp, value in zip(*(part.tolist() for part in arrivals), strict=True):
             signal = Signal.of(kind)
             fault, cause = self._add(signal, stamp, None if kind == Kind.NO_POSITION else value)
@@ -254,49 +269,38 @@ class RecordBuffer:
 
     def drop_damaged(self, signal: Signal, count: int) -> Intake:
         """Count messages of a signal's topic that hold no sample."""
-        self._rejected[f"{signal.value} is damaged"] += count
+        self._rejected[_cause(signal, SampleFault.DAMAGED)] += count
         return Intake({(signal, SampleFault.DAMAGED): count})
 
     def _add(
         self, signal: Signal, stamp: int, value: float | None
-    ) -> tuple[SampleFault | None, str | None]:
-        """Take a sample; return the fault for which it is rejected, and the cause in words."""
+    ) -> tuple[SampleFault | None, Statement | None]:
+        """Take a sample; return the fault for which it is rejected, and the cause."""
         buffer = self._pressure if signal is Signal.PRESSURE else self._position
-        last, name = buffer.last_stamp, signal.value
+        last = buffer.last_stamp
         if value is None:
-            return self._reject(
-                stamp, SampleFault.NO_JOINT, f"{name} without a position of the joint"
-            )
+            return self._reject(stamp, signal, SampleFault.NO_JOINT)
         if buffer.overtaken(np.array([stamp], np.int64)).any():
-            self._rejected[overtaken := _OVERTAKEN.format(name)] += 1
+            self._rejected[overtaken := _cause(signal, SampleFault.OVERTAKEN)] += 1
             return SampleFault.OVERTAKEN, overtaken
         if last is not None and stamp < last:
-            cause = f"stamps of {name} went back by {(last - stamp) / 1e9:.3g} s"
+            seconds = (last - stamp) / 1e9
+            cause = said(Code.STAMPS_WENT_BACK, signal=signal.value, seconds=seconds)
             self.clear(cause)
-            self._rejected[f"{name} went back in time"] += 1
-            return SampleFault.BACK, cause + _CLEARED
-        if last is not None and stamp == last:
-            return self._reject(stamp, SampleFault.REPEATED, f"{name} repeats a stamp")
-        if (fault := self._unusable(signal, value)) is not None:
-            return self._reject(stamp, *fault)
+            self._rejected[_cause(signal, SampleFault.BACK)] += 1
+            return SampleFault.BACK, said(Code.BUFFER_CLEARED, because=cause)
+        if stamp == last or not math.isfinite(value):
+            fault = SampleFault.REPEATED if stamp == last else SampleFault.NOT_FINITE
+            return self._reject(stamp, signal, fault)
+        lowest, highest = self.bounds(signal)
+        if not lowest <= value <= highest:
+            whose = Code.SENSOR_RANGE if signal is Signal.PRESSURE else Code.ANY_VALVE_RANGE
+            span = said(whose, lowest=lowest, highest=highest)
+            return self._reject(stamp, signal, SampleFault.OUT_OF_RANGE, span=span)
         buffer.append(stamp, value)
         self._taken += 1
         self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
         return None, None
-
-    def _unusable(self, signal: Signal, value: float) -> tuple[SampleFault, str] | None:
-        """Return why no valve reads this value; None if one may."""
-        name, (lowest, highest) = signal.value, self.bounds(signal)
-        if not math.isfinite(value):
-            return SampleFault.NOT_FINITE, f"{name} is not finite"
-        if lowest <= value <= highest:
-            return None
-        whose = (
-            f"the sensor's range {lowest:g} to {highest:g} Pa"
-            if signal is Signal.PRESSURE
-            else f"the range of any valve, {lowest:g} to {highest:g} m"
-        )
-        return SampleFault.OUT_OF_RANGE, f"{name} outside {whose}"
 
     def bounds(self, signal: Signal) -> tuple[float, float]:
         """Return the lowest and the highest reading that is taken, Pa or m."""
@@ -304,12 +308,15 @@ class RecordBuffer:
             return self._valve.pressure_minimum, self._valve.pressure_maximum
         return -MOST_POSITION, MOST_POSITION
 
-    def _reject(self, stamp: int, fault: SampleFault, cause: str) -> tuple[SampleFault, str]:
+    def _reject(
+        self, stamp: int, signal: Signal, fault: SampleFault, **facts: Statement
+    ) -> tuple[SampleFault, Statement]:
+        cause = _cause(signal, fault, **facts)
         self._rejections.append(Rejection(stamp, cause))
         self._rejected[cause] += 1
         return fault, cause
 
-    def clear(self, cause: str) -> None:
+    def clear(self, cause: Statement) -> None:
         """Remove all samples; refusals name `cause` until the buffer is full again."""
         self._pressure.clear()
         self._position.clear()

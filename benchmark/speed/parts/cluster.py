@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Many recordings on the workers of a Dask cluster, beside the processes of one machine.
 
 The recordings and the clock are those of the part `fleet`. Needs the extra `cluster`, and as many
@@ -13,8 +22,7 @@ from pathlib import Path
 from benchmark.speed.parts.fleet import Cost, cost_of, recordings, timed, write_recordings
 from benchmark.speed.rows import Row, Settings
 from valve_friction_ros.fleet import in_processes
-from valve_friction_ros.fleet.sharing.batches import in_cluster
-from valve_friction_ros.fleet.sharing.cluster import Cluster, cluster_at
+from valve_friction_ros.fleet.cluster import Cluster, cluster_at, in_cluster
 
 __all__ = ["measure"]
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The instants of breakaway, and the static friction (9) from them."""
 
 import numpy as np
@@ -14,8 +23,7 @@ from valve_friction_ros.identification.published.breakaway import (
     find_breakaways,
 )
 from valve_friction_ros.model import GRAPHITE_PACKING, Recording, SensorNoise, SquareWave
-from valve_friction_ros.signals.noise import position_noise, velocity_noise
-from valve_friction_ros.signals.runs import runs_of
+from valve_friction_ros.signals import position_noise, runs_of, velocity_noise
 
 SETTINGS = IdentificationSettings()
 

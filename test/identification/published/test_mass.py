@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Whether a record determines the mass, and what is assumed where it does not."""
 
 import numpy as np
@@ -9,8 +18,7 @@ from valve_friction_ros.identification.published.identify import (
     _why_mass_is_unknown,
 )
 from valve_friction_ros.model import BENCH_VALVE, SensorNoise, SineWave
-from valve_friction_ros.signals import differentiate
-from valve_friction_ros.signals.measured_record import measured
+from valve_friction_ros.signals import differentiate, measured
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a record must hold: each limit from both sides, and what a refusal says."""
 
 import numpy as np
@@ -10,14 +19,12 @@ from valve_friction_ros.identification.trust.excitation import (
     require_enough_samples,
     require_motion,
     require_related_signals,
-    require_stem_between_stops,
     require_travel,
     require_two_directions,
     require_unbroken,
 )
 from valve_friction_ros.model import Recording, Valve
-from valve_friction_ros.signals.measured_record import measured
-from valve_friction_ros.signals.noise import position_noise
+from valve_friction_ros.signals import measured, position_noise
 
 VALVE = Valve(0.0445, travel=0.02)
 OPEN_ENDED = Valve(0.0445)
@@ -174,37 +181,6 @@ def test_what_is_said_of_the_travel():
     assert "moved 0.19 mm, 0.95 % of" in refusal(require_travel, record([0, 1.9e-4]), VALVE)
 
 
-@pytest.mark.parametrize(("stop", "level"), [("lower", 0.0), ("upper", 0.02)])
-def test_half_of_the_record_may_lie_at_a_stop(stop, level):
-    """Within a thousandth of the travel, 20 µm, of a stem without noise."""
-    away, at = abs(level - 0.01), 19e-6 if level == 0 else level - 19e-6
-    require_stem_between_stops(record([at] * 50 + [away] * 50), VALVE)
-    most = [at] * 61 + [away] * 39
-    assert refusal(require_stem_between_stops, record(most), VALVE) == (
-        f"the stem is at its {stop} stop for 61 % of the record, where pressure holds no "
-        "information on friction: excite the valve around mid-travel"
-    )
-    require_stem_between_stops(record(most), OPEN_ENDED)
-    if stop == "lower":
-        require_stem_between_stops(record([2e-5] * 61 + [away] * 39), VALVE)
-    off = 21e-6 if level == 0 else level - 21e-6
-    require_stem_between_stops(record([off] * 61 + [away] * 39), VALVE)
-
-
-@pytest.mark.parametrize(("deviations", "lies"), [(4.8, True), (5.2, False)])
-def test_a_noisy_stem_reaches_a_stop_earlier(deviations, lies):
-    """Within five deviations of its noise, 0.8 mm here, far above a thousandth of the travel."""
-    shake = 1e-3 * np.random.default_rng(3).choice([-1.0, 1.0], 300)
-    position = np.concatenate([np.zeros(700), 0.01 + shake])
-    position[:700] = deviations * position_noise(position)
-    assert position[0] == pytest.approx(deviations * position_noise(position), rel=0.01)
-    if lies:
-        message = refusal(require_stem_between_stops, record(position), VALVE)
-        assert "lower stop for 70 %" in message
-    else:
-        require_stem_between_stops(record(position), VALVE)
-
-
 def strokes(scatter=0.0, slope=2e6, friction=1e4):
     """Pressure = slope · position ± friction, sampled like its blocks; scatter on the pressure."""
     position = 0.01 + 0.005 * np.sin(np.linspace(0, 6 * np.pi, 301))
@@ -216,10 +192,11 @@ def strokes(scatter=0.0, slope=2e6, friction=1e4):
 
 
 def test_pressure_follows_the_moving_stem():
-    slope, share = _followed(strokes(friction=0.0))
+    slope, share, _ = _followed(strokes(friction=0.0))
     assert (slope, share) == (pytest.approx(2e6, rel=1e-9), pytest.approx(1.0, abs=1e-12))
     # The way of the stem explains its friction; only the turns lie between both.
-    slope, share = _followed(strokes())
+    slope, share, dissipates = _followed(strokes())
+    assert dissipates
     assert slope == pytest.approx(2e6, rel=1e-3)
     assert share > 0.99
 
@@ -228,12 +205,12 @@ def test_rests_and_other_sample_periods_do_not_matter():
     """Ten samples in each block of 0.1 s, and a rest in which the pressure does anything."""
     clean = strokes(friction=0.0)
     fine = record(np.repeat(clean.position, 10), np.repeat(clean.pressure, 10), 0.01)
-    assert _followed(fine) == pytest.approx(_followed(clean), rel=1e-9)
+    assert _followed(fine)[:2] == pytest.approx(_followed(clean)[:2], rel=1e-9)
     rest = record(
         np.concatenate([clean.position, np.full(100, clean.position[-1])]),
         np.concatenate([clean.pressure, 1e5 * np.random.default_rng(1).random(100)]),
     )
-    assert _followed(rest) == pytest.approx(_followed(clean), rel=1e-9)
+    assert _followed(rest)[:2] == pytest.approx(_followed(clean)[:2], rel=1e-9)
 
 
 @pytest.mark.parametrize(("share", "counts"), [(0.045, False), (0.055, True)])
@@ -247,7 +224,7 @@ def test_a_twentieth_of_the_top_speed_is_motion(share, counts):
             np.concatenate([clean.pressure, 1e5 * np.random.default_rng(1).random(100)]),
         )
     )
-    assert (found != pytest.approx(_followed(clean), rel=1e-9)) is counts
+    assert (found[:2] != pytest.approx(_followed(clean)[:2], rel=1e-9)) is counts
 
 
 def test_what_two_blocks_make_up_for_is_left_out():
@@ -255,14 +232,14 @@ def test_what_two_blocks_make_up_for_is_left_out():
     clean = strokes(friction=0.0)
     zigzag = clean.pressure + 1e4 * (-1.0) ** np.arange(301)
     found = _followed(record(clean.position, zigzag))
-    assert found == (pytest.approx(2e6, rel=1e-9), pytest.approx(1.0, abs=1e-12))
+    assert found[:2] == (pytest.approx(2e6, rel=1e-9), pytest.approx(1.0, abs=1e-12))
 
 
 def test_the_unit_of_the_pressure_does_not_matter():
     scattered = strokes(scatter=1e4)
     small = record(scattered.position, 1e-9 * scattered.pressure)
-    slope, share = _followed(scattered)
-    assert _followed(small) == pytest.approx((1e-9 * slope, share), rel=1e-9)
+    slope, share, _ = _followed(scattered)
+    assert _followed(small)[:2] == pytest.approx((1e-9 * slope, share), rel=1e-9)
     require_related_signals(small)
 
 
@@ -307,25 +284,43 @@ def test_the_share_is_told_in_whole_percent():
     assert "explain 9 % of the pressure" in refusal(require_related_signals, unrelated)
 
 
+def turned_over(upright):
+    """The same with a position that grows the other way."""
+    return record(0.02 - upright.position, upright.pressure)
+
+
 def test_a_stem_against_the_pressure():
-    assert refusal(require_related_signals, strokes(slope=-2e6)) == (
+    assert refusal(require_related_signals, turned_over(strokes())) == (
         "the stem moves against the pressure: invert the position, so that it grows in the "
         "direction in which pressure pushes the stem"
     )
 
 
+def test_no_position_is_inverted_whose_loop_dissipates():
+    """Of a hunting loop with slip jumps the slope may have either sign."""
+    require_related_signals(strokes(slope=-2e6))
+
+
 @pytest.mark.parametrize(("share", "passes"), [(0.48, True), (0.52, False)])
 def test_where_less_than_half_is_explained_the_sign_is_chance(share, passes):
-    turned = strokes_explaining(share, slope=-2e6)
+    turned = turned_over(strokes_explaining(share))
     if passes:
         require_related_signals(turned)
     else:
         assert "moves against the pressure" in refusal(require_related_signals, turned)
 
 
+def test_the_jumps_of_a_stem_that_sticks_are_no_slow_sampling():
+    """A third of the range between two samples upward; the way down is slow."""
+    position = np.concatenate([np.linspace(0, 0.01, 4), np.linspace(0.01, 0, 101)[1:]])
+    position = np.concatenate([position, np.linspace(0, 0.004, 50)])
+    require_related_signals(record(position, 1e6 * position + 1e4, period=2.0))
+
+
 @pytest.mark.parametrize(("samples", "share"), [(11, None), (9, 11), (3, 33)])
 def test_a_stroke_has_ten_samples(samples, share):
-    position = np.concatenate([np.linspace(0, 0.01, samples + 1), np.linspace(0.01, 0, 101)[1:]])
+    stroke = np.linspace(0, 0.01, samples + 1)
+    position = np.concatenate([*[stroke, stroke[::-1]] * 5, np.zeros(50)])
     stem = record(position, 1e6 * position + 1e4, period=2.0)
     if share is None:
         require_related_signals(stem)

@@ -1,23 +1,23 @@
-"""How far a model is from its record: numbers, limits and words."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
 
-import math
+"""How far a model is from its record: numbers, limits and words."""
 
 import pytest
 
 from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
-from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model import Valve
+from valve_friction_ros.wording import percentage
 
 
 def misfit(fit=1.0, systematic=5.0, tolerated=4.0):
     return Misfit(fit, rms=9.0, systematic=systematic, tolerated=tolerated)
-
-
-def test_excess_is_what_chance_leaves():
-    """Chance makes three quarters of what is tolerated, 3 of 4; of 5 that leaves √(5² − 3²)."""
-    assert misfit().excess == pytest.approx(4.0, rel=1e-12)
-    assert misfit(systematic=3.0).excess == 0.0
-    assert misfit(systematic=1.0).excess == 0.0
 
 
 def test_the_tolerated_misfit_is_still_described():
@@ -53,8 +53,3 @@ def test_distance_of_the_stem_in_words():
 )
 def test_percentages_for_people(share, text):
     assert percentage(share) == text
-
-
-def test_a_misfit_is_finite_where_nothing_is_tolerated():
-    assert misfit(systematic=2.0, tolerated=0.0).excess == 2.0
-    assert math.isfinite(misfit(systematic=0.0, tolerated=0.0).excess)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Each wrong unit of a record or of a valve file is named, and no right one is questioned."""
 
 import math
@@ -187,7 +196,7 @@ class TestTime:
         (remark,) = time_remarks(self.bench(1 / 60), BENCH_VALVE)
         assert "min read as s" in remark
 
-    @pytest.mark.parametrize("method", ["best", "refined", "published"])
+    @pytest.mark.parametrize("method", ["plant", "bench", "published"])
     def test_every_method_refuses(self, method):
         with pytest.raises(RefusalError, match="ms read as s"):
             identify(self.bench(1e3), BENCH_VALVE, method=method)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Stated data of a valve, compared with what its record shows."""
 
 import json
@@ -41,7 +50,7 @@ def record():
     return recorded()
 
 
-def found(record, stated, method="best", **typed):
+def found(record, stated, method="plant", **typed):
     settings = vf.IdentificationSettings(stated=stated)
     return vf.identify(record, replace(VALVE, **typed), settings, method)
 
@@ -55,7 +64,7 @@ def verdicts(result):
 
 
 class TestOfARecord:
-    @pytest.mark.parametrize("method", ["robust", "refined", "published"])
+    @pytest.mark.parametrize("method", ["plant", "bench", "published"])
     def test_right_data_change_nothing(self, record, method):
         stated = {**STATED, "mass": 1.6}
         result, without = found(record, stated, method), found(record, {}, method)
@@ -63,7 +72,7 @@ class TestOfARecord:
         assert result.warnings == without.warnings
         assert told(result) == {}
 
-    @pytest.mark.parametrize("method", ["robust", "refined"])
+    @pytest.mark.parametrize("method", ["plant", "bench"])
     def test_an_area_typed_twice_too_large(self, record, method):
         result = found(record, {"spring_constant": SPRING}, method, diaphragm_area=2 * AREA)
         (one,) = told(result).values()
@@ -299,3 +308,59 @@ class TestSettings:
     def test_impossible(self, stated, words):
         with pytest.raises(ValueError, match=f"^{words}"):
             vf.IdentificationSettings(stated=stated)
+
+
+class TestAssumed:
+    """What nobody has stated of the valve."""
+
+    def found(self, record, *assumed, stated=None, method="robust"):
+        settings = vf.IdentificationSettings(stated=stated or {}, assumed=assumed)
+        return vf.identify(record, VALVE, settings, method)
+
+    def test_without_any_nothing_is_said(self, record):
+        result = self.found(record)
+        assert not any("not stated" in one for one in result.warnings)
+        assert result.to_dict()["settings"]["assumed"] == []
+
+    @pytest.mark.parametrize("method", ["robust", "published"])
+    def test_newtons_of_an_assumed_area_are_weak_and_their_ratios_are_not(self, record, method):
+        known, result = (
+            self.found(record, *names, method=method)
+            for names in ((), ("travel", "diaphragm_area"))
+        )
+        for name in FORCES:
+            one, before = result.parameters[name], known.parameters[name]
+            if before.verdict in (Verdict.IDENTIFIED, Verdict.WEAK):
+                assert one.verdict is Verdict.WEAK
+                assert one.reason.endswith("of an assumed area")
+            assert repr(one.without_calibration) == repr(before.without_calibration)
+        assert result.warnings == (
+            "not stated, and assumed: travel 0.028575 m, diaphragm_area 0.0445 m²; newtons are of "
+            "an assumed area, percent and ratios are not; percent of the travel are of an assumed "
+            "one",
+            *known.warnings,
+        )
+        assert result.to_dict()["settings"]["assumed"] == ["travel", "diaphragm_area"]
+
+    def test_a_stated_spring_that_the_record_confirms_makes_up_for_an_area(self, record):
+        result = self.found(record, "diaphragm_area", stated={"spring_constant": SPRING})
+        assert verdicts(result) == verdicts(self.found(record))
+        assert result.warnings[0] == "not stated, and assumed: diaphragm_area 0.0445 m²"
+
+    def test_one_that_it_contradicts_comes_first(self, record):
+        result = self.found(record, "diaphragm_area", stated={"spring_constant": SPRING / 2})
+        assert result.warnings[0].startswith("spring_constant is ")
+        assert result.warnings[1].startswith("not stated, and assumed: ")
+        assert "contradicts" in result.parameters["coulomb_friction"].reason
+
+    def test_of_an_assumed_reference_the_preload_alone_is_weak(self, record):
+        known, result = self.found(record), self.found(record, "pressure_reference")
+        assert known.parameters["spring_preload"].verdict is Verdict.IDENTIFIED
+        changed = {n for n in FORCES if result.parameters[n] != known.parameters[n]}
+        changed -= {n for n in FORCES if math.isnan(known.parameters[n].value)}
+        assert changed == {"spring_preload"}
+        assert result.parameters["spring_preload"].reason == "of an assumed pressure_reference"
+
+    def test_what_is_fixed_is_not_compared(self):
+        settings = vf.IdentificationSettings(fixed={"mass": 1.6}, stated={"mass": 9.0, **STATED})
+        assert settings.stated == STATED

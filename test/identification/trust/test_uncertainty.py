@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Covariances of estimates whose uncertainty is known from theory."""
 
 import math
@@ -9,19 +18,16 @@ from hypothesis import strategies as st
 from scipy.linalg import sqrtm
 from scipy.signal import lfilter
 
-from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.trust.uncertainty import (
     block_covariance,
     half_width,
-    plain_sandwich,
     stroke_length,
-    worst_case,
 )
 
 
-def mean_equation(signal):
-    """Σ (θ − y) = 0, whose root is the mean."""
-    return EstimatingEquation.of_least_squares(np.ones((signal.size, 1)), signal.mean() - signal)
+def of_mean(signal, block):
+    """The covariance of θ in Σ (θ − y) = 0, whose root is the mean."""
+    return block_covariance(np.ones((signal.size, 1)), signal.mean() - signal, block)
 
 
 class TestBlocks:
@@ -29,7 +35,7 @@ class TestBlocks:
     BLOCK = 1000
 
     def variance_of_mean(self, signal):
-        return float(block_covariance(mean_equation(signal), self.BLOCK).matrix[0, 0])
+        return float(of_mean(signal, self.BLOCK).matrix[0, 0])
 
     def noise(self):
         return np.random.default_rng(0).standard_normal(self.SIZE)
@@ -67,8 +73,7 @@ class TestBlocksOfLeastSquares:
     GRADIENT = np.array([1.0, -2.0, 0.5])
 
     def covariance(self, noise):
-        equation = EstimatingEquation.of_least_squares(self.SLOPE, self.RESIDUAL_OF @ noise)
-        return block_covariance(equation, self.LENGTH)
+        return block_covariance(self.SLOPE, self.RESIDUAL_OF @ noise, self.LENGTH)
 
     def maps(self):
         """For each block the matrix that makes its contribution from the noise, (b, p, n)."""
@@ -121,14 +126,12 @@ class TestBlocksOfLeastSquares:
 def test_equal_blocks_of_a_mean_have_one_freedom_less_than_there_are():
     signal = np.random.default_rng(8).standard_normal(240)
     for block, blocks in ((30, 8), (20, 12), (240, 8)):  # at least 8
-        assert block_covariance(mean_equation(signal), block).freedom(np.ones(1)) == pytest.approx(
-            blocks - 1, rel=1e-9
-        )
+        assert of_mean(signal, block).freedom(np.ones(1)) == pytest.approx(blocks - 1, rel=1e-9)
 
 
 def test_a_record_of_few_samples_has_a_block_for_each():
     signal = np.array([1.0, 3.0, 2.0, 7.0, 5.0])
-    covariance = block_covariance(mean_equation(signal), 30)
+    covariance = of_mean(signal, 30)
     assert covariance.freedom(np.ones(1)) == pytest.approx(4.0, rel=1e-9)
     assert covariance.matrix[0, 0] == pytest.approx(np.var(signal, ddof=1) / 5, rel=1e-9)
 
@@ -140,78 +143,30 @@ def test_a_block_with_nearly_all_the_information_counts_as_if_with_95_percent():
     shares = np.minimum(slope**2 / (slope @ slope), 0.95)
     assert shares[0] == 0.95
     expected = slope * residual / (slope @ slope) / np.sqrt(1 - shares)
-    found = block_covariance(EstimatingEquation.of_least_squares(slope[:, None], residual), 1)
+    found = block_covariance(slope[:, None], residual, 1)
     np.testing.assert_allclose(found.contributions[:, 0], expected, rtol=1e-9)
 
 
-def test_a_block_with_negative_information_counts_as_if_with_none():
-    """As above; two halves of a noisy slope may differ in sign, and then the share is negative."""
-    one, two = np.array([1.0, *[2.0] * 7]), np.array([-3.0, *[2.0] * 7])
-    first, second = np.random.default_rng(2).standard_normal((2, 8))
-    shares = np.maximum(one * two / (one @ two), 0.0)
-    assert shares[0] == 0.0
-    expected = (one * second + two * first) / (2 * (one @ two)) / np.sqrt(1 - shares)
-    equation = EstimatingEquation((one[:, None], two[:, None]), (first, second))
-    found = block_covariance(equation, 1).contributions[:, 0]
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
-
-
-def random_equation(samples, free, seed):
+def random_regression(samples, free, seed):
     generator = np.random.default_rng(seed)
-    slope = generator.standard_normal((samples, free))
-    return EstimatingEquation.of_least_squares(slope, generator.standard_normal(samples))
+    return generator.standard_normal((samples, free)), generator.standard_normal(samples)
 
 
 @given(scales=st.lists(st.floats(1e-6, 1e6), min_size=3, max_size=3))
 def test_units_of_the_parameters_do_not_matter(scales):
-    equation, units = random_equation(90, 3, 5), np.array(scales)
-    plain = block_covariance(equation, 9).matrix
-    scaled = block_covariance(equation.in_units(units), 9).matrix
+    (slope, residual), units = random_regression(90, 3, 5), np.array(scales)
+    plain = block_covariance(slope, residual, 9).matrix
+    scaled = block_covariance(slope / units, residual, 9).matrix
     np.testing.assert_allclose(scaled / np.outer(units, units), plain, rtol=1e-9)
 
 
-def test_unknown_where_the_equation_is_singular_or_the_record_too_short():
-    slope = random_equation(50, 2, 6).slopes[0]
+def test_unknown_where_the_regression_is_singular_or_the_record_too_short():
+    slope, _ = random_regression(50, 2, 6)
     for singular in (slope[:, [0, 0]], slope * [1.0, 0.0], slope[:2]):
-        equation = EstimatingEquation.of_least_squares(singular, np.ones(len(singular)))
-        covariance = block_covariance(equation, 5)
+        covariance = block_covariance(singular, np.ones(len(singular)), 5)
         assert np.isnan(covariance.matrix).all()
         assert np.isnan(covariance.half_width(np.ones(2)))
         assert np.isnan(covariance.freedom(np.ones(2)))
-
-
-def test_crossed_looks():
-    """Scores and curvature written out sample by sample, and the step that solves them."""
-    generator = np.random.default_rng(9)
-    slopes = tuple(generator.standard_normal((6, 2)) for _ in range(2))
-    residuals = tuple(generator.standard_normal(6) for _ in range(2))
-    equation = EstimatingEquation(slopes, residuals)
-    curvature = np.zeros((2, 2))
-    for one, two, first, second, score in zip(*slopes, *residuals, equation.scores, strict=True):
-        np.testing.assert_allclose(score, one * second + two * first, rtol=1e-14)
-        curvature += np.outer(one, two) + np.outer(two, one)
-    np.testing.assert_allclose(equation.curvature, curvature, rtol=1e-13)
-    expected = -np.linalg.solve(curvature, equation.scores.sum(axis=0))
-    np.testing.assert_allclose(equation.newton_step(), expected, rtol=1e-10)
-
-
-def faint_equation():
-    """A second coordinate whose information is rounding: 9e−16 of the first one's."""
-    slope = np.vstack([[1.0, 0.0], [0.0, 3e-8], np.zeros((6, 2))])
-    return EstimatingEquation.of_least_squares(slope, np.ones(8))
-
-
-def test_a_coordinate_that_only_rounding_tells_stays():
-    np.testing.assert_allclose(faint_equation().newton_step(), [-1.0, 0.0], atol=1e-12)
-    assert plain_sandwich(faint_equation(), 1)[1, 1] == 0.0
-
-
-def test_plain_sandwich_written_out():
-    equation = random_equation(90, 3, 10)
-    inverse = np.linalg.inv(equation.curvature)
-    sums = equation.scores.reshape(10, 9, 3).sum(axis=1)
-    expected = inverse @ sums.T @ sums @ inverse
-    np.testing.assert_allclose(plain_sandwich(equation, 9), expected, rtol=1e-9)
 
 
 def test_half_width_is_students():
@@ -227,33 +182,3 @@ def test_stroke_length_between_reversals():
     assert stroke_length(simulated) == 120 // 3
     assert stroke_length(simulated[:-1]) == 119 // 3
     assert stroke_length(np.zeros(50)) == 50
-
-
-class TestWorstCase:
-    SENSITIVITY = np.random.default_rng(7).standard_normal((200, 3)) * [1.0, 5.0, 0.1]
-
-    def bound(self, misfit):
-        gram = self.SENSITIVITY.T @ self.SENSITIVITY
-        return worst_case(2 * gram, 200, misfit)
-
-    def moved(self, residual):
-        return np.linalg.lstsq(self.SENSITIVITY, residual, rcond=None)[0]
-
-    @pytest.mark.parametrize("index", range(3))
-    def test_attained_by_the_worst_residual(self, index):
-        """The residual along S·(SᵀS)⁻¹·e_i moves θ_i by the whole bound."""
-        gram = self.SENSITIVITY.T @ self.SENSITIVITY
-        worst = self.SENSITIVITY @ np.linalg.inv(gram)[:, index]
-        worst *= 0.7 / np.sqrt(np.mean(worst**2))
-        bound = math.sqrt(self.bound(0.7)[index, index])
-        assert self.moved(worst)[index] == pytest.approx(bound, rel=1e-12)
-
-    @given(seed=st.integers(0, 10_000))
-    def test_no_residual_moves_more(self, seed):
-        residual = np.random.default_rng(seed).standard_normal(200)
-        misfit = float(np.sqrt(np.mean(residual**2)))
-        bound = np.sqrt(np.diag(self.bound(misfit)))
-        assert (np.abs(self.moved(residual)) <= bound).all()
-
-    def test_unknown_without_curvature(self):
-        assert np.isnan(worst_case(np.diag([1.0, 0.0]), 10, 1.0)).all()

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What each sub-command takes, and what its help says around it.
 
 Nothing slow is imported here, so that a help text is there at once; what runs a sub-command is
@@ -13,26 +22,24 @@ from types import MappingProxyType
 
 from valve_friction_ros.commands.arguments.actuator_questions import QUESTIONS
 from valve_friction_ros.commands.arguments.fail_on import add_fail_on
-from valve_friction_ros.commands.arguments.history_place import (
+from valve_friction_ros.commands.arguments.identification import add_identification_arguments
+from valve_friction_ros.commands.arguments.kept_valves import (
     PLACE,
+    add_valve_argument,
     history_place,
     usual_history,
 )
-from valve_friction_ros.commands.arguments.identification import add_identification_arguments
-from valve_friction_ros.commands.arguments.kept_valves import add_valve_argument
 from valve_friction_ros.commands.arguments.planning import add_planning_arguments
 from valve_friction_ros.commands.arguments.recording import (
     add_reading_arguments,
     add_recording_arguments,
     add_table_arguments,
 )
-from valve_friction_ros.dashboard.access import Role
+from valve_friction_ros.dashboard.accounts import Role
 from valve_friction_ros.history import URL_VARIABLE
 from valve_friction_ros.identification import LEAST_FIT
 from valve_friction_ros.records.data_folder import history_file
 from valve_friction_ros.records.spelling import nearest
-
-__all__ = ["DECLARATIONS", "EARLIEST", "LATEST", "PAGE", "SERVICES"]
 
 
 def _add_files(parser: argparse.ArgumentParser) -> None:
@@ -96,6 +103,19 @@ def _identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
+def _inspect(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Show what would be read of a table: how it is written, columns, units, rates, gaps, bad "
+        "values, and the course of each signal."
+    )
+    parser.epilog = (
+        "Exit code 2: the file cannot be read, or leaves something open; stderr asks for all of it."
+    )
+    add_recording_arguments(parser)
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the recording")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
 def _identify_folder(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Identify all recordings in a folder and in the folders below it, on all cores or on the "
@@ -144,6 +164,25 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.yaml",
         help="valve of the recordings that have neither NAME.valve.yaml beside them nor valve.yaml "
         "in their bag or beside them",
+    )
+    parser.add_argument(
+        "--plant",
+        type=Path,
+        metavar="FILE.csv",
+        help="the valves of the recordings in one table: tag, area, travel, spring, range; a "
+        "recording is of the valve whose tag is in its name or above its values",
+    )
+    parser.add_argument(
+        "--history",
+        type=Path,
+        metavar="FILE.sqlite",
+        help="with --plant: file each result under its tag and the time of its recording, and "
+        "compare it with the baseline that is kept there; `history` and the dashboard read it",
+    )
+    parser.add_argument(
+        "--first-is-baseline",
+        action="store_true",
+        help="with --history: the first result of a valve without a baseline becomes its baseline",
     )
     _add_sharing(parser)
     parser.add_argument(
@@ -198,6 +237,24 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         default=Path("stroke_test.csv"),
         metavar="FILE.csv",
         help="corners of the pressure: time_s and pressure_pa (%(default)s)",
+    )
+    parser.add_argument(
+        "--table",
+        type=Path,
+        metavar="FILE.csv",
+        help="the set points with their times, in %%, mA, kPa and bar, the positions at which to "
+        "abort, and what each step tells: for a control system without ROS",
+    )
+    parser.add_argument(
+        "--form",
+        type=Path,
+        metavar="FILE.txt",
+        help="the same as the form of a partial-stroke test, for a person with a stopwatch",
+    )
+    parser.add_argument(
+        "--signal-range",
+        metavar="RANGE",
+        help="pressures of a signal of 0 and 100 %%, as '0.2..1.0 bar' (those of the spring)",
     )
     parser.add_argument("--replace", action="store_true", help="replace a file that is there")
     parser.add_argument(
@@ -314,6 +371,17 @@ def _until(text: str) -> datetime:
     return min(_time(text) + timedelta(days=is_date), LATEST)
 
 
+def _add_history(parser: argparse.ArgumentParser, words: str) -> None:
+    parser.add_argument(
+        "file",
+        type=history_place,
+        nargs="?",
+        default=usual_history(),
+        metavar=PLACE,
+        help=f"{words} (that of {URL_VARIABLE}, else {history_file()})",
+    )
+
+
 def _history(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "List what the identifiers have kept: identifications, refusals, baselines, trend, "
@@ -323,15 +391,7 @@ def _history(parser: argparse.ArgumentParser) -> None:
         "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
         "picture could not be written; 3: the latest diagnosis of a valve reached --fail-on."
     )
-    parser.add_argument(
-        "file",
-        type=history_place,
-        nargs="?",
-        default=usual_history(),
-        metavar=PLACE,
-        help="the identifiers' history_file, or the server of their history_url "
-        f"(that of {URL_VARIABLE}, else {history_file()})",
-    )
+    _add_history(parser, "the identifiers' history_file, or the server of their history_url")
     add_valve_argument(parser)
     parser.add_argument(
         "--since", type=_time, default=EARLIEST, metavar="TIME", help="only from this time on"
@@ -373,6 +433,47 @@ def _history_copy(parser: argparse.ArgumentParser) -> None:
     )
     add_valve_argument(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _dashboard(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Serve the pages of a history: plant, valve, alarms and comparison. Nothing is heard and "
+        "no ROS is needed; alarms of a file can be answered. The node `dashboard` shows what its "
+        "identifiers say now, too."
+    )
+    parser.epilog = (
+        "Ctrl-C ends it. Exit code 2: the history cannot be read, or the address is taken or is "
+        "not allowed."
+    )
+    _add_history(parser, "the history of `identify-folder --history` or of the identifiers")
+    parser.add_argument(
+        "--time-zone",
+        default="UTC",
+        metavar="ZONE",
+        help="zone of the times, as Europe/Berlin (%(default)s)",
+    )
+    parser.add_argument(
+        "--reports",
+        type=Path,
+        metavar="DIR",
+        help="folder of the reports, as `identify-folder --output FILE.html` makes it: each valve "
+        "shows its own",
+    )
+    parser.add_argument(
+        "--port", type=int, default=8080, metavar="N", help="port to listen at (%(default)s)"
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="address to listen at; any but this machine's own needs accounts (%(default)s)",
+    )
+    parser.add_argument(
+        "--accounts",
+        type=Path,
+        metavar="FILE",
+        help="accounts by `valve_friction dashboard-account`; empty: the environment's",
+    )
 
 
 def _dashboard_account(parser: argparse.ArgumentParser) -> None:
@@ -462,6 +563,7 @@ def _demo(parser: argparse.ArgumentParser) -> None:
 DECLARATIONS: Mapping[str, Callable[[argparse.ArgumentParser], None]] = MappingProxyType(
     {
         "identify": _identify,
+        "inspect": _inspect,
         "identify-folder": _identify_folder,
         "describe-valve": _describe_valve,
         "plan-test": _plan_test,
@@ -469,6 +571,7 @@ DECLARATIONS: Mapping[str, Callable[[argparse.ArgumentParser], None]] = MappingP
         "call": _call,
         "history": _history,
         "history copy": _history_copy,
+        "dashboard": _dashboard,
         "dashboard-account": _dashboard_account,
         "reproduce-paper": _reproduce_paper,
         "demo": _demo,

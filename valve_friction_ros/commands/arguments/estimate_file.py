@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Estimates that `valve_friction identify --json` wrote, read back."""
 
 import json
@@ -7,9 +16,7 @@ from typing import Any
 
 from valve_friction_ros.identification import PARAMETER_UNITS
 from valve_friction_ros.records.spelling import nearest
-from valve_friction_ros.records.unreadable import cause_of
-
-__all__ = ["read_estimate"]
+from valve_friction_ros.records.whole_file import cause_of
 
 _LARGEST = 10_000_000
 """Most bytes of an estimate. Chosen: `identify --json` writes some ten thousand."""

@@ -1,76 +1,61 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Arguments of the commands that identify: the method and its settings."""
 
 import argparse
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from valve_friction_ros.identification import (
-    CALIBRATION,
+from valve_friction_ros.identification.settings import (
     DEFAULT_METHOD,
     FIXABLE,
-    METHOD_NAMES,
-    TIMING_UNCERTAINTY,
     IdentificationSettings,
 )
 from valve_friction_ros.records.spelling import nearest, resembling
+from valve_friction_ros.settings import (
+    IDENTIFICATION,
+    SURVEY,
+    identification_from,
+    survey_from,
+)
 
 if TYPE_CHECKING:
+    from valve_friction_ros.health import FrictionLimits
     from valve_friction_ros.records.valve_file import ValveFile
 
-__all__ = ["add_identification_arguments", "identification_settings", "method_name"]
+_NUMBERS = {int: "N", float: "SHARE"}
+"""What the help calls pure numbers."""
 
 
 def add_identification_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the method and what it takes."""
-    defaults = IdentificationSettings()
-    parser.add_argument(
-        "--method",
-        choices=METHOD_NAMES,
-        help="best: robust wherever it applies; robust: imperfections of a plant in the fit; "
-        "refined: the Karnopp model alone; published: the paper's model 1; signature: model 2, two "
-        f"periods or more of a slow triangle ({DEFAULT_METHOD})",
-    )
+    """Declare the settings that are options, and the known parameters."""
+    for one in (*IDENTIFICATION, *SURVEY):
+        if not one.option:
+            continue
+        kind = float if one.default is None else type(one.default)
+        usual = f" ({one.default})" if one.is_given(one.default) else ""
+        nothing = "unset" if kind is float else "0"
+        words = one.description.replace(" [-]", "").replace(f"; {nothing}:", "; without it:")
+        parser.add_argument(
+            one.option,
+            type=one.spell if kind is str else kind,
+            choices=one.choices or None,
+            metavar=None if one.choices else one.unit.upper() or _NUMBERS[kind],
+            help=(words[0].lower() + words[1:] + usual).replace("%", "%%"),
+        )
     parser.add_argument(
         "--fix",
         action="append",
         default=[],
         metavar="NAME=VALUE",
         help=f"take a parameter as known ({', '.join(FIXABLE)}); NAME alone: from the valve file",
-    )
-    parser.add_argument(
-        "--position-bias",
-        type=float,
-        metavar="M",
-        help="x̄ of (10) in m: the paper's form of four columns, F_0 = k·x̄",
-    )
-    parser.add_argument(
-        "--derivative-window",
-        type=int,
-        metavar="SAMPLES",
-        help=f"derivative window d, samples; by default {defaults.published_window} for the "
-        "published method, and chosen by the noise of the record for refined and signature; "
-        "robust takes no derivatives",
-    )
-    parser.add_argument(
-        "--timing-uncertainty",
-        type=float,
-        metavar="S",
-        help="standard deviation in s of the whole lag between the signals, of the method robust; "
-        f"by default {TIMING_UNCERTAINTY:g}",
-    )
-    for name, what in CALIBRATION.items():
-        parser.add_argument(
-            f"--{name.replace('_', '-')}",
-            type=float,
-            metavar="SHARE",
-            help=f"relative standard uncertainty of {what}, 0.02 for 2 %%: widens every interval "
-            f"({getattr(defaults, name):g})",
-        )
-    parser.add_argument(
-        "--order",
-        type=int,
-        metavar="N",
-        help=f"polynomial order n ({defaults.order})",
     )
 
 
@@ -112,25 +97,27 @@ def identification_settings(
     An option goes before the settings of the valve file. Raises ValueError if they do not go
     together.
     """
-    defaults = IdentificationSettings()
+    options_given = {one.name: getattr(options, one.field) for one in IDENTIFICATION if one.option}
+    known = {f"fixed.{name}": value for name, value in _fixed(options.fix, described.known).items()}
+    given = {
+        **described.settings,
+        **{name: value for name, value in options_given.items() if value is not None},
+        **known,
+    }
+    if "mass" in described.known:
+        given["assumed_mass"] = described.known["mass"]
+    return identification_from(given, stated=described.stated, assumed=described.assumed)
 
-    def given(name: str, option: Any) -> Any:
-        if option is not None:
-            return option
-        return described.settings.get(name, getattr(defaults, name, None))
 
-    fixed = {
-        name.removeprefix("fixed."): value
-        for name, value in described.settings.items()
-        if name.startswith("fixed.")
-    } | _fixed(options.fix, described.known)
-    return IdentificationSettings(
-        derivative_window=given("derivative_window", options.derivative_window),
-        order=given("polynomial_order", options.order) or defaults.order,
-        fixed=fixed,
-        stated={name: each for name, each in described.stated.items() if name not in fixed},
-        position_bias=given("position_bias", options.position_bias),
-        timing_uncertainty=given("timing_uncertainty", options.timing_uncertainty),
-        **{name: given(name, getattr(options, name)) for name in CALIBRATION},
-        assumed_mass=described.known.get("mass", defaults.assumed_mass),
+def survey_limits(options: argparse.Namespace, described: "ValveFile") -> "FrictionLimits":
+    """Build the limits from the parsed arguments, and from what the valve file names.
+
+    An option goes before the valve file. Raises ValueError if they are out of order.
+    """
+    from valve_friction_ros.health import FrictionLimits, SurveyLimits  # noqa: PLC0415 - slow
+
+    given = {one.name: getattr(options, one.field) for one in SURVEY}
+    stated = {name: value for name, value in given.items() if value is not None}
+    return FrictionLimits(
+        survey=SurveyLimits.of_packing(**survey_from({**described.survey, **stated}))
     )

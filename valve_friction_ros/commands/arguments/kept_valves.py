@@ -1,13 +1,43 @@
-"""Valves of a history, chosen by what people call them."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Where a history is, a file or a server; and its valves, chosen by what people call them."""
 
 import argparse
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+from valve_friction_ros.history import URL_VARIABLE, HistoryServer, is_url
+from valve_friction_ros.records.data_folder import history_file
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import KeptValve
 
-__all__ = ["add_valve_argument", "chosen_valves"]
+PLACE = "FILE.sqlite|URL"
+"""How the help calls it."""
+
+
+def history_place(text: str) -> Path | HistoryServer:
+    """Read a path, or the address of a server."""
+    if not is_url(text):
+        return Path(text)
+    try:
+        return HistoryServer(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def usual_history() -> str:
+    """Return the address of the server that the environment names, else the file of the nodes."""
+    return os.environ.get(URL_VARIABLE, "").strip() or str(history_file())
 
 
 def add_valve_argument(parser: argparse.ArgumentParser) -> None:

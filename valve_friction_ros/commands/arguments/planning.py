@@ -1,39 +1,34 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Arguments of `plan-test`: what is known of a valve, and what may be done to it."""
 
 import argparse
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from valve_friction_ros.commands.arguments.history_place import PLACE, history_place
+from valve_friction_ros.commands.arguments.kept_valves import PLACE, history_place
 from valve_friction_ros.identification import (
     CALIBRATION,
     TIMING_UNCERTAINTY,
+    UNITS,
     IdentificationSettings,
 )
 from valve_friction_ros.planning import AIMS, Conditions, Limits
+from valve_friction_ros.settings import identification_from
 
 if TYPE_CHECKING:
     from valve_friction_ros.planning import FrictionRange
     from valve_friction_ros.records.valve_file import ValveFile
-
-__all__ = [
-    "add_planning_arguments",
-    "frictions_from",
-    "planned_conditions",
-    "planned_limits",
-    "planned_settings",
-]
-
-_KNOWN = {
-    "coulomb_friction": "N",
-    "static_friction": "N",
-    "viscous_friction": "N·s/m",
-    "spring_constant": "N/m",
-    "spring_preload": "N",
-    "mass": "kg",
-}
 
 
 def _percent(text: str) -> float:
@@ -49,6 +44,19 @@ def _percent(text: str) -> float:
 
 def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what is known, the limits, the sensors and the aim."""
+    _add_known(parser)
+    _add_limits(parser)
+    _add_sensors(parser)
+    parser.add_argument(
+        "--for",
+        dest="aim",
+        choices=[*AIMS],
+        default="friction",
+        help="what shall be known best; friction: F_c, F_v and F_s alike (%(default)s)",
+    )
+
+
+def _add_known(parser: argparse.ArgumentParser) -> None:
     known = parser.add_argument_group(
         "known",
         "of friction and spring: an option goes before an earlier result, and that before the "
@@ -68,7 +76,7 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
         help="the last identification in the identifiers' history_file, or on their server; "
         "of several valves that of --valve-name",
     )
-    for name, unit in _KNOWN.items():
+    for name, unit in UNITS.items():
         known.add_argument(
             f"--{name.replace('_', '-')}",
             type=float,
@@ -82,6 +90,9 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FACTOR",
         help="friction may be so many times smaller or larger than what is known (%(default)g)",
     )
+
+
+def _add_limits(parser: argparse.ArgumentParser) -> None:
     limits, default = parser.add_argument_group("limits", "of what the test may do"), Limits()
     limits.add_argument(
         "--from",
@@ -121,6 +132,9 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
             metavar=unit,
             help=f"{text}{shown}",
         )
+
+
+def _add_sensors(parser: argparse.ArgumentParser) -> None:
     sensors, usual = parser.add_argument_group("sensors"), Conditions()
     for name, unit, value, text in (
         ("sample-rate", "HZ", usual.sample_rate, "samples per second of both signals"),
@@ -137,13 +151,6 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="standard deviation of the whole lag between the signals, as of `identify` (valve "
         f"file, or {TIMING_UNCERTAINTY:g})",
-    )
-    parser.add_argument(
-        "--for",
-        dest="aim",
-        choices=[*AIMS],
-        default="friction",
-        help="what shall be known best; friction: F_c, F_v and F_s alike (%(default)s)",
     )
 
 
@@ -181,7 +188,7 @@ def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "Fric
 
     found = dict(described.known)
     found |= {name: one for name, one in _earlier(options).items() if math.isfinite(one)}
-    given = {name: getattr(options, name) for name in _KNOWN}
+    given = {name: getattr(options, name) for name in UNITS}
     found |= {name: one for name, one in given.items() if one is not None}
     for name in ("spring_constant", "spring_preload"):
         if name not in found:
@@ -215,16 +222,8 @@ def frictions_from(options: argparse.Namespace, described: "ValveFile") -> "Fric
 
 def planned_limits(options: argparse.Namespace) -> Limits:
     """Return the limits that the options state."""
-    return Limits(
-        lowest=options.lowest,
-        highest=options.highest,
-        speed=options.speed,
-        duration=options.duration,
-        pressure_rate=options.pressure_rate,
-        pressure_minimum=options.pressure_minimum,
-        pressure_maximum=options.pressure_maximum,
-        allow_stops=options.allow_stops,
-    )
+    given = {one.name: vars(options).get(one.name, one.default) for one in fields(Limits)}
+    return Limits(**given)
 
 
 def planned_conditions(options: argparse.Namespace) -> Conditions:
@@ -243,8 +242,6 @@ def planned_settings(options: argparse.Namespace, described: "ValveFile") -> Ide
     if timing is None:
         timing = described.settings.get("timing_uncertainty")
     mass = described.known.get("mass") if options.mass is None else options.mass
-    return IdentificationSettings(
-        timing_uncertainty=timing,
-        assumed_mass=IdentificationSettings().assumed_mass if mass is None else mass,
-        **{name: described.settings.get(name, 0.0) for name in CALIBRATION},
-    )
+    given = {"timing_uncertainty": timing, "assumed_mass": mass}
+    given |= {name: described.settings.get(name) for name in CALIBRATION}
+    return identification_from({name: one for name, one in given.items() if one is not None})

@@ -1,8 +1,19 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Arguments of the commands that read a recording: the file, its valve, and what it leaves open."""
 
 import argparse
+import contextlib
 import math
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,17 +27,6 @@ if TYPE_CHECKING:
     from valve_friction_ros.records.recorded_valve import RecordedValve
     from valve_friction_ros.records.recordings import ReadingOptions
     from valve_friction_ros.records.valve_file import ValveFile
-
-__all__ = [
-    "add_reading_arguments",
-    "add_recording_arguments",
-    "add_table_arguments",
-    "described",
-    "given_columns",
-    "read_one",
-    "reading_options",
-    "require_one",
-]
 
 _OWN_DESCRIPTION = "valve.yaml"
 """The valve file in a bag, as ``~/save`` leaves it."""
@@ -47,6 +47,13 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.yaml",
         help="diaphragm_area, pressure_reference, travel, columns …, or parameters of an "
         "identifier; needed unless the file holds force_n, or a bag its own valve.yaml",
+    )
+    parser.add_argument(
+        "--save-columns",
+        type=Path,
+        metavar="FILE.yaml",
+        help="write the valve file with what was recognized of this table: the next one like it "
+        "needs no option",
     )
     add_reading_arguments(parser)
 
@@ -122,6 +129,57 @@ def reading_options(
     )
 
 
+def valve_of(arguments: argparse.Namespace) -> "ValveFile | None":
+    """Read the valve file, if there is one, given or in the bag."""
+    from valve_friction_ros.records.valve_file import read_valve_file  # noqa: PLC0415 - slow
+
+    path = arguments.valve or _own_description(arguments.file)
+    return None if path is None else read_valve_file(path, arguments.valve_name)
+
+
+def save_columns(arguments: argparse.Namespace, reading: "ReadingOptions") -> None:
+    """Write the valve file with what was found of the table, if that was asked for.
+
+    Raises ValueError if it is a bag, or leaves something open; OSError if it cannot be written.
+    """
+    if arguments.save_columns is None:
+        return
+    from valve_friction_ros.records.table import OpenTable  # noqa: PLC0415 - slow to import
+    from valve_friction_ros.records.valve_file import with_columns  # noqa: PLC0415
+    from valve_friction_ros.records.whole_file import write_whole  # noqa: PLC0415
+
+    table = OpenTable(arguments.file, reading.columns)
+    table.require_settled()
+    source = arguments.valve
+    text = "" if source is None else source.read_text(encoding="utf-8-sig")
+    try:
+        text = with_columns(text or "{}\n", table.layout.form)
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from None
+    write_whole(arguments.save_columns, text.removeprefix("{}\n").encode())
+
+
+@contextlib.contextmanager
+def reading_progress() -> "Iterator[None]":
+    """Show on a terminal how much of a large text was read."""
+    from valve_friction_ros.records.table_rows import PROGRESS  # noqa: PLC0415 - slow to import
+
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.progress import Progress  # noqa: PLC0415 - slow to import
+
+    from valve_friction_ros.commands.console import OutputConsole  # noqa: PLC0415
+
+    with Progress(console=OutputConsole(stderr=True), transient=True) as progress:
+        task = progress.add_task("reading", total=1.0)
+        token = PROGRESS.set(lambda share: progress.update(task, completed=share))
+        try:
+            yield
+        finally:
+            PROGRESS.reset(token)
+
+
 def _own_description(recording: Path) -> Path | None:
     folder = recording if recording.is_dir() else recording.parent
     place = folder / _OWN_DESCRIPTION
@@ -176,6 +234,7 @@ def read_one(path: Path, valve: "Valve", reading: "ReadingOptions") -> "Recorded
     """
     from valve_friction_ros.records.recordings import read_recordings  # noqa: PLC0415 - slow
 
-    recorded = read_recordings(path, valve, reading)
+    with reading_progress():
+        recorded = read_recordings(path, valve, reading)
     require_one(recorded, f"{path} holds several, and this command takes")
     return recorded[0]

@@ -1,9 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Sub-command `demo`: the packing of a simulated valve is tightened, and the monitor notices."""
 
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -12,27 +21,154 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
 
-from valve_friction_ros.commands.ctrl_c import sigterm_raises
-from valve_friction_ros.commands.demo.bench_client import BenchClient, BenchError
-from valve_friction_ros.commands.demo.bench_processes import (
+from valve_friction_ros.commands.console import OutputConsole
+from valve_friction_ros.commands.demo.bench import (
+    BenchClient,
+    BenchError,
     NodeProcess,
     free_domain,
     quick_discovery,
     running_nodes,
 )
-from valve_friction_ros.commands.demo.outcome import Outcome, identified, table_of
 from valve_friction_ros.commands.demo.plant import require_dashboard, show_plant
-from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.commands.output.formatting import OutputConsole
-from valve_friction_ros.figures import friction_figure, require_picture_file, save_picture
+from valve_friction_ros.commands.process import ExitCode, sigterm_raises
+from valve_friction_ros.figures import Case, friction_figure, require_picture_file, save_picture
 from valve_friction_ros.health import Level
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification import (
+    UNITS,
+    IdentificationSettings,
+    Parameter,
+    RefusalError,
+    Verdict,
+    identify,
+    parameter_cells,
+    parameter_mapping,
+)
 from valve_friction_ros.identification.preparation import compile_methods
-from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, LOW_FRICTION, SquareWave
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    HIGH_FRICTION,
+    LOW_FRICTION,
+    KarnoppParameters,
+    SquareWave,
+)
 from valve_friction_ros.streams import RecordBuffer
 
-__all__ = ["REFUSALS", "run"]
+WEIGHED_MASS = 1.6
+"""Mass that the identification is given, kg: noise hides it from a square wave."""
+
+TOLERANCES = {
+    "mass": 0.10,
+    "viscous_friction": 0.02,
+    "coulomb_friction": 0.01,
+    "static_friction": 0.1,
+    "spring_constant": 0.002,
+    "spring_preload": 0.002,
+}
+"""Relative errors that a published estimate may have, by parameter, with the noise of the demo.
+
+The mass is given. A published F_s is read from single samples.
+"""
+_INTERVALS = 3.0
+"""Half widths of its interval by which an identified value may be off."""
+_ANSWER_TIMEOUT = 120.0
+_NEWEST = 2.0
+"""Age, s, up to which a diagnosed estimate is the one just asked for."""
+
+
+class Outcome(NamedTuple):
+    """One identified state of the packing."""
+
+    label: str
+    truth: KarnoppParameters
+    published: Mapping[str, float]
+    found: Mapping[str, Parameter]
+    case: Case
+
+    def errors(self) -> dict[str, float]:
+        """Relative errors of the published estimate."""
+        return {name: self.published[name] / getattr(self.truth, name) - 1 for name in TOLERANCES}
+
+    def missed(self) -> list[str]:
+        """Parameters whose published error exceeds the tolerance, or whose interval is untrue."""
+        outside = {
+            name for name, error in self.errors().items() if not abs(error) <= TOLERANCES[name]
+        }
+        untrue = {
+            name
+            for name, one in self.found.items()
+            if one.verdict is Verdict.IDENTIFIED
+            and abs(one.value - getattr(self.truth, name)) > _INTERVALS * one.half_width
+        }
+        return [name for name in TOLERANCES if name in outside | untrue]
+
+
+def identified(client: BenchClient, label: str, truth: KarnoppParameters) -> Outcome:
+    """Identify the record on the running node and read the result from its topics.
+
+    The picture is of the same record, identified here.
+    """
+    recording = client.recording()
+    client.trigger("identify")
+    client.wait(
+        lambda: float(client.diagnostic_values.get("estimate_age [s]", "inf")) < _NEWEST,
+        _ANSWER_TIMEOUT,
+        "diagnostic of the estimate",
+    )
+    values = client.diagnostic_values
+    if "threshold [m/s]" not in values:
+        raise BenchError(f"no published estimate: {values['warnings']}")
+    published = {name: float(values[f"{name} published [{UNITS[name]}]"]) for name in TOLERANCES}
+    found = {name: _found(name, values) for name in TOLERANCES}
+    try:
+        drawn = identify(
+            recording, BENCH_VALVE, IdentificationSettings(fixed={"mass": WEIGHED_MASS})
+        )
+    except RefusalError as refusal:
+        raise BenchError(f"no picture: {refusal}") from None
+    return Outcome(label, truth, published, found, Case.of(label, drawn))
+
+
+def _found(name: str, values: Mapping[str, str]) -> Parameter:
+    """Read a parameter with its verdict from a diagnostic."""
+    half_width = float(values[f"{name} half width [{UNITS[name]}]"])
+    return Parameter(
+        name,
+        float(values[f"{name} [{UNITS[name]}]"]),
+        float("nan"),
+        half_width,
+        Verdict(values[f"{name} verdict"]),
+        values.get(f"{name} reason", ""),
+    )
+
+
+def table_of(outcome: Outcome) -> Table:
+    """Put true, published and identified values side by side; what is off is red."""
+    table = Table(title=outcome.label, title_justify="left", box=None, header_style="bold")
+    table.add_column("parameter", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for heading in ("true", "published", "error", "identified", "± 95 %"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for name, error in outcome.errors().items():
+        _, value, width, unit, verdict, _ = parameter_cells(
+            name, parameter_mapping(outcome.found[name])
+        )
+        table.add_row(
+            name,
+            unit,
+            f"{getattr(outcome.truth, name):.6g}",
+            f"{outcome.published[name]:.6g}",
+            f"{100 * error:+.3f} %",
+            value,
+            width,
+            verdict,
+            style="red" if name in outcome.missed() else None,
+        )
+    return table
+
 
 REFUSALS = (BenchError, RefusalError)
 
@@ -68,8 +204,10 @@ def _record(client: BenchClient, console: Console, label: str) -> None:
 
 def _nodes() -> list[NodeProcess]:
     monitored = {
+        "method": "bench",
+        **vars(BENCH_VALVE),
         "position_bias": _POSITION_BIAS,
-        "fixed.mass": 1.6,  # weighed: noise hides it from a square wave
+        "fixed.mass": WEIGHED_MASS,
         "valve_tag": _NAMESPACE.upper().replace("_", "-"),
         "history_file": "''",  # empty, as ROS arguments write it: a demo is no plant's history
     }

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Three simulated valves on the dashboard: one healthy, one tightening, one leaking."""
 
 import contextlib
@@ -11,13 +20,10 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from valve_friction_ros.commands.demo.bench_client import BenchError
-from valve_friction_ros.commands.demo.bench_processes import NodeProcess, running_nodes
-from valve_friction_ros.commands.output.errors import ExitCode
-from valve_friction_ros.model import SquareWave
+from valve_friction_ros.commands.demo.bench import BenchError, NodeProcess, running_nodes
+from valve_friction_ros.commands.process import ExitCode
+from valve_friction_ros.model import BENCH_VALVE, SquareWave
 from valve_friction_ros.nodes.service_call import Caller, caller
-
-__all__ = ["VALVES", "PlantValve", "plant_nodes", "require_dashboard", "show_plant"]
 
 _PORT = 8080
 _RATE = 200.0
@@ -63,7 +69,7 @@ VALVES = (
 def require_dashboard() -> None:
     """Raise BenchError where NiceGUI is not installed."""
     if importlib.util.find_spec("nicegui") is None:
-        from valve_friction_ros.dashboard.options import INSTALL  # noqa: PLC0415 - rarely needed
+        from valve_friction_ros.dashboard.context import INSTALL  # noqa: PLC0415 - rarely needed
 
         raise BenchError(
             f"the dashboard needs NiceGUI: run `{INSTALL}`, or `make demo DEMO_ARGS=--dashboard`"
@@ -76,6 +82,7 @@ def plant_nodes(valve: PlantValve, number: int, history: Path) -> list[NodeProce
         NodeProcess(
             "identifier",
             {
+                **vars(BENCH_VALVE),
                 "valve_tag": valve.name.upper().replace("_", "-"),
                 "history_file": history,
                 "window": _RECORD,

@@ -1,32 +1,49 @@
-"""The page *Plant*: all valves, the worst first."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The pages *Plant*, the worst valve first, and *Compare*, two identifications side by side."""
 
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
+from urllib.parse import urlencode
 
 from nicegui import run, ui
 
-from valve_friction_ros.dashboard.board import Board
-from valve_friction_ros.dashboard.heard.plant import Heard
-from valve_friction_ros.dashboard.pages.plant_table import PlantTable
-from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
-from valve_friction_ros.dashboard.plant_rows import SIGNAL_WORDS, STATE_WORDS, RowFeed, summary
-from valve_friction_ros.dashboard.selection import (
+from valve_friction_ros.dashboard.context import DashboardContext
+from valve_friction_ros.dashboard.live_state import Heard
+from valve_friction_ros.dashboard.pages.theme import Frame, PlantTable, chip, element, frame, text
+from valve_friction_ros.dashboard.plant_rows import (
+    SIGNAL_WORDS,
     SIGNALS,
+    STATE_WORDS,
     STATES,
+    ComparedIdentification,
+    RowFeed,
     Selection,
+    compared,
     levels_in,
+    moment,
+    quantity_texts,
     selected,
+    side_of_entry,
+    side_of_view,
+    summary,
 )
-from valve_friction_ros.dashboard.times import moment
-
-__all__ = ["plant_page"]
+from valve_friction_ros.history import HistoryError, ValveHistory
 
 _PERIOD = 1.0
 _FIRST_PERIOD, _FIRST_TIME = 0.25, 10.0
 """Period, s, in which a page looks at first, and for how long: after a restart of the dashboard the
 valves are heard then."""
+_KEPT_STATES = tuple(one for one in STATES if one not in ("silent", "unheard"))
 _COLUMNS = [
     {"key": key, "title": title, "unit": unit, "sort": sort, "css": f"vf-c-{key}"}
     for key, title, unit, sort in (
@@ -44,11 +61,17 @@ _COLUMNS = [
 ]
 
 
+_NONE_YET = {
+    True: "No valve has been heard yet: start an identifier in this ROS domain.",
+    False: "The history holds no valve yet: `identify-folder --history` files results in it.",
+}
+
+
 class _PlantPage:
     """What one browser looks at: its selection, and what it has been sent."""
 
-    def __init__(self, board: Board, selection: Selection) -> None:
-        self._board = board
+    def __init__(self, context: DashboardContext, selection: Selection) -> None:
+        self._context = context
         self._selection = selection
         self._counts: dict[str, ui.label] = {}
         self._views: dict[ui.element, bool] = {}
@@ -60,6 +83,7 @@ class _PlantPage:
         self._page = page
         self._feed = RowFeed(lambda node: page.link("/valve", node=node))
         with element("section", "vf-head", aria_label="Filters"):
+            text("h1", "Plant", "vf-unseen")
             self._title = ui.label("").classes("vf-title")
             self._title.props["role"] = "status"
             with element("div", "vf-search"):
@@ -70,18 +94,20 @@ class _PlantPage:
                 ).props("dense outlined clearable debounce=250 type=search")
                 search.props["aria-label"] = "Search"
             with element("div", "vf-filters", role="group", aria_label="State"):
-                for state in STATES:
+                for state in STATES if self._context.is_live else _KEPT_STATES:
                     self._chip("states", state, STATE_WORDS[state], f"vf-{state}")
             with element("div", "vf-filters", role="group", aria_label="NE 107"):
                 for letter in SIGNALS:
                     self._chip("signals", letter, letter, "vf-letter", SIGNAL_WORDS[letter])
             with element("div", "vf-filters vf-views", role="group", aria_label="View"):
-                for text, tiled in (("Table", False), ("Tiles", True)):
-                    self._view(text, tiled)
+                for words, tiled in (("Table", False), ("Tiles", True)):
+                    self._view(words, tiled)
         heard = self._heard()
         shown = selected(heard, self._selection)
-        first = self._feed.news(shown, self._board.kept.spark, time.time())
-        self._table = PlantTable({**first, **self._arrangement()}, _COLUMNS)
+        first = self._feed.news(shown, self._context.history.spark, time.time())
+        live = self._context.is_live
+        columns = [one for one in _COLUMNS if live or one["key"] != "heard"]
+        self._table = PlantTable({**first, **self._arrangement(), "live": live}, columns)
         self._table.on("sort", lambda event: self._sort(event.args))
         self._note = ui.label("").classes("vf-note")
         self._count(heard)
@@ -89,19 +115,21 @@ class _PlantPage:
         self._drawn = time.monotonic()
 
     def _heard(self) -> list[Heard]:
-        self._board.plant.expect(self._board.kept.valves)
-        return self._board.plant.valves(time.monotonic())
+        self._context.plant.expect(self._context.history.valves)
+        return self._context.plant.valves(time.monotonic())
 
     async def _tick(self) -> None:
         if time.monotonic() > self._drawn + _FIRST_TIME:
             self._timer.interval = _PERIOD
-        await run.io_bound(self._board.kept.refresh)
+        await run.io_bound(self._context.history.refresh)
         self._show({})
 
     def _show(self, more: dict[str, Any]) -> None:
         heard = self._heard()
         shown = selected(heard, self._selection)
-        self._table.send({**self._feed.news(shown, self._board.kept.spark, time.time()), **more})
+        self._table.send(
+            {**self._feed.news(shown, self._context.history.spark, time.time()), **more}
+        )
         self._count(heard)
 
     def _count(self, heard: list[Heard]) -> None:
@@ -110,7 +138,7 @@ class _PlantPage:
             label.set_text(str(counts[state]))
         self._title.set_text(summary(counts))
         self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
-        self._note.set_text(self._board.kept.problem or "")
+        self._note.set_text(self._context.history.problem or "")
 
     def _arrangement(self) -> dict[str, Any]:
         one = self._selection
@@ -120,7 +148,7 @@ class _PlantPage:
             "tiled": one.is_tiled,
             "empty": "No valve meets the filters."
             if one.search or one.states or one.signals
-            else "No valve has been heard yet: start an identifier in this ROS domain.",
+            else _NONE_YET[self._context.is_live],
         }
 
     def _change(self, selection: Selection) -> None:
@@ -167,8 +195,162 @@ class _PlantPage:
         return made
 
 
-def plant_page(board: Board, query: dict[str, str]) -> None:
+def plant_page(context: DashboardContext, query: dict[str, str]) -> None:
     """Draw the page."""
-    page = _PlantPage(board, Selection.from_query(query))
-    with frame(board, query, "Plant · valve friction", page.address) as inside:
+    page = _PlantPage(context, Selection.from_query(query))
+    with frame(context, query, "Plant · valve friction", page.address) as inside:
         page.draw(inside)
+
+
+_SIDES = ("a", "b")
+_NOW = "now"
+_MOST_CHOICES = 400
+
+
+class _ComparePage:
+    """What one browser compares."""
+
+    def __init__(self, context: DashboardContext, query: dict[str, str], page: Frame) -> None:
+        self._context, self._page = context, page
+        self._nodes = {side: query.get(side, "") for side in _SIDES}
+        self._stamps = {"a": query.get("at", _NOW), "b": query.get("bt", _NOW)}
+
+    def address(self, common: dict[str, str]) -> str:
+        """Return the address of what is compared."""
+        parts = {**self._nodes, "at": self._stamps["a"], "bt": self._stamps["b"]}
+        kept = {key: value for key, value in parts.items() if value and value != _NOW}
+        query = urlencode({**kept, **common})
+        return f"/compare?{query}" if query else "/compare"
+
+    async def draw(self) -> None:
+        """Draw both choices and the table."""
+        self._context.plant.expect(self._context.history.valves)
+        valves = sorted(
+            (one.view.tag, one.view.node) for one in self._context.plant.valves(time.monotonic())
+        )
+        with element("article", "vf-compare"):
+            text("h1", "Compare")
+            with element("div", "vf-compare-heads"):
+                for side in _SIDES:
+                    await self._draw_choice(side, valves)
+            with element("div", "vf-card"), element("div", "vf-card-body") as self._body:
+                pass
+        await self._show()
+        ui.timer(1.0, self._tick)
+
+    async def _tick(self) -> None:
+        self._page.clock.set_text(moment(time.time_ns(), self._page.zone))
+        if self._heard_now() != self._drawn:
+            await self._show()
+
+    def _heard_now(self) -> tuple[tuple[int, bool] | None, ...]:
+        """Return what tells the views of now apart; None for a side that the history holds."""
+        found = []
+        for side in _SIDES:
+            heard = None
+            if self._stamps[side] == _NOW:
+                heard = self._context.plant.valve(self._nodes[side], time.monotonic())
+            found.append(None if heard is None else (heard.revision, heard.is_silent))
+        return tuple(found)
+
+    async def _draw_choice(self, side: str, valves: list[tuple[str, str]]) -> None:
+        names = {node: f"{tag}   {node.rpartition('/')[0]}" for tag, node in valves}
+        chosen = self._nodes[side] if self._nodes[side] in names else None
+        kept = await self._history(side)
+        times = {_NOW: "as it is now" if self._context.is_live else "the latest"}
+        if kept is not None:
+            for entry in reversed(kept.entries[-_MOST_CHOICES:]):
+                if not entry.refusal:
+                    times[str(entry.time)] = moment(entry.time, self._page.zone)
+        with element("div", "vf-card vf-choice-card"), element("div", "vf-card-body"):
+            text("h2", f"Side {side.upper()}")
+            valve = ui.select(names, value=chosen, label="Valve", with_input=True)
+            valve.on_value_change(lambda event: self._choose(side, str(event.value or ""), _NOW))
+            valve.classes("vf-select").props["aria-label"] = f"Valve of side {side.upper()}"
+            stamp = self._stamps[side] if self._stamps[side] in times else _NOW
+            when = ui.select(times, value=stamp, label="Identification")
+            when.on_value_change(
+                lambda event: self._choose(side, self._nodes[side], str(event.value))
+            )
+            when.classes("vf-select").props["aria-label"] = f"Identification of side {side.upper()}"
+
+    def _choose(self, side: str, node: str, stamp: str) -> None:
+        self._nodes[side], self._stamps[side] = node, stamp
+        ui.navigate.to(self.address(self._page.common))
+
+    async def _history(self, side: str) -> ValveHistory | None:
+        try:
+            return await run.io_bound(self._context.history.valve, self._nodes[side])
+        except HistoryError:
+            return None
+
+    async def _side(self, side: str) -> ComparedIdentification | None:
+        node, stamp = self._nodes[side], self._stamps[side]
+        heard = self._context.plant.valve(node, time.monotonic())
+        if stamp == _NOW:
+            return None if heard is None else side_of_view(heard.view)
+        kept = await self._history(side)
+        found = (one for one in (kept.entries if kept else ()) if str(one.time) == stamp)
+        entry = next(found, None)
+        return None if entry is None else side_of_entry(entry)
+
+    async def _show(self) -> None:
+        self._drawn = self._heard_now()
+        sides = [await self._side(side) for side in _SIDES]
+        self._body.clear()
+        with self._body:
+            if sides[0] is None or sides[1] is None:
+                text("p", "Choose a valve on both sides.", "vf-none")
+                return
+            self._draw_table(sides[0], sides[1])
+
+    def _draw_table(self, one: ComparedIdentification, other: ComparedIdentification) -> None:
+        with element("table", "vf-list vf-compared"):
+            with element("thead"), element("tr"):
+                for title, css in (("number", ""), ("A", "vf-n"), ("B", "vf-n"),
+                                   ("B ÷ A", "vf-n"), ("verdict", "")):  # fmt: skip
+                    text("th", title, css).props["scope"] = "col"
+            with element("tbody"):
+                heard = tuple(
+                    "–" if now is None else ("silent" if now[1] else "now") for now in self._drawn
+                )
+                for name, words in (
+                    *((("heard", heard),) if self._context.is_live else ()),
+                    ("valve", (one.tag, other.tag)),
+                    ("identified", tuple(moment(s.time, self._page.zone) for s in (one, other))),
+                    ("method", (one.method, other.method)),
+                ):
+                    with element("tr"):
+                        for each in (name, *words, "", ""):
+                            text("td", each, "" if each == name else "vf-n")
+                for row in compared(one, other):
+                    with element("tr"):
+                        text("td", row.name.replace("_", " "))
+                        for quantity in (row.one, row.other):
+                            value, width = quantity_texts(quantity)
+                            unit = quantity.unit if quantity.if_determined.is_known else ""
+                            text("td", f"{value} {width} {unit}".strip(), "vf-n")
+                        text("td", row.ratio_words, "vf-n")
+                        with element("td"):
+                            if row.verdict:
+                                state = "warn" if row.verdict == "differs" else "unknown"
+                                chip(state, row.verdict)
+                with element("tr"):
+                    text("td", "diagnosis")
+                    for side in (one, other):
+                        text("td", side.sentence, "vf-words vf-said")
+                    text("td", "")
+                    text("td", "")
+
+
+async def compare_page(context: DashboardContext, query: dict[str, str]) -> None:
+    """Draw the page; the address names two valves and the times of their identifications."""
+    made: list[_ComparePage] = []
+    with frame(
+        context,
+        query,
+        "Compare · valve friction",
+        lambda common: made[0].address(common) if made else "/compare",
+    ) as inside:
+        made.append(_ComparePage(context, query, inside))
+        await made[0].draw()

@@ -52,7 +52,7 @@ export default {
               <path class="vf-one" :d="row.base"/><path :d="row.spark"/></svg><small>{{ row.expected }}</small></td>
           <td class="vf-c-drift vf-n" data-label="drift, N a month"><b>{{ row.drift }}</b></td>
           <td class="vf-c-age vf-n" data-label="identified">{{ since(row) }}</td>
-          <td class="vf-c-heard vf-n" data-label="heard">{{ heard(row) }}</td>
+          <td v-if="live" class="vf-c-heard vf-n" data-label="heard">{{ heard(row) }}</td>
         </tr>
       </tbody>
     </table>
@@ -74,7 +74,7 @@ export default {
   props: { initial: Object, columns: Array },
   emits: ["sort"],
   data: () => ({ rows: new Map(), order: [], sort: "worst", reversed: false, tiled: false,
-                 empty: "", clock: 0, at: performance.now(), tick: performance.now() }),
+                 empty: "", live: true, clock: 0, at: performance.now(), tick: performance.now() }),
   created() { this.update(this.initial); },
   mounted() { this.timer = setInterval(() => { this.tick = performance.now(); }, 1000); },
   unmounted() { clearInterval(this.timer); },
@@ -89,7 +89,7 @@ export default {
       if (news.now) { this.clock = news.now; this.at = this.tick = performance.now(); }
       for (const row of news.rows ?? []) this.rows.set(row.i, Object.freeze(row));
       if (news.order) this.order = news.order;
-      for (const key of ["sort", "reversed", "tiled", "empty"]) {
+      for (const key of ["sort", "reversed", "tiled", "empty", "live"]) {
         if (news[key] !== undefined) this[key] = news[key];
       }
     },

@@ -1,7 +1,17 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The server of the pages."""
 
 import logging
 import socket
+import time
 from collections.abc import Awaitable, Callable
 
 from fastapi import Request, Response
@@ -10,18 +20,17 @@ from fastapi.responses import FileResponse
 from nicegui import app, run, ui
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from valve_friction_ros.dashboard.access import Access
-from valve_friction_ros.dashboard.access.guard import Guard, guard, server_options
-from valve_friction_ros.dashboard.board import Board
-from valve_friction_ros.dashboard.pages.compare_page import compare_page
-from valve_friction_ros.dashboard.pages.plant_page import plant_page
+from valve_friction_ros.dashboard.accounts import Access
+from valve_friction_ros.dashboard.alarm_list import AlarmSelection
+from valve_friction_ros.dashboard.context import DashboardContext, ValveFiles
+from valve_friction_ros.dashboard.gate import Guard, guard, server_options
+from valve_friction_ros.dashboard.pages.alarm_page import alarm_page
+from valve_friction_ros.dashboard.pages.plant_page import compare_page, plant_page
 from valve_friction_ros.dashboard.pages.theme import load_style
 from valve_friction_ros.dashboard.pages.valve_page import valve_page
-from valve_friction_ros.dashboard.valve_files import ValveFiles
+from valve_friction_ros.history import HistoryError, alarms_as_csv
 
-__all__ = ["guarded", "require_free", "serve"]
-
-_Draw = Callable[[Board, dict[str, str]], Awaitable[None] | None]
+_Draw = Callable[[DashboardContext, dict[str, str]], Awaitable[None] | None]
 
 _FILES = "/files/"
 """Where the paths of reports and bags begin."""
@@ -55,27 +64,57 @@ def guarded(access: Access, log: Callable[[str], None]) -> Guard:
     return guard(app, access, log)
 
 
-def serve(board: Board, started: Callable[[], None], log: Callable[[str], None]) -> None:
+class _Resting:
+    """Answers 503 to every request while the node of the dashboard is inactive."""
+
+    def __init__(self, application: ASGIApp, is_active: Callable[[], bool]) -> None:
+        self._application, self._is_active = application, is_active
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] == "lifespan" or self._is_active():
+            await self._application(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1013})
+        else:
+            words = "The dashboard is inactive: `ros2 lifecycle set` its node to active."
+            await Response(words, 503, media_type="text/plain")(scope, receive, send)
+
+
+def serve(
+    context: DashboardContext,
+    started: Callable[[], None],
+    log: Callable[[str], None],
+    is_active: Callable[[], bool],
+) -> None:
     """Serve the pages until Ctrl-C or SIGTERM; call `started` once they can be opened.
 
-    `log` takes the lines on connections that were ended.
+    `log` takes the lines on connections that were ended. Pages are refused while not `is_active`.
     """
+    app.add_middleware(_Resting, is_active=is_active)
     load_style()
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True  # it has no name for readers
     logging.getLogger("uvicorn.error").addFilter(_Gone())
-    pages: dict[str, _Draw] = {"/": plant_page, "/valve": valve_page, "/compare": compare_page}
+    pages: dict[str, _Draw] = {
+        "/": plant_page,
+        "/alarms": alarm_page,
+        "/valve": valve_page,
+        "/compare": compare_page,
+    }
     for path, draw in pages.items():
-        _add_page(board, path, draw)
+        _add_page(context, path, draw)
 
-    _add_files(ValveFiles.of(board.options))
+    _add_files(ValveFiles.of(context.options))
+    _add_export(context)
 
     async def begin() -> None:
-        await run.io_bound(board.kept.refresh)
+        await run.io_bound(context.history.refresh)
         started()
 
     app.on_startup(begin)
     ui.run(
-        **server_options(board.options.access, log),
-        port=board.options.port,
+        **server_options(context.options.access, log),
+        port=context.options.port,
         title="Valve friction",
         dark=None,
         language="en-US",
@@ -105,12 +144,28 @@ class LightlyPacked(GZipMiddleware):
         await (self.app if is_file else super().__call__)(scope, receive, send)
 
 
-def _add_page(board: Board, path: str, draw: _Draw) -> None:
+def _add_page(context: DashboardContext, path: str, draw: _Draw) -> None:
     @ui.page(path)
     async def page(request: Request) -> None:
-        drawing = draw(board, dict(request.query_params))
+        drawing = draw(context, dict(request.query_params))
         if drawing is not None:
             await drawing
+
+
+def _add_export(context: DashboardContext) -> None:
+    """Offer the alarms that an address selects as CSV."""
+
+    def exported(request: Request) -> Response:
+        selection = AlarmSelection.from_query(dict(request.query_params))
+        chosen = selection.chosen(time.time_ns())
+        try:
+            events = context.history.alarms(chosen, selection.is_journal)
+        except HistoryError as error:
+            return Response(str(error), 503, media_type="text/plain")
+        name = {"Content-Disposition": 'attachment; filename="alarms.csv"'}
+        return Response(alarms_as_csv(events), media_type="text/csv", headers=name)
+
+    app.add_api_route("/alarms.csv", exported, methods=["GET"])
 
 
 _SANDBOX = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"

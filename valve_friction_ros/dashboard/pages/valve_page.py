@@ -1,36 +1,376 @@
-"""The page *Valve*: all that is known of one."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The page *Valve*: all that is known of one, and what is asked of its identifier."""
 
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 from urllib.parse import urlencode
 
 from nicegui import run, ui
 
-from valve_friction_ros.dashboard.board import Board
-from valve_friction_ros.dashboard.heard.plant import Heard
-from valve_friction_ros.dashboard.heard.valve_view import ValveView
-from valve_friction_ros.dashboard.pages.parts import EntryList, card, text
-from valve_friction_ros.dashboard.pages.theme import Frame, element, frame
-from valve_friction_ros.dashboard.pages.valve_actions import ValveActions
-from valve_friction_ros.dashboard.pages.valve_head import ValveHead
-from valve_friction_ros.dashboard.pages.valve_history import (
+from valve_friction_ros.dashboard.context import (
+    Answer,
+    DashboardContext,
+    OfferedFile,
+    Operator,
+    ServiceRequest,
+    ValveFiles,
+)
+from valve_friction_ros.dashboard.live_state import Heard, Quantity, ValveView
+from valve_friction_ros.dashboard.pages.alarm_page import AlarmStates
+from valve_friction_ros.dashboard.pages.theme import (
+    EntryList,
+    Frame,
+    card,
+    chip,
+    element,
+    frame,
+    retitle,
+    text,
+)
+from valve_friction_ros.dashboard.pages.valve_cards import (
+    ValveSignals,
     baseline_words,
     draw_alarms,
     draw_baselines,
     draw_files,
     draw_identifications,
+    draw_parameters,
+    draw_trend,
 )
-from valve_friction_ros.dashboard.pages.valve_parameters import draw_parameters
-from valve_friction_ros.dashboard.pages.valve_signals import ValveSignals
-from valve_friction_ros.dashboard.pages.valve_trend import draw_trend
-from valve_friction_ros.dashboard.selection import state_of
-from valve_friction_ros.dashboard.times import moment
-from valve_friction_ros.dashboard.valve_files import OfferedFile, ValveFiles
-from valve_friction_ros.history import HistoryError, ValveHistory
+from valve_friction_ros.dashboard.plant_rows import (
+    Selection,
+    ago,
+    drift_number,
+    interval_text,
+    moment,
+    quantity_texts,
+    ratio_text,
+    state_of,
+    state_words,
+)
+from valve_friction_ros.health import AlarmEvent
+from valve_friction_ros.history import AlarmFilter, HistoryError, ValveHistory
 from valve_friction_ros.outside_text import printable
+from valve_friction_ros.wording import lack_remedies
 
-__all__ = ["valve_page"]
 
+class ValveHead:
+    """Name, state and sentence of a valve, and its most important numbers.
+
+    Parameters
+    ----------
+    page : Frame
+        The frame of the page.
+    is_live : bool
+        Whether valves are heard.
+    """
+
+    def __init__(self, page: Frame, is_live: bool = True) -> None:
+        self._page, self._is_live = page, is_live
+        self._values: dict[str, ui.label] = {}
+
+    def draw(self) -> None:
+        """Draw it, still without its values."""
+        with element("div", "vf-valve-name"):
+            with element("a", "vf-back", href=self._page.link("/", **_selection_before())):
+                ui.label("‹ Plant")
+            self._title = text("h1", "")
+            self._chip = element("span")
+            self._place = ui.label("").classes("vf-place")
+        self._advice = text("p", "", "vf-advice")
+        self._sentence = text("p", "", "vf-sentence")
+        self._facts = element("div", "vf-facts")
+
+    def show(self, view: ValveView, heard: Heard | None, state: str) -> None:
+        """Show the state of a valve and its sentence."""
+        retitle(self._title, view.tag)
+        ui.page_title(f"{view.tag} · valve friction")
+        self._place.set_text(view.node)
+        letter = "" if state in ("silent", "unheard") else view.signal.value
+        self._chip.clear()
+        with self._chip:
+            chip(state, "not heard" if heard is None else state_words(heard), letter)
+        retitle(self._advice, view.advice)
+        self._advice.set_visibility(bool(view.advice))
+        retitle(self._sentence, view.sentence or "No message of this valve has been heard.")
+
+    def show_facts(self, view: ValveView, heard: Heard | None) -> None:
+        """Show the numbers, and how old they are now."""
+        facts = _facts(view, heard, self._page, self._is_live)
+        if not self._values:
+            with self._facts:
+                self._values = {name: _fact(name) for name in facts}
+        for name, words in facts.items():
+            self._values[name].set_text(words)
+
+
+def _facts(view: ValveView, heard: Heard | None, page: Frame, is_live: bool) -> dict[str, str]:
+    silent = None if heard is None else heard.silent_for
+    ratio = "–"
+    if view.ratio is not None:
+        between = interval_text(view.ratio, " to ")
+        ratio = f"× {ratio_text(view.ratio.value)}" + (f"  ({between})" if between else "")
+    made = view.identified
+    age = "" if made is None else f"  ({ago(time.time() - made / 1e9)} ago)"
+    facts = {
+        "friction ÷ baseline": ratio,
+        "dead band": _with_unit(view.dead_band, "% of travel"),
+        "drift": _drift_words(view),
+        "identified": moment(made, page.zone) + age,
+    }
+    if is_live:
+        facts["heard"] = "never" if silent is None else f"{ago(silent)} ago"
+    return facts
+
+
+def _fact(name: str) -> ui.label:
+    with element("div", "vf-fact"):
+        ui.label(name).classes("vf-fact-name")
+        return ui.label("").classes("vf-fact-value")
+
+
+def _with_unit(one: Quantity, unit: str) -> str:
+    return f"{' '.join(quantity_texts(one)).strip()} {unit}" if one.is_known else "–"
+
+
+def _drift_words(view: ValveView) -> str:
+    if view.drift is None:
+        return "none that is significant" if view.friction.is_known else "–"
+    words = f"{drift_number(view.drift)} N a month"
+    expected = view.drift.expected
+    return f"{words}; limit {expected.date}" if expected else words
+
+
+def _selection_before() -> dict[str, str]:
+    """Return search and filters of the plant, where the visitor has come from its page."""
+    referrer = ui.context.client.request.headers.get("referer", "")
+    return Selection.from_address(referrer).to_query()
+
+
+_ACTIONS = {
+    "identify": ("Identify", "identifying"),
+    "save": ("Save recording", "saving"),
+    "report": ("Write report", "writing the report"),
+    "set_baseline": ("Set baseline …", "setting the baseline"),
+    "restore_baseline": ("Restore baseline …", "restoring the baseline"),
+}
+
+
+def _size(one: Quantity) -> str:
+    return " ".join(filter(None, (one.name.replace("_", " "), *quantity_texts(one), one.unit)))
+
+
+def _frictions(found: tuple[Quantity, ...]) -> str:
+    return "; ".join(map(_size, found)) or "none"
+
+
+class Question(NamedTuple):
+    """What is asked before a baseline changes: of which valve and estimate, and from what to what.
+
+    `identified` is the time of the estimate that a baseline is set from, ns since 1970; `alarm` the
+    level of the valve where that is WARN or ERROR.
+    """
+
+    tag: str
+    identified: int | None
+    old: str
+    new: str
+    alarm: str = ""
+
+
+def question_of(view: ValveView, new: str | None) -> Question:
+    """Return what to ask of a valve; `new` None: the baseline is set from the estimate."""
+    return Question(
+        view.tag,
+        view.identified if new is None else None,
+        _frictions(view.baseline),
+        _frictions(_estimate(view)) if new is None else new,
+        view.level.name if new is None and view.level is not None and view.level > 0 else "",
+    )
+
+
+def _estimate(view: ValveView) -> tuple[Quantity, ...]:
+    found = (
+        view.parameter(name).if_determined for name in ("coulomb_friction", "sliding_friction")
+    )
+    return tuple(one for one in found if one.is_known)
+
+
+class ValveActions:
+    """Buttons that call the services of one identifier, one call at a time.
+
+    Parameters
+    ----------
+    operator : Operator
+        Calls the services.
+    node : str
+        The identifier.
+    now : callable
+        Returns what is known of the valve.
+    replaced : callable
+        Says in words which baseline a restoration would bring back.
+    done : callable
+        Called with the name of a service that has answered.
+    """
+
+    def __init__(
+        self,
+        operator: Operator,
+        node: str,
+        now: Callable[[], ValveView],
+        replaced: Callable[[], str],
+        done: Callable[[str], None],
+    ) -> None:
+        self._operator, self._node = operator, node
+        self._now, self._replaced, self._done = now, replaced, done
+        self._busy: tuple[str, float] | None = None
+        self._buttons: list[ui.button] = []
+
+    def draw(self) -> None:
+        """Draw the buttons and the line of the answer."""
+        with element("div", "vf-actions", role="group", aria_label="Actions"):
+            for service, (title, _) in _ACTIONS.items():
+                self._buttons.append(self._button(service, title))
+        self._says = ui.label("").classes("vf-answer")
+        self._says.props["role"] = "status"
+        self._says.set_visibility(False)
+
+    def _button(self, service: str, title: str) -> ui.button:
+        async def act() -> None:
+            asked: str | None = service
+            if service == "set_baseline" and self._now().lacks:
+                asked = await self._told_what_is_missing()
+            elif service in ("set_baseline", "restore_baseline"):
+                asked = service if await self._agreed(service) else None
+            if asked is not None:
+                await self._call(asked)
+
+        made = ui.button(title, on_click=act, color=None).props("no-caps unelevated dense")
+        return made.classes("vf-act" + (" vf-act-first" if service == "identify" else ""))
+
+    async def _told_what_is_missing(self) -> str | None:
+        """Say what a baseline lacks, and what may be done; return what shall be done now."""
+        view = self._now()
+        with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
+            dialog.props["aria-label"] = "Set baseline"
+            ui.label(f"No baseline of {view.tag} can be set now").classes("vf-dialog-title")
+            asked = [(one.of, one.lack.name) for one in view.lacks]
+            for title, some in (
+                ("What is missing", [one.words for one in view.lacks]),
+                ("What may be done", lack_remedies(asked)),
+            ):
+                text("h2", title)
+                with element("ul", "vf-points"):
+                    for words in some:
+                        text("li", words)
+            with element("div", "vf-actions"):
+                ui.button("Close", on_click=lambda: dialog.submit(None), color=None).props(
+                    "flat no-caps autofocus"
+                )
+                ui.button("Identify", on_click=lambda: dialog.submit("identify"), color=None).props(
+                    "unelevated no-caps"
+                ).classes("vf-act-first")
+        chosen = await dialog
+        if not dialog.is_deleted:  # the visitor may have gone meanwhile
+            dialog.delete()
+        return "identify" if chosen else None
+
+    async def _agreed(self, service: str) -> bool:
+        """Show the old and the new baseline, and ask; again where they have changed meanwhile."""
+        shown, agreed = None, True
+        while agreed and shown != (question := self._question(service)):
+            agreed = await self._asked(service, question, is_again=shown is not None)
+            shown = question
+        return agreed
+
+    def _question(self, service: str) -> Question:
+        new = None if service == "set_baseline" else self._replaced()
+        return question_of(self._now(), new)
+
+    async def _asked(self, service: str, question: Question, is_again: bool) -> bool:
+        is_set = service == "set_baseline"
+        with ui.dialog() as dialog, ui.card().classes("vf-dialog"):
+            dialog.props["aria-label"] = _ACTIONS[service][0]
+            ui.label(f"{'Set' if is_set else 'Restore'} the baseline of {question.tag}?").classes(
+                "vf-dialog-title"
+            )
+            if is_again:
+                ui.label("This has changed while you were asked:").classes("vf-reason")
+            for name, words in (
+                ("in force now", question.old),
+                ("from then on", question.new),
+            ):
+                with element("div", "vf-pair"):
+                    ui.label(name)
+                    ui.label(words)
+            ui.label(
+                "All later diagnoses compare with it: set it on a healthy valve only."
+                if is_set
+                else "This undoes the last setting of the baseline."
+            ).classes("vf-none")
+            if question.alarm:
+                ui.label(
+                    f"The valve is in {question.alarm}: make sure that it is healthy. "
+                    "Another baseline may hide what is wrong."
+                ).classes("vf-answer vf-answer-error")
+            with element("div", "vf-actions"):
+                ui.button("Cancel", on_click=lambda: dialog.submit(False), color=None).props(
+                    "flat no-caps autofocus"
+                )
+                ui.button(
+                    ("Set anyway" if question.alarm else "Set baseline")
+                    if is_set
+                    else "Restore baseline",
+                    on_click=lambda: dialog.submit(True),
+                    color=None,
+                ).props("unelevated no-caps").classes("vf-act-first")
+        agreed = bool(await dialog)
+        if not dialog.is_deleted:  # the visitor may have gone meanwhile
+            dialog.delete()
+        return agreed
+
+    async def _call(self, service: str) -> None:
+        if self._busy is not None:
+            return
+        self._busy = (service, time.monotonic())
+        for button in self._buttons:
+            button.disable()
+        self._say("busy", f"{_ACTIONS[service][1]} …")
+        try:
+            answer = await self._operator.call(self._node, ServiceRequest(service))
+        except Exception as error:  # noqa: BLE001 - a bug shall not leave the buttons dead
+            answer = Answer(False, f"the call has failed: {error}")
+        self._busy = None
+        for button in self._buttons:
+            button.enable()
+        title = _ACTIONS[service][0].rstrip(" …")
+        words = printable(answer.message, 2000) or "done"
+        self._say("ok" if answer.success else "error", f"{title}: {words}")
+        self._done(service)
+
+    def _say(self, state: str, words: str) -> None:
+        self._says.classes(replace=f"vf-answer vf-answer-{state}")
+        self._says.set_visibility(True)
+        self._says.set_text(words)
+
+    def tick(self) -> None:
+        """Show for how long a call has been under way."""
+        if self._busy is not None:
+            service, begin = self._busy
+            self._says.set_text(f"{_ACTIONS[service][1]} … {time.monotonic() - begin:.0f} s")
+
+
+_MOST_EVENTS = 500
+"""Events of alarms that the trend shows, the newest."""
 _PERIOD = 0.2
 _SLOWER = 5
 """Beats of the timer between two looks at all but the signals."""
@@ -43,24 +383,28 @@ _LISTS = (
     ("counters", "Node and samples", "Nothing has been heard."),
 )
 """Group of values, title of its card, and what stands there without any."""
+_KEPT = ("fit",)
+"""Groups that a history tells."""
+_OF_EXPERTS = ("fit", "counters")
+"""Groups that are folded away."""
 
 
 class _ValvePage:
     """What one browser looks at: one valve."""
 
-    def __init__(self, board: Board, node: str, page: Frame) -> None:
-        self._board, self._node, self._page = board, node, page
+    def __init__(self, context: DashboardContext, node: str, page: Frame) -> None:
+        self._context, self._node, self._page = context, node, page
         self._shown: ValveView | None = None
         self._state = ""
         self._revision = -1
         self._beat = 0
         self._history: ValveHistory | None = None
-        self._head = ValveHead(page)
-        self._signals = ValveSignals(board.signals.watch(node))
-        ui.context.client.on_delete(lambda: board.signals.unwatch(node))
+        self._head = ValveHead(page, context.is_live)
+        self._signals = ValveSignals(context.signals.watch(node))
+        ui.context.client.on_delete(lambda: context.signals.unwatch(node))
 
     def _heard(self) -> Heard | None:
-        return self._board.plant.valve(self._node, time.monotonic())
+        return self._context.plant.valve(self._node, time.monotonic())
 
     def _view(self) -> ValveView:
         heard = self._heard()
@@ -72,9 +416,11 @@ class _ValvePage:
             with element("div", "vf-valve-head"):
                 self._head.draw()
                 self._actions = ValveActions(
-                    self._board.operator, self._node, self._view, self._replaced, self._answered
+                    self._context.operator, self._node, self._view, self._replaced, self._answered
                 )
-                if self._board.visitors.may_operate():
+                if not self._context.is_live:
+                    pass
+                elif self._context.visitors.may_operate():
                     self._actions.draw()
                 else:
                     text("p", "Your account may view, not operate.", "vf-none")
@@ -88,8 +434,9 @@ class _ValvePage:
             text("p", "The history is being read …", "vf-none")
         with card("Parameters") as self._parameters_body:
             pass
-        with card("Pressure and stem", "vf-wide", "last 60 s, while this page is open"):
-            self._signals.draw()
+        if self._context.is_live:
+            with card("Pressure and stem", "vf-wide", "last 60 s, while this page is open"):
+                self._signals.draw()
         with card("Signature", "", "stem over pressure") as self._signature_body:
             pass
         with card("Identifications", "vf-wide vf-long") as self._entries_body:
@@ -97,22 +444,34 @@ class _ValvePage:
         with element("div", "vf-stack"):
             with card("Baselines") as self._baselines_body:
                 pass
-            with card("Alarms") as self._alarms_body:
-                pass
+            with card("Alarms"):
+                self._states = AlarmStates(self._context, self._node)
+                self._states.draw()
+            if self._context.is_live:
+                with card("Recordings of alarms") as self._alarms_body:
+                    pass
             with card("Reports and recordings") as self._files_body:
                 pass
         self._lists = {}
         for key, title, empty in _LISTS:
+            if not (self._context.is_live or key in _KEPT):
+                continue
             with card(title):
-                self._lists[key] = EntryList(empty)
+                if key not in _OF_EXPERTS:
+                    self._lists[key] = EntryList(empty)
+                    continue
+                with element("details"):
+                    text("summary", f"For experts: {title[0].lower()}{title[1:]}")
+                    self._lists[key] = EntryList(empty)
 
     async def _tick(self) -> None:
         self._beat += 1
-        self._signals.show()
+        if self._context.is_live:
+            self._signals.show()
         if self._beat % _SLOWER == 1:
             self._look()
-            await run.io_bound(self._board.kept.refresh)
-            if self._revision != self._board.kept.revision:
+            await run.io_bound(self._context.history.refresh)
+            if self._revision != self._context.history.revision:
                 await self._read()
 
     # What is heard
@@ -127,6 +486,7 @@ class _ValvePage:
             self._state = state
             self._head.show(view, heard, state)
             self._show_values(view)
+            self._states.show(view)
         self._head.show_facts(view, heard)
 
     def _show_values(self, view: ValveView) -> None:
@@ -145,31 +505,42 @@ class _ValvePage:
     # The history
 
     async def _read(self) -> None:
-        self._revision = self._board.kept.revision
+        self._revision = self._context.history.revision
         try:
-            self._history = await run.io_bound(self._board.kept.valve, self._node)
-            problem = self._board.kept.problem
+            self._history = await run.io_bound(self._context.history.valve, self._node)
+            problem = self._context.history.problem
         except HistoryError as error:
             problem = str(error)
+        events = await self._events()
         files = await run.io_bound(
-            ValveFiles.of(self._board.options).offered, self._view().namespace
+            ValveFiles.of(self._context.options).offered, self._view().namespace
         )
         kept, zone = self._history, self._page.zone
         draws: tuple[tuple[ui.element, Callable[[], None]], ...] = (
-            (self._trend_body, lambda: draw_trend(kept, problem, zone)),
+            (self._trend_body, lambda: draw_trend(kept, problem, zone, events)),
             (self._signature_body, lambda: self._signals.draw_signature(kept)),
             (self._entries_body, lambda: draw_identifications(kept, zone, self._compare)),
             (self._baselines_body, lambda: draw_baselines(kept, zone)),
-            (self._alarms_body, lambda: draw_alarms(kept, zone)),
             (self._files_body, lambda: self._draw_files(files or [])),
         )
+        if self._context.is_live:
+            draws = (*draws, (self._alarms_body, lambda: draw_alarms(kept, zone)))
         for body, draw in draws:
             body.clear()
             with body:
                 draw()
 
+    async def _events(self) -> list[AlarmEvent]:
+        """Read the events of the valve's alarms."""
+        chosen = AlarmFilter(valve=self._node)
+        try:
+            found = await run.io_bound(self._context.history.alarms, chosen, True, _MOST_EVENTS)
+        except HistoryError:
+            return []
+        return [one.event for one in found or ()]
+
     def _draw_files(self, files: list[OfferedFile]) -> None:
-        valves = self._board.plant.valves(time.monotonic())
+        valves = self._context.plant.valves(time.monotonic())
         sharing = ValveFiles.sharing(self._view().namespace, (one.view.namespace for one in valves))
         if files and sharing:
             names = printable(", ".join(sharing), 300)
@@ -189,12 +560,12 @@ class _ValvePage:
         self._revision = -1  # files and history may be new
 
 
-def valve_page(board: Board, query: dict[str, str]) -> None:
+def valve_page(context: DashboardContext, query: dict[str, str]) -> None:
     """Draw the page of the valve that the address names by ``node``."""
     node = query.get("node", "")
 
     def here(common: dict[str, str]) -> str:
         return f"/valve?{urlencode({'node': node, **common})}"
 
-    with frame(board, query, "Valve · valve friction", here) as inside:
-        _ValvePage(board, node, inside).draw()
+    with frame(context, query, "Valve · valve friction", here) as inside:
+        _ValvePage(context, node, inside).draw()

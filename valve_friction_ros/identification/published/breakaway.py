@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Static friction from the instants of breakaway, equation (9)."""
 
 from typing import NamedTuple
@@ -7,11 +16,7 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.signals.measured_record import measured
-from valve_friction_ros.signals.noise import velocity_noise
-from valve_friction_ros.signals.runs import runs_of
-
-__all__ = ["Breakaway", "find_breakaways"]
+from valve_friction_ros.signals import measured, runs_of, velocity_noise
 
 _AT_REST = 4.0
 """A stem rests while its speed is below this many standard deviations of the velocity's noise.

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Identification of the Karnopp parameters from a recording, as published."""
 
 from dataclasses import replace
@@ -26,9 +35,7 @@ from valve_friction_ros.identification.trust.plausible_units import require_plau
 from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
-
-__all__ = ["PublishedFit", "chosen_step", "published_estimate", "published_fit"]
+from valve_friction_ros.signals import MeasuredRecord, measured
 
 _MASS_TOLERANCE = 0.25
 """Relative change of a regressed mass with half the derivative window, up to which it is kept.
@@ -166,21 +173,29 @@ def published_estimate(
     warning. Inertia is about 0.01 N of 5000 N on the bench valve, so the other parameters hardly
     change.
     """
-    return published_fit(measured(recording), valve, settings or IdentificationSettings()).estimate
+    settings, record = settings or IdentificationSettings(), measured(recording)
+    require_published(record, valve, settings)
+    return published_fit(record, valve, settings).estimate
+
+
+def require_published(
+    record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
+) -> None:
+    """Refuse a record with a gap, or whose stem does not move both ways."""
+    require_unbroken(record)
+    require_enough_samples(record, settings.published_window)
+    require_motion(record)
+    require_drive(record, valve)
+    require_plausible_units(record, valve, settings)
+    require_two_directions(record, settings.published_window)
 
 
 def published_fit(
     record: MeasuredRecord, valve: Valve, settings: IdentificationSettings
 ) -> PublishedFit:
-    """Identify as `published_estimate` does, and return the regression too."""
+    """Identify a checked record as `published_estimate` does, and return the regression too."""
     warnings: list[str] = []
-    require_unbroken(record)
-    require_enough_samples(record, settings.published_window)
     derivatives = record.derivatives(settings.published_window, settings.order)
-    require_motion(record)
-    require_drive(record, valve)
-    require_plausible_units(record, valve, settings)
-    require_two_directions(record, settings.published_window)
     force = valve.actuator_force(record.drive)
     regression = force_balance_regression(force, record.position, derivatives, settings)
     sweep, chosen = chosen_step(regression, settings, settings.published_window)

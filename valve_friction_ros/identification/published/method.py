@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Method "published": the paper's model 1 as it is, without intervals."""
 
 import math
@@ -9,16 +18,14 @@ from valve_friction_ros.identification.published.evidence import (
     sweep_finding,
     with_published,
 )
-from valve_friction_ros.identification.published.identify import published_fit
+from valve_friction_ros.identification.published.identify import published_fit, require_published
 from valve_friction_ros.identification.result import Result
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.sliding import SLIDING
 from valve_friction_ros.identification.trust.verdict import Parameter, Verdict, fixed
+from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.measured_record import measured
-
-__all__ = ["METHOD", "identify_published"]
+from valve_friction_ros.signals import measured
 
 METHOD = "published"
 """Name of this method."""
@@ -52,6 +59,7 @@ def identify_published(
     """
     settings = settings or IdentificationSettings()
     record = measured(recording)
+    require_published(record, valve, settings)
     found = published_fit(record, valve, settings)
     estimate = found.estimate
     parameters = {name: _stated(name, estimate, settings.fixed) for name in estimate.values}

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The force balance of the sliding stem as a linear regression, equations (3) to (7)."""
 
 from collections.abc import Mapping
@@ -7,9 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.settings import REGRESSED, IdentificationSettings
-from valve_friction_ros.signals.derivatives import Derivatives
-
-__all__ = ["ForceBalanceRegression", "force_balance_regression"]
+from valve_friction_ros.signals import Derivatives
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sweep of the velocity threshold δv, equations (6) to (8), (17) and (18)."""
 
 from collections.abc import Mapping
@@ -8,8 +17,6 @@ from numpy.typing import NDArray
 
 from valve_friction_ros.identification.published.regression import ForceBalanceRegression
 from valve_friction_ros.identification.published.triangular_factors import factors_above
-
-__all__ = ["Sweep", "sweep_thresholds"]
 
 _DEPENDENT = 1e-10
 """Share of a column's length below which its independent part counts as zero.

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The sweep of the velocity threshold in figures and reports."""
 
 import numpy as np
@@ -6,8 +15,6 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.drawing import Curve, Panel
 from valve_friction_ros.identification.published.sweep import Sweep
 from valve_friction_ros.identification.trust.verdict import Parameter
-
-__all__ = ["SETTLED_SHARE", "chosen_region", "r_squared_panel", "sweep_panels"]
 
 SETTLED_SHARE = 0.1
 """Largest difference of σ_s in the chosen region, over σ_s at the chosen threshold. Chosen."""

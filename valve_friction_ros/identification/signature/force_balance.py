@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Method "signature": the paper's model 2, from the force balances of a valve signature."""
 
 import math
@@ -34,22 +43,21 @@ from valve_friction_ros.identification.trust.jackknife import Jackknife, jackkni
 from valve_friction_ros.identification.trust.limits import FALL_SPEED
 from valve_friction_ros.identification.trust.misfit import stem_distance
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
-from valve_friction_ros.identification.trust.rounding import percentage
-from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING, SLIDING
+from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
 from valve_friction_ros.identification.trust.uncertainty import half_width
 from valve_friction_ros.identification.trust.verdict import (
+    PRELOAD_SCALE,
     Parameter,
     fixed,
     not_identifiable,
     with_verdict,
 )
-from valve_friction_ros.identification.units import UNITS
+from valve_friction_ros.identification.units import SLIDING, UNITS
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.measured_record import measured
-
-__all__ = ["METHOD", "identify_signature"]
+from valve_friction_ros.signals import measured
+from valve_friction_ros.wording import percentage
 
 METHOD = "signature"
 """Name of this method."""
@@ -127,7 +135,7 @@ def identify_signature(
     """
     settings = settings or IdentificationSettings()
     if settings.fixed.get("spring_constant") == 0:
-        raise RefusalError("the force balance needs a spring: use the method refined")
+        raise RefusalError("the force balance needs a spring: use the method plant or bench")
     record = measured(recording)
     require_unbroken(record)
     require_plausible_units(record, valve, settings)
@@ -278,6 +286,7 @@ def _parameters(
     speed = sliding_speed(ways)
     points = [point for way in ways for point in breakaway_points(way)]
     place = float(np.mean([abs(point.position) for point in points]))
+    force_range = float(np.ptp([point.force for point in points]))
     stiffness = _STIFFNESS_BIAS * values["spring_constant"]
     friction = _BREAKAWAY_BIAS * values["static_friction"]
     biases = {
@@ -313,6 +322,9 @@ def _parameters(
         else:
             width = half_width(errors[source], found.freedom) + bias
             doubt = slow if is_sliding else ""
-            parameters[name] = with_verdict(name, values[source], errors[source], width, doubt)
+            scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
+            parameters[name] = with_verdict(
+                name, values[source], errors[source], width, doubt, scale
+            )
     given = {name: fixed(name, value) for name, value in settings.fixed.items() if name in UNITS}
     return {**parameters, **given}

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The strokes of a valve signature: where each breaks away, and where it slides steadily."""
 
 from dataclasses import dataclass, field
@@ -10,12 +19,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.signature.onset import fit_onset
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.derivatives import differentiate
-from valve_friction_ros.signals.measured_record import measured
-from valve_friction_ros.signals.noise import velocity_noise
-from valve_friction_ros.signals.runs import runs_of
-
-__all__ = ["BreakawayPoint", "SignatureStroke", "Sliding", "find_strokes", "velocity_window"]
+from valve_friction_ros.signals import differentiate, measured, runs_of, velocity_noise
 
 _ORDER = 3
 """Polynomial order of the derivatives: the paper's n."""
@@ -72,7 +76,7 @@ class BreakawayPoint(NamedTuple):
     speed: float
 
 
-class Sliding(NamedTuple):
+class SteadySliding(NamedTuple):
     """The instants of a stroke at which the stem slides at a constant speed, shape (n,) each.
 
     Time since the first sample, s; stem position, m; actuator force F_ext, N; stem velocity, m/s;
@@ -97,7 +101,7 @@ class SignatureStroke:
     direction: int
     breakaway: BreakawayPoint | None
     steadiness: float
-    sliding: Sliding = field(repr=False)
+    sliding: SteadySliding = field(repr=False)
 
     @property
     def spring_constant(self) -> float:
@@ -167,7 +171,7 @@ def find_strokes(recording: Recording, valve: Valve, window: int) -> tuple[Signa
         if abs(way) < _LEAST_STROKE_SHARE * span or (direction * run < 0).any():
             continue
         steady = begin + _steady_instants(run)
-        sliding = Sliding(
+        sliding = SteadySliding(
             recording.time[steady + margin],
             position[steady + margin],
             force[steady + margin],

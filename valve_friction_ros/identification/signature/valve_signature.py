@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The valve signature: breakaway points, spring constant, bias and dead zone, (10) to (16)."""
 
 from collections.abc import Mapping, Sequence
@@ -15,25 +24,11 @@ from valve_friction_ros.identification.signature.strokes import (
 )
 from valve_friction_ros.identification.trust.excitation import require_drive
 from valve_friction_ros.identification.trust.jackknife import jackknife
-from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.model.frozen import frozen
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-
-__all__ = [
-    "TRIANGLE_NEEDED",
-    "ValveSignature",
-    "Ways",
-    "breakaway_points",
-    "leaving_speed",
-    "mean_position_bias",
-    "mean_spring_constant",
-    "sliding_friction",
-    "sliding_places",
-    "sliding_speed",
-    "valve_signature",
-]
+from valve_friction_ros.wording import percentage
 
 TRIANGLE_NEEDED = (
     "excite the valve by a slow triangular wave of pressure, such as 60 s a period, "

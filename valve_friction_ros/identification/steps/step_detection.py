@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Where the steps of an input signal begin."""
 
 from itertools import pairwise
@@ -5,10 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.signals.noise import position_noise, sensor_noise
-from valve_friction_ros.signals.smoothing import find_corners
-
-__all__ = ["find_steps"]
+from valve_friction_ros.signals import find_corners, position_noise, sensor_noise
 
 _GATE = 6.0
 """Standard deviations of the noise beyond which a sample has left its level: 2 of 10⁹ by chance."""

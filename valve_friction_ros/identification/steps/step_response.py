@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Response of a valve to steps of its input: T_d, T63, T86, overshoot, gain, dead band, resolution.
 
 These are the figures that ANSI/ISA-75.25.01, *Test Procedure for Control Valve Response
@@ -18,13 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.steps.step_detection import find_steps
 from valve_friction_ros.model.checks import require_positive
-from valve_friction_ros.signals.noise import sensor_noise
-from valve_friction_ros.signals.smoothing import (
+from valve_friction_ros.signals import (
     longest_faithful_window,
+    sensor_noise,
     smooth_between,
 )
-
-__all__ = ["Bracket", "StepMetrics", "StepTest", "first_beyond", "step_test"]
 
 _T63 = -math.expm1(-1.0)
 _T86 = -math.expm1(-2.0)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Validation: a recording simulated with an identified model, section 5 of the paper."""
 
 from dataclasses import dataclass, field
@@ -17,10 +26,7 @@ from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import StemState, simulate
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.conditioned_record import smoothed_drive
-from valve_friction_ros.signals.measured_record import measured
-
-__all__ = ["Validation", "measured_start", "validate"]
+from valve_friction_ros.signals import measured
 
 _START_TIME = 0.1
 """Longest part of the record, s, that gives the start. Chosen: the speed changes little within it;
@@ -168,7 +174,7 @@ def validate(
     trajectory = simulate(
         valve,
         parameters,
-        smoothed_drive(record),
+        record.smoothed_drive,
         recording.sample_period,
         measured_start(record, valve),
     )

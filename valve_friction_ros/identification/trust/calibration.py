@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Calibration: what the unknown scales of diaphragm area and sensors add to an interval."""
 
 import math
@@ -5,18 +14,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.trust.verdict import WEAK_SHARE, Parameter, Verdict
 from valve_friction_ros.model.drive import Drive
-
-__all__ = [
-    "BUDGET",
-    "COVERAGE",
-    "OF_FORCE",
-    "calibrated",
-    "calibration_share",
-    "with_calibration",
-]
+from valve_friction_ros.wording import percentage
 
 BUDGET = "uncertainty_budget"
 """Name of the evidence that splits the standard uncertainty of each parameter by its sources."""

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a record must hold to determine friction; a refusal names what is missing.
 
 Where a limit is given with "simulated records", it lies between two sets of records: those that
@@ -5,27 +14,17 @@ Where a limit is given with "simulated records", it lies between two sets of rec
 high, graphite and stribeck), which all determine the friction, and records that do not.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.identification.trust.plausible_units import position_question
-from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.measured_record import measured
-
-__all__ = [
-    "require_drive",
-    "require_enough_samples",
-    "require_motion",
-    "require_related_signals",
-    "require_stem_between_stops",
-    "require_travel",
-    "require_two_directions",
-    "require_unbroken",
-    "require_within_travel",
-]
+from valve_friction_ros.signals import measured
+from valve_friction_ros.wording import percentage
 
 _LEAST_WINDOWS = 10
 """Derivative windows in a record. Chosen: fewer give no two strokes with a rest and a motion."""
@@ -50,16 +49,6 @@ _LEAST_TRAVEL = 0.01
 """Range of the position over the travel.
 
 0.14 and more in simulated records. Chosen: a motion below 1 % is mostly within the dead band."""
-
-_MOST_AT_A_STOP = 0.5
-"""Share of the time at a travel stop: 0.18 at most in simulated records. Chosen."""
-
-_AT_A_STOP_NOISE = 5.0
-_AT_A_STOP_SHARE = 1e-3
-"""Distance within which the stem is at a stop: in standard deviations of the position's noise,
-which chance exceeds in 6 of 10⁷ samples, and at least this share of the travel.
-
-Chosen: the share of a noiseless record, far below the dead band of a stem."""
 
 _OUTSIDE = 0.05
 """Distance beyond a travel stop over the travel.
@@ -211,31 +200,23 @@ def require_travel(recording: Recording, valve: Valve) -> None:
         )
 
 
-def require_stem_between_stops(recording: Recording, valve: Valve) -> None:
-    """Refuse a stem that rests at a travel stop for most of the record."""
-    travel = valve.travel
-    if not np.isfinite(travel):
-        return
-    reach = max(_AT_A_STOP_NOISE * measured(recording).white_noise, _AT_A_STOP_SHARE * travel)
-    for name, distance in (
-        ("lower", np.abs(recording.position)),
-        ("upper", np.abs(recording.position - travel)),
-    ):
-        share = float(np.mean(distance < reach))
-        if share > _MOST_AT_A_STOP:
-            raise LittleMotionError(
-                f"the stem is at its {name} stop for {100 * share:.0f} % of the record, where "
-                f"{recording.driven_by.words} holds no information on friction: excite the valve "
-                "around mid-travel"
-            )
+class _Followed(NamedTuple):
+    """How the drive of the moving stem follows it.
+
+    The slope of drive over position, Pa/m or N/m; the share of the drive's variance that position
+    and direction explain; and whether the drive does work on the stem, as friction takes it.
+    """
+
+    slope: float
+    share: float
+    dissipates: bool
 
 
-def _followed(recording: Recording) -> tuple[float, float]:
+def _followed(recording: Recording) -> _Followed:
     """Fit the drive of the moving stem by its position and its direction.
 
-    Returns the slope, Pa/m or N/m, and the share of the variance that is explained. While the stem
-    moves, its drive follows position, shifted up or down by the friction. While it rests, any drive
-    within the dead band is possible, so rests are left out.
+    While the stem moves, its drive follows position, shifted up or down by the friction. While it
+    rests, any drive within the dead band is possible, so rests are left out.
     """
     longest = max(len(recording) // _FEWEST_BLOCKS, 1)
     length = max(min(round(_FOLLOWED_BLOCK / recording.sample_period), longest), 1)
@@ -247,38 +228,53 @@ def _followed(recording: Recording) -> tuple[float, float]:
     moves = np.diff(position)
     moving = np.abs(moves) > _MOVING_SHARE * np.abs(moves).max()
     if not moving.any():
-        return 0.0, 0.0
+        return _Followed(0.0, 0.0, False)
     place, target = (0.5 * (one[1:] + one[:-1])[moving] for one in (position, drive))
     columns = np.column_stack([place - place.mean(), np.sign(moves[moving]), np.ones(place.size)])
     fitted, *_ = np.linalg.lstsq(columns, target, rcond=None)
     left = target - columns @ fitted
     total = float(np.sum((target - target.mean()) ** 2))
     share = 1 - float(left @ left) / total if total > 0 else 0.0
-    return float(fitted[0]), share
+    away = columns[:, 0]
+    along = float(away @ target) / max(float(away @ away), np.finfo(float).tiny)
+    work = float(np.sum((target - target.mean() - along * away) * moves[moving]))
+    return _Followed(float(fitted[0]), share, work > 0.0)
+
+
+_JUMPED = 0.5
+"""Share of the distance that may lie between two samples, in jumps of a stem that sticks."""
+
+
+def require_changing_drive(recording: Recording) -> None:
+    """Refuse a drive that is the same all the time."""
+    words = recording.driven_by.words
+    if np.ptp(recording.drive) == 0:
+        raise LittleMotionError(
+            f"the {words} did not change: excite the valve, or check the {words} sensor"
+        )
 
 
 def require_related_signals(recording: Recording) -> None:
     """Refuse drive and stem that do not move together, or move too fast for the sampling."""
     words, position = recording.driven_by.words, recording.position
-    if np.ptp(recording.drive) == 0:
-        raise LittleMotionError(
-            f"the {words} did not change: excite the valve, or check the {words} sensor"
-        )
-    slope, share = _followed(recording)
+    require_changing_drive(recording)
+    slope, share, dissipates = _followed(recording)
     if share < _LEAST_FOLLOWED:
         raise RefusalError(
             f"{words} and stem do not move together (position and direction of the moving stem "
             f"explain {100 * share:.0f} % of the {words}): check that both signals belong to "
             "this valve, are not swapped, come from working sensors, and share one clock"
         )
-    if slope < 0 and share > _SURELY_FOLLOWED:
+    if slope < 0 and share > _SURELY_FOLLOWED and not dissipates:
         raise RefusalError(
             f"the stem moves against the {words}: invert the position, so that it grows in the "
             f"direction in which {words} pushes the stem"
         )
-    step = float(np.max(np.abs(np.diff(position))))
-    span = float(np.ptp(position))
-    if step * _LEAST_SAMPLES_A_STROKE > span:
+    steps, span = np.diff(position), float(np.ptp(position))
+    step = float(np.max(np.abs(steps)))
+    jumps = np.where(_LEAST_SAMPLES_A_STROKE * np.abs(steps) > span, steps, 0.0)
+    is_glitch = bool(np.any(jumps[1:] * jumps[:-1] < 0))
+    if is_glitch or np.sum(np.abs(jumps)) > _JUMPED * np.sum(np.abs(steps)):
         raise RefusalError(
             f"sampling is too slow for the motion: the stem moves {100 * step / span:.0f} % of "
             f"its range between two samples, {recording.sample_period:.3g} s apart; sample faster, "

@@ -1,20 +1,22 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Misfit: the distance between a model and the record that it was identified from."""
 
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from valve_friction_ros.identification.trust.rounding import percentage
+from valve_friction_ros.wording import misfit_words, percentage
 
 if TYPE_CHECKING:
     from valve_friction_ros.model.valve import Valve
-
-__all__ = ["LEAST_FIT", "Misfit", "stem_distance"]
-
-_EXPECTED_SHARE = 0.75
-"""Share of the tolerated misfit that chance explains.
-
-Chosen: 68 of 71 simulated noisy records of Karnopp valves lie below it, 70 below the tolerance."""
 
 LEAST_FIT = 0.9
 """Share of the movement below which a model that does not describe the record is refused.
@@ -56,15 +58,7 @@ class Misfit:
     @property
     def words(self) -> str:
         """The systematic misfit with its unit, for people."""
-        if self.unit == "m":
-            return f"{self.systematic * 1e6:.3g} µm"
-        return f"{self.systematic:.3g} {self.unit}"
-
-    @property
-    def excess(self) -> float:
-        """Systematic misfit beyond the share that chance explains, `unit`."""
-        expected = _EXPECTED_SHARE * self.tolerated
-        return math.sqrt(max(self.systematic**2 - expected**2, 0.0))
+        return misfit_words(self.systematic, self.unit)
 
     @property
     def is_gross(self) -> bool:

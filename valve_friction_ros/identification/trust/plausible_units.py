@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Quantities that no control valve has, and the unit in which they would be ordinary.
 
 Only a diaphragm with a spring is judged. The wide ranges refuse; they hold every actuator of the
@@ -13,15 +22,11 @@ import numpy as np
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.trust.uncertainty import block_covariance, stroke_length
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals.derivatives import Derivatives
-from valve_friction_ros.signals.measured_record import MeasuredRecord, measured
-
-__all__ = ["position_question", "require_plausible_units", "require_valve_units", "time_remarks"]
+from valve_friction_ros.signals import Derivatives, MeasuredRecord, measured
 
 
 class _Quantity(NamedTuple):
@@ -196,9 +201,10 @@ def _least_time_constant(recording: Recording) -> float:
     sizes = np.linalg.norm(velocity), np.linalg.norm(place - place.mean())
     columns *= moving[:, None]
     solved = np.linalg.lstsq(columns, pressure * moving, rcond=None)[0]
-    equation = EstimatingEquation.of_least_squares(columns, columns @ solved - pressure * moving)
     stroke = stroke_length(np.cumsum(velocity * moving))
-    covariance = block_covariance(equation, max(stroke, velocity.size // _MOST_BLOCKS))
+    covariance = block_covariance(
+        columns, columns @ solved - pressure * moving, max(stroke, velocity.size // _MOST_BLOCKS)
+    )
     viscous, spring = (
         (solved[index] + sign * covariance.half_width(np.eye(4)[index])) / sizes[index]
         for index, sign in ((0, -1), (1, 1))

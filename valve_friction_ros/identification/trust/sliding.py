@@ -1,12 +1,28 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The mean friction of the sliding stem: the work of friction over the distance."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 
-__all__ = ["FINEST_SLIDING", "SLIDING", "mean_over_distance", "mean_sliding_friction", "mean_speed"]
+COMPARABLE = "comparable"
+"""Name of the evidence by which the sliding frictions of two records are compared.
+
+``shared_half_width``, N, is the part of its half width by which another record of the same sensors
+is wrong alike; ``speed_exponent`` is d ln F / d ln v at the sliding speed, and ``half_width`` that
+of the exponent but for what is shared."""
+
+SPEED_EXPONENT = "speed_exponent"
+"""Name of d ln F / d ln v at the sliding speed: near it, friction grows as that power of speed."""
 
 FINEST_SLIDING = 3e-3
 """Least half width of its interval, as a share of the value, however quiet the record is.

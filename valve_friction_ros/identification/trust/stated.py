@@ -1,7 +1,16 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """What a data sheet states of a valve, compared with what a record shows."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from types import MappingProxyType
@@ -15,8 +24,6 @@ from valve_friction_ros.identification.units import PARAMETER_UNITS
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 
-__all__ = ["CONTRADICTED", "Cause", "Contradiction", "contradictions", "with_stated"]
-
 CONTRADICTED = "contradicted_data"
 """Name of the evidence that holds the contradictions by the name of the parameter."""
 
@@ -28,6 +35,9 @@ _DIFFERENT = 0.15
 """Half widths, and share of the stated value, beyond both of which two numbers contradict.
 
 Chosen: springs of a catalogue are made to ±10 %."""
+
+_UNITS = {"diaphragm_area": "m²", "travel": "m"}
+_UNITS |= dict.fromkeys(("pressure_reference", "pressure_minimum", "pressure_maximum"), "Pa")
 
 _ATMOSPHERE = 101325.0
 _ALTITUDE = 0.1
@@ -195,36 +205,66 @@ def _scale_is_confirmed(parameters: Mapping[str, Parameter], stated: Mapping[str
 
 def _doubtful(one: Parameter, reason: str) -> Parameter:
     """Return an estimate as weak; its ratio to a baseline leaves the doubt out."""
-    if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK) or reason in one.reason:
+    if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
         return one
     told = f"{one.reason}; {reason}" if one.reason else reason
     return replace(one, verdict=Verdict.WEAK, reason=told, uncalibrated=one.without_calibration)
 
 
+def _of_assumed(
+    parameters: Mapping[str, Parameter],
+    stated: Mapping[str, float],
+    assumed: Sequence[str],
+    valve: Valve,
+) -> tuple[dict[str, str], list[str]]:
+    """Return why numbers of assumed data are doubtful, and one sentence on what was not stated.
+
+    A stated spring constant that the record confirms makes up for an area.
+    """
+    if not assumed:
+        return {}, []
+    reasons: dict[str, str] = {}
+    consequences = []
+    if "pressure_reference" in assumed:
+        reasons["spring_preload"] = "of an assumed pressure_reference"
+        consequences.append("spring_preload is of an assumed pressure_reference")
+    if "diaphragm_area" in assumed and not _scale_is_confirmed(parameters, stated):
+        reasons |= dict.fromkeys(OF_FORCE, "of an assumed area")
+        consequences.insert(0, "newtons are of an assumed area, percent and ratios are not")
+    if "travel" in assumed:
+        consequences.append("percent of the travel are of an assumed one")
+    taken = ", ".join(f"{name} {getattr(valve, name):g} {_UNITS[name]}" for name in assumed)
+    told = "; ".join([f"not stated, and assumed: {taken}", *consequences])
+    return reasons, [told]
+
+
 def with_stated(
     parameters: Mapping[str, Parameter],
     stated: Mapping[str, float],
+    assumed: Sequence[str],
     valve: Valve,
     recording: Recording,
 ) -> tuple[dict[str, Parameter], dict[str, Contradiction], tuple[str, ...]]:
-    """Return parameters with the doubt of contradicted data, the contradictions, and their words.
+    """Return parameters with the doubt of their data, the contradictions, and all that in words.
 
-    A contradicted number is weak at most. Where the scale of the forces is in doubt, all numbers
-    that grow with it are: the spring constant is contradicted, or a preload that no spring constant
-    confirms. The ratio to a baseline of the same scale stays as it is.
+    What depends on `assumed` data of the valve is weak at most, and so is a contradicted number.
+    Where the scale of the forces is in doubt, all numbers that grow with it are: the spring
+    constant is contradicted, or a preload that no spring constant confirms. The ratio to a baseline
+    of the same scale stays as it is.
     """
     span = valve.travel if math.isfinite(valve.travel) else float(np.ptp(recording.position))
     told = {one.name: one for one in contradictions(parameters, stated, valve, span)}
     found = dict(parameters)
-    reasons = {name: f"the stated {name} contradicts it" for name in told}
+    reasons, sentences = _of_assumed(parameters, stated, assumed, valve)
+    reasons |= {name: f"the stated {name} contradicts it" for name in told}
     witness = next((name for name in ("spring_constant", "spring_preload") if name in told), "")
     if witness and not _scale_is_confirmed(parameters, stated):
         doubt = f"the scale of the forces is in doubt: the stated {witness} contradicts the record"
-        reasons = dict.fromkeys(OF_FORCE, doubt) | reasons
+        reasons |= {name: doubt for name in OF_FORCE if name not in told}
     for name, reason in reasons.items():
         if name in found:
             found[name] = _doubtful(found[name], reason)
-    return found, told, tuple(_sentence(one, valve) for one in told.values())
+    return found, told, (*(_sentence(one, valve) for one in told.values()), *sentences)
 
 
 def _sentence(one: Contradiction, valve: Valve) -> str:

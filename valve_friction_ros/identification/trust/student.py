@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Student's t: the quantile of an interval, without scipy.
 
 scipy.special would do, but takes 55 MB and a fifth of a second of processor time in a program that
@@ -6,8 +15,6 @@ needs nothing else of it.
 
 import math
 from functools import cache
-
-__all__ = ["student_quantile"]
 
 _MANY = 1e8
 """Degrees of freedom from which the quantile is that of the normal distribution to 10⁻⁸."""

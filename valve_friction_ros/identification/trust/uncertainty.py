@@ -1,25 +1,31 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Standard errors and intervals that are valid for correlated residuals."""
 
+import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.trust.estimating_equation import EstimatingEquation
 from valve_friction_ros.identification.trust.student import student_quantile
-
-__all__ = [
-    "CONFIDENCE",
-    "Covariance",
-    "block_covariance",
-    "half_width",
-    "plain_sandwich",
-    "stroke_length",
-    "worst_case",
-]
 
 CONFIDENCE = 0.95
 """Probability that an interval covers the true value; the usual choice of metrology (GUM)."""
+
+NORMAL_QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
+"""Half width over the standard deviation of a normal error: 1.96."""
+
+_LEAST_FREEDOM = 0.05
+"""Degrees of freedom below which nothing is known: the interval is 10²⁰ standard errors wide."""
 
 _FEWEST_BLOCKS = 8
 """Fewest blocks of a record. Chosen: 7 degrees of freedom make an interval 2.4 standard errors;
@@ -61,7 +67,10 @@ class Covariance:
         return float(np.linalg.norm(self.contributions @ gradient))
 
     def half_width(self, gradient: NDArray[np.float64]) -> float:
-        """Half the width of the interval of gᵀθ that covers the true value with `CONFIDENCE`."""
+        """Half the width of the interval of gᵀθ that covers the true value with `CONFIDENCE`.
+
+        Infinite without degrees of freedom.
+        """
         error = self.standard_error(gradient)
         return half_width(error, self.freedom(gradient)) if error > 0 else error
 
@@ -77,8 +86,10 @@ class Covariance:
         return float(np.trace(moments) ** 2 / max(np.sum(moments**2), np.finfo(float).tiny))
 
 
-def block_covariance(equation: EstimatingEquation, block: int) -> Covariance:
-    """Sandwich covariance of the root of an equation, from sums over blocks of samples.
+def block_covariance(
+    slope: NDArray[np.float64], residual: NDArray[np.float64], block: int
+) -> Covariance:
+    """Sandwich covariance of a least-squares estimate, from sums over blocks of samples.
 
     Residuals at 1 kHz are far from independent: the error of one stroke is in all its samples.
     Sums over blocks as long as that memory are independent, so their scatter measures the
@@ -93,53 +104,40 @@ def block_covariance(equation: EstimatingEquation, block: int) -> Covariance:
 
     Parameters
     ----------
-    equation : EstimatingEquation
-        At its root.
+    slope : ndarray of float, shape (n, p)
+        Derivatives of the residuals by the coordinates.
+    residual : ndarray of float, shape (n,)
+        Model minus measurement, at the estimate.
     block : int
         Samples a block; shortened where fewer than 8 blocks would remain.
 
     Returns
     -------
     Covariance
-        All nan if the record is too short or the equation is singular.
+        All nan if the record is too short or the regression is singular.
 
     References
     ----------
     R. M. Bell and D. F. McCaffrey, Survey Methodology 28 (2002) 169–181.
     """
-    one, two = equation.slopes
-    free = one.shape[1]
-    ends = _block_ends(one.shape[0], block)
-    blocks = ends.size
-    if blocks <= free or not equation.is_definite:
+    free = slope.shape[1]
+    ends = _block_ends(slope.shape[0], block)
+    scale = np.linalg.norm(slope, axis=0)
+    if ends.size <= free or not (scale > 0).all():
         return _unknown(free)
-    scale = np.sqrt(np.abs(np.diag(equation.curvature)))
-    values, vectors = np.linalg.eigh(equation.curvature / np.outer(scale, scale))
+    slope = slope / scale
+    values, vectors = np.linalg.eigh(slope.T @ slope)
+    if values[0] <= np.finfo(float).eps * values[-1]:
+        return _unknown(free)
     root = (vectors / np.sqrt(values)) @ vectors.T
-    sums = np.add.reduceat(equation.scores, ends) / scale @ root
-    mixed = [
-        first.T @ second
-        for first, second in zip(np.split(one, ends[1:]), np.split(two, ends[1:]), strict=True)
-    ]
-    curvatures = np.array(mixed) / np.outer(scale, scale)
-    information = root @ (curvatures + curvatures.transpose(0, 2, 1)) @ root
+    sums = np.add.reduceat(slope * residual[:, None], ends) @ root
+    curvatures = np.array([part.T @ part for part in np.split(slope, ends[1:])])
+    information = root @ curvatures @ root
     shares, axes = np.linalg.eigh(information)
     enlarged = axes / np.sqrt(1 - np.clip(shares, 0.0, _LARGEST_SHARE))[:, None, :]
     undone = enlarged @ axes.transpose(0, 2, 1)
     contributions = np.einsum("bij,bj->bi", undone, sums) @ root / scale
     return Covariance(contributions, undone @ (root / scale), information)
-
-
-def plain_sandwich(equation: EstimatingEquation, block: int) -> NDArray[np.float64]:
-    """Return A⁻¹·(Σ_b s_b s_bᵀ)·A⁻¹, the scatter of the scores as they are, shape (p, p).
-
-    For a score test: away from the root of an equation the shares of the information do not
-    measure how far the fit has reduced the residuals. The blocks are those of
-    `block_covariance`.
-    """
-    sums = np.add.reduceat(equation.scores, _block_ends(equation.scores.shape[0], block))
-    spread = np.linalg.lstsq(equation.curvature, sums.T, rcond=1e-14)[0]
-    return np.asarray(spread @ spread.T, dtype=np.float64)
 
 
 def _block_ends(samples: int, block: int) -> NDArray[np.int64]:
@@ -156,6 +154,8 @@ def _unknown(free: int) -> Covariance:
 
 def half_width(standard_error: float, freedom: float) -> float:
     """Half the width of the interval that covers the true value with `CONFIDENCE`."""
+    if not freedom > _LEAST_FREEDOM:
+        return math.inf
     return student_quantile(0.5 + CONFIDENCE / 2, freedom) * standard_error
 
 
@@ -165,34 +165,3 @@ def stroke_length(simulated: NDArray[np.float64]) -> int:
     moving = np.sign(steps[steps != 0])
     reversals = int(np.count_nonzero(np.diff(moving)))
     return simulated.size // (reversals + 1)
-
-
-def worst_case(curvature: NDArray[np.float64], samples: int, misfit: float) -> NDArray[np.float64]:
-    """Bound the effect of a systematic misfit on the estimate.
-
-    A misfit of root mean square s, of any shape, moves the least-squares estimate by
-
-        |Δθ_i| ≤ s·√n·√[(SᵀS)⁻¹]_ii      (Cauchy–Schwarz),
-
-    with the sensitivities S, of which the curvature is 2·SᵀS.
-
-    Parameters
-    ----------
-    curvature : ndarray of float, shape (p, p)
-        Derivative of the estimating equation.
-    samples : int
-        Number of samples n.
-    misfit : float
-        Root mean square of the systematic misfit, m.
-
-    Returns
-    -------
-    ndarray of float, shape (p, p)
-        (s·√n)²·(SᵀS)⁻¹: the bound of any combination gᵀθ is √(gᵀ·that·g).
-    """
-    scale = np.sqrt(np.abs(np.diag(curvature)))
-    if not (scale > 0).all():
-        return np.full_like(curvature, np.nan)
-    inverse = np.linalg.pinv(curvature / np.outer(scale, scale)) / np.outer(scale, scale)
-    bound: NDArray[np.float64] = misfit**2 * samples * (inverse + inverse.T)
-    return bound

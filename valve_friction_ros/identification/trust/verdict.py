@@ -1,18 +1,33 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The verdict on an identified number: how far it can be trusted."""
 
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from valve_friction_ros.identification.trust.rounding import percentage
 from valve_friction_ros.identification.units import PARAMETER_UNITS
-
-__all__ = ["WEAK_SHARE", "Parameter", "Verdict", "fixed", "not_identifiable", "with_verdict"]
+from valve_friction_ros.wording import percentage
 
 WEAK_SHARE = 0.05
 """Half width of an interval, as a share of the value, above which the verdict is weak.
 
 Chosen: a fifth of the 25 % growth of F_c that raises the first alarm (`FrictionLimits`)."""
+
+
+PRELOAD_SCALE = 0.12
+"""Share of the range of the actuator force below which the size of a preload is that of this share.
+
+A preload may well be zero, so its interval is judged by what depends on it, the balance of spring
+and actuator: at `WEAK_SHARE` of this it is 0.6 % of the range, a fifth of the shift that is first
+found (`ValveLimits.preload_change`)."""
 
 
 class Verdict(Enum):
@@ -87,8 +102,26 @@ class Parameter:
         return self.value - self.half_width, self.value + self.half_width
 
 
+def share_of(value: float, half_width: float, scale: float = 0.0) -> float:
+    """Return a half width as a share of a value, or of a scale where that is larger."""
+    size = max(abs(value), scale)
+    return half_width / size if size else math.inf
+
+
+def interval_share(value: float, share: float, scale: float = 0.0) -> str:
+    """Say what share of its value, or of the scale that counts in its place, an interval is."""
+    if abs(value) >= scale:
+        return f"±{percentage(share)} of its value"
+    return f"±{percentage(share * PRELOAD_SCALE)} of the range of the actuator force"
+
+
 def with_verdict(
-    name: str, value: float, standard_error: float, half_width: float, doubt: str = ""
+    name: str,
+    value: float,
+    standard_error: float,
+    half_width: float,
+    doubt: str = "",
+    scale: float = 0.0,
 ) -> Parameter:
     """Give a value its verdict, by the width of its interval.
 
@@ -99,17 +132,19 @@ def with_verdict(
     doubt : str
         A reason why the value is at most weak, however narrow its interval is. Without a doubt the
         width of the interval is the reason.
+    scale : float
+        Least size, SI unit, that the interval is judged by where the value may be zero.
 
     Returns
     -------
     Parameter
         Identified, weak beyond `WEAK_SHARE` of the value, not identifiable beyond the value.
     """
-    share = half_width / abs(value) if value else math.inf
+    share = share_of(value, half_width, scale)
     if share <= WEAK_SHARE and not doubt:
         return Parameter(name, value, standard_error, half_width, Verdict.IDENTIFIED)
     if share < 1:
-        reason = doubt or f"its interval is ±{percentage(share)} of its value"
+        reason = doubt or f"its interval is {interval_share(value, share, scale)}"
         return Parameter(name, value, standard_error, half_width, Verdict.WEAK, reason)
     reason = doubt or "its interval is wider than its value"
     return replace(not_identifiable(name, reason), withheld=(value, half_width))

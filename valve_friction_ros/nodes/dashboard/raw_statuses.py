@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Statuses out of serialised diagnostics, each read only when somebody looks.
 
 rclpy takes 0.2 ms to turn the status of an identifier into objects, a tenth of a core for 500
@@ -13,8 +22,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message
 
 from valve_friction_ros.dashboard import ESSENTIAL_KEYS, Status, Unread
-
-__all__ = ["status_of", "statuses_in"]
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _AFTER_STAMP = 12

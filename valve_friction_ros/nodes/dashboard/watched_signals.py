@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Signals of the valves whose pages are open."""
 
 import threading
@@ -7,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.dashboard.heard.live_strip import LiveStrip
-from valve_friction_ros.dashboard.heard.valve_view import Sources
+from valve_friction_ros.dashboard.live_state import Sources
+from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import watched
@@ -18,8 +27,6 @@ from valve_friction_ros.nodes.plumbing.raw_samples import (
     readable,
 )
 from valve_friction_ros.outside_text import printable
-
-__all__ = ["WatchedSignals"]
 
 _SPAN = 60.0
 """Seconds of signal that are shown."""
@@ -35,7 +42,7 @@ class _Watch:
     def follow(self, node: PolledNode, sources: Sources) -> None:
         """Subscribe to the topics of the valve, anew where they have changed."""
         if sources != self.sources:
-            self.end(node)
+            self.end()
             self.sources, self.strip.trouble = sources, ""
             if sources.pressure_topic and sources.stem_topic:
                 self._begin(node)
@@ -47,20 +54,20 @@ class _Watch:
             try:
                 made = PolledSubscription(node, kind, topic, watched(), raw=True)
             except Exception as error:  # noqa: BLE001 - rclpy's, where the name is none of a topic
-                self._destroy(node)
+                self._destroy()
                 about = printable(str(error).partition("\n")[0], 200)
                 self.strip.trouble = f"{printable(topic, 100)!r} cannot be subscribed to: {about}"
                 return
             self.streams += (made,)
 
-    def _destroy(self, node: PolledNode) -> None:
+    def _destroy(self) -> None:
         for stream in self.streams:
-            node.destroy_subscription(stream.subscription)
+            stream.end()
         self.streams = ()
 
-    def end(self, node: PolledNode) -> None:
+    def end(self) -> None:
         """End the subscriptions."""
-        self._destroy(node)
+        self._destroy()
         self.sources = Sources()
 
     def take(self) -> None:
@@ -113,13 +120,20 @@ class WatchedSignals:
             if watch.lookers <= 0:
                 self._dropped.append(self._watches.pop(node))
 
+    def rest(self) -> None:
+        """Unsubscribe from all, until the next step; in the node's thread."""
+        with self._lock:
+            watches = [*self._watches.values()]
+        for watch in watches:
+            watch.end()
+
     def step(self, node: PolledNode) -> None:
         """Subscribe, take and unsubscribe; in the node's thread."""
         with self._lock:
             watches, dropped = dict(self._watches), self._dropped
             self._dropped = []
         for watch in dropped:
-            watch.end(node)
+            watch.end()
         for name, watch in watches.items():
             watch.follow(node, self._sources_of(name))
             watch.take()

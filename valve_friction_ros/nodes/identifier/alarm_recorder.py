@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A bag, and the page of the report, of the time before and after a rise of the level."""
 
 import contextlib
@@ -11,8 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from rclpy.node import Node
 
+from valve_friction_ros import history as database
 from valve_friction_ros.health import FrictionMonitor, Level
-from valve_friction_ros.history import AlarmRecording, keep_alarm_recording
+from valve_friction_ros.history import AlarmRecording
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_folder import (
     PAGE,
@@ -23,22 +33,12 @@ from valve_friction_ros.nodes.identifier.alarm_folder import (
 )
 from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
 from valve_friction_ros.nodes.identifier.report_service import ReportWriter
-from valve_friction_ros.nodes.identifier.service_parameters import (
-    ALARM_FOLDER,
-    ALARM_MEGABYTES,
-    ALARM_PAUSE,
-    ALARM_RECORDING,
-    ALARM_RECORDINGS,
-)
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, valve_name
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc_second
-
-__all__ = ["AlarmRecorder"]
 
 _LATE = 1.0
 """Time, s, for which samples may be late before a recording ends without them."""
@@ -78,7 +78,7 @@ class AlarmRecorder:
     ) -> None:
         self._node, self._monitor, self._history = node, monitor, history
         self._reports, self._worker = reports, worker
-        given = node.get_parameter(ALARM_FOLDER.name).value
+        given = node.get_parameter("alarm_folder").value
         self._folder = OutputFolder(given, "alarms", "an alarm's recording")
         self._level: Level | None = None
         self._rise: _Rise | None = None
@@ -118,14 +118,14 @@ class AlarmRecorder:
 
     def _risen(self, level: Level, message: str, names: StreamNames) -> None:
         last, now = self._last_rise, time.monotonic()
-        if self._parameter(ALARM_RECORDING.name) <= 0:
+        if self._parameter("alarm_recording") <= 0:
             return
         if self._rise is not None:
             level = max(level, self._rise.level)
             self._rise = self._rise._replace(level=level, message=message)
             self._last_rise = level, self._rise.clock
             return
-        pause = self._parameter(ALARM_PAUSE.name)
+        pause = self._parameter("alarm_pause")
         if last is not None and now - last[1] < pause and level <= last[0]:
             return
         buffer, stamp = self._monitor.buffer, self._node.get_clock().now().nanoseconds
@@ -136,7 +136,7 @@ class AlarmRecorder:
 
     def _is_over(self, rise: _Rise) -> bool:
         """Whether the time after a rise is over: by the stamps, or else by the machine's clock."""
-        after = min(self._parameter(ALARM_RECORDING.name), self._monitor.settings.window)
+        after = min(self._parameter("alarm_recording"), self._monitor.settings.window)
         before, newest = rise.newest, self._monitor.buffer.newest_stamp
         if before is not None and newest is not None and newest - before >= nanoseconds(after):
             return True
@@ -166,7 +166,7 @@ class AlarmRecorder:
                 if size > room:
                     remove_recording(path)
                     raise RefusalError(
-                        f"a bag of {size / 1e6:.3g} MB has no room in {ALARM_MEGABYTES.name} "
+                        f"a bag of {size / 1e6:.3g} MB has no room in alarm_megabytes "
                         f"({room / 1e6:g}): raise it"
                     )
                 remove_oldest(folder, valve, most, room, new=path)
@@ -189,7 +189,7 @@ class AlarmRecorder:
                 write(page)
                 if size_of(path) > room:
                     page.unlink()
-                    return f"{page} has no room in {ALARM_MEGABYTES.name}: raise it"
+                    return f"{page} has no room in alarm_megabytes: raise it"
                 remove_oldest(path.parent, valve, most, room, new=path)
             except OSError as error:
                 return f"{page} was not written: {error.strerror or error}"
@@ -199,8 +199,8 @@ class AlarmRecorder:
 
     def _bounds(self) -> tuple[int, float]:
         """Return how many recordings stay, and their room, bytes."""
-        most = int(self._parameter(ALARM_RECORDINGS.name))
-        return most, 1e6 * self._parameter(ALARM_MEGABYTES.name)
+        most = int(self._parameter("alarm_recordings"))
+        return most, 1e6 * self._parameter("alarm_megabytes")
 
     def _settle(self) -> None:
         """Take the outcome of what was written, if it has ended."""
@@ -236,8 +236,8 @@ class AlarmRecorder:
 
     def _keep(self, recording: AlarmRecording) -> None:
         """Keep in the history that the alarm was recorded."""
-        valve, days = self._history.valve, self._parameter(HISTORY_DAYS.name)
-        keep = partial(keep_alarm_recording, valve=valve, one=recording, days=days)
+        valve, days = self._history.valve, self._parameter("history_days")
+        keep = partial(database.keep_alarm_recording, valve=valve, one=recording, days=days)
         self._history.keep_soon(keep)
 
 

@@ -1,23 +1,47 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Changes of a valve's level, as alerts to a webhook."""
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from valve_friction_ros.alerts import URL_VARIABLE, Alert, AlertSender, Secrets, Webhook
-from valve_friction_ros.health import Diagnosis, Finding, Level, StatusSignal, leading_ratio
-from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.service_parameters import (
-    WEBHOOK_PERIOD,
-    WEBHOOK_URL,
+from valve_friction_ros.alerts import URL_VARIABLE, Alert, Secrets, Webhook
+from valve_friction_ros.health import (
+    Alarm,
+    AlarmKind,
+    AlarmState,
+    Diagnosis,
+    Finding,
+    Level,
+    StatusSignal,
+    leading_ratio,
 )
-
-__all__ = ["Alerts"]
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.identifier.workers import Workers
 
 _NE_107 = "NE 107"
+
+
+def webhook_from(url: str) -> Webhook | None:
+    """Return the webhook of the parameter's value, else of the environment; None for none.
+
+    Raises ValueError if its address, or the token in the environment, cannot be used.
+    """
+    webhook = Webhook.at(url) if url else Webhook.from_environment()
+    if webhook is not None:
+        Secrets.from_environment()
+    return webhook
 
 
 class Alerts:
@@ -32,13 +56,13 @@ class Alerts:
     def __init__(
         self,
         node: Node,
-        sender: AlertSender,
+        workers: Workers,
         history: HistoryWriter,
         level: Level,
         webhook: Webhook | None,
     ) -> None:
         self._node, self._history, self._webhook = node, history, webhook
-        self._outbox = sender.outbox()
+        self._outbox, self._desk = workers.alerts.outbox(), workers.digest
         self._outbox.address(webhook)
         if (
             webhook is not None
@@ -46,31 +70,53 @@ class Alerts:
         ):
             node.get_logger().warning(
                 f"no token is sent to {webhook}, as that of the environment goes only to the "
-                f"address of {URL_VARIABLE}: name the address there, not by {WEBHOOK_URL.name}"
+                f"address of {URL_VARIABLE}: name the address there, not by webhook_url"
             )
         self._kept = history.told_level()
         self._told = level if self._kept is None else self._kept
         self._told_at = -math.inf if self._kept is None else time.monotonic()
 
     def follow(
-        self, status: DiagnosticStatus, diagnosis: Diagnosis, findings: Sequence[Finding]
+        self,
+        status: DiagnosticStatus,
+        diagnosis: Diagnosis,
+        findings: Sequence[Finding],
+        alarms: Mapping[AlarmKind, Alarm],
+        beside: Level = Level.OK,
     ) -> None:
         """Post the level of a status if it has changed; then add to it what became of alerts.
 
         The level rests on the diagnosis of the friction, and on what else is found on the valve.
+        While an alarm is shelved, or out of service, the level is that of the other alarms, and of
+        what has none (`beside`): nobody is told again of what somebody has shelved.
 
         What is wrong with the alerts themselves raises the level afterwards, and is not posted.
         """
         if self._webhook is None:
             return
-        level, period = Level(status.level[0]), self._node.get_parameter(WEBHOOK_PERIOD.name).value
+        level = Level(status.level[0])
+        if any(one.state.is_suppressed for one in alarms.values()):
+            told = (one.condition.level for one in alarms.values() if one.is_told)
+            level = min(level, max([beside, *told]))
+        period = self._node.get_parameter("webhook_period").value
         if self._kept is None:
             self._keep(self._told)
         now = time.monotonic()
         if level != self._told and now - self._told_at >= period:
-            self._outbox.put(self._alert(status, level, leading_ratio(diagnosis, findings, level)))
+            self._outbox.put(
+                self._alert(status, level, leading_ratio(diagnosis, findings, level), alarms)
+            )
             self._told, self._told_at = level, now
+        self._put_digest(alarms)
         self._mark(status, str(self._webhook))
+
+    def _put_digest(self, alarms: Mapping[AlarmKind, Alarm]) -> None:
+        """Give the alarms to the digest; the first valve that finds it due posts it for all."""
+        hour = self._node.get_parameter("webhook_digest").value
+        valve = self._history.valve.tag, self._node.get_fully_qualified_name()
+        letter = self._desk.hear(self._webhook, hour, valve, alarms, time.time())
+        if letter is not None:
+            self._outbox.put(letter)
 
     def _keep(self, level: Level) -> None:
         """Keep the level that was told last, unless it is kept."""
@@ -78,7 +124,13 @@ class Alerts:
             self._kept = level
             self._history.keep_told_level(level)
 
-    def _alert(self, status: DiagnosticStatus, level: Level, ratio: float) -> Alert:
+    def _alert(
+        self,
+        status: DiagnosticStatus,
+        level: Level,
+        ratio: float,
+        alarms: Mapping[AlarmKind, Alarm],
+    ) -> Alert:
         values = {entry.key: entry.value for entry in status.values}
         return Alert(
             valve=self._history.valve.tag,
@@ -88,6 +140,11 @@ class Alerts:
             ne_107=values[_NE_107],
             message=status.message,
             friction_ratio=ratio,
+            alarms={
+                kind.value: one.state.value
+                for kind, one in alarms.items()
+                if one.state is not AlarmState.NORMAL
+            },
         )
 
     def _mark(self, status: DiagnosticStatus, place: str) -> None:

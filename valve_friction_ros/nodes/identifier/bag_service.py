@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """``~/save``: the identifier's buffer as a bag."""
 
 import shutil
@@ -8,9 +17,8 @@ from pathlib import Path
 from rclpy.node import Node
 
 from valve_friction_ros.health import FrictionMonitor
-from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.identification import STATED, RefusalError
 from valve_friction_ros.model import Valve
-from valve_friction_ros.nodes.identifier.parameters import SAVE_FOLDER, SAVE_MEGABYTES
 from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import (
     OutputFolder,
@@ -18,12 +26,10 @@ from valve_friction_ros.nodes.plumbing.output_folder import (
     require_room,
     valve_name,
 )
-from valve_friction_ros.records.bags.libraries import bag_libraries
+from valve_friction_ros.records.bags.storage import bag_libraries
 from valve_friction_ros.records.bags.topics import StreamNames
-from valve_friction_ros.records.valve_keys import SETTINGS
+from valve_friction_ros.settings import IDENTIFICATION
 from valve_friction_ros.streams import Snapshot
-
-__all__ = ["BagSaver", "bag_writer"]
 
 
 class BagSaver:
@@ -34,7 +40,7 @@ class BagSaver:
 
     def __init__(self, node: Node, monitor: FrictionMonitor) -> None:
         self._node, self._monitor = node, monitor
-        given = node.get_parameter(SAVE_FOLDER.name).value
+        given = node.get_parameter("save_folder").value
         self._folder = OutputFolder(given, "saved", "a bag")
 
     async def saved(self, names: StreamNames, worker: ThreadPoolExecutor) -> Path:
@@ -45,7 +51,7 @@ class BagSaver:
         """
         node, valve = self._node, valve_name(self._node)
         name = file_name(node, node.get_clock().now().nanoseconds)
-        room = 1e6 * node.get_parameter(SAVE_MEGABYTES.name).value
+        room = 1e6 * node.get_parameter("save_megabytes").value
         snapshot, settings = self._monitor.input()
         write_into = bag_writer(node, settings.valve, names)
 
@@ -72,7 +78,9 @@ def bag_writer(
     RefusalError if the libraries that bags need are not there or the snapshot is empty, and
     OSError.
     """
-    described = {name: node.get_parameter(name).value for name in SETTINGS}
+    names_of = (*(one.name for one in IDENTIFICATION), *STATED)
+    described = {name: node.get_parameter(name).value for name in names_of}
+    described = {name: value for name, value in described.items() if value is not None}
 
     def write(folder: Path, name: str, snapshot: Snapshot, replaced: Path | None) -> Path:
         # Costs memory and time at the start, and most nodes never save.

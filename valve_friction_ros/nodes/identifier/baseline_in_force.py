@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The baseline in force: parameter, services and history all set it here."""
 
 import contextlib
@@ -7,22 +16,27 @@ from collections.abc import Callable, Iterable
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from valve_friction_ros.health import Baseline, Diagnosis, Finding, FrictionMonitor, Level
+from valve_friction_ros.health import (
+    Baseline,
+    BaselineLack,
+    BaselineRefusalError,
+    Diagnosis,
+    Finding,
+    FrictionMonitor,
+    Lack,
+    Level,
+    lack_of_moves,
+)
 from valve_friction_ros.history import KeptBaseline
+from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import (
-    BASELINE,
-    BASELINE_IN_ALARM,
-    baseline_from,
-)
-from valve_friction_ros.nodes.plumbing.parameters import values_of
+from valve_friction_ros.nodes.identifier.parameters import baseline_from
 from valve_friction_ros.streams import utc_minute
 
-__all__ = ["BaselineInForce"]
-
 _RESTORE = "restore_baseline"
+_PARAMETER = "baseline_coulomb_friction"
 
 
 def _value(baseline: Baseline | None) -> float | None:
@@ -55,13 +69,16 @@ class BaselineInForce:
         self._evidence = evidence
         self._level = level
 
+    def _given(self) -> Baseline | None:
+        return baseline_from(self._node.get_parameter(_PARAMETER).value)
+
     def begin(self) -> None:
         """Take the baseline of the parameter, or else of the history, and log which."""
         kept = self._history.baseline
-        self._monitor.baseline = baseline_from(values_of(self._node, (BASELINE,)))
+        self._monitor.baseline = self._given()
         given, log = self._monitor.baseline, self._node.get_logger()
         if given is not None:
-            source = f"from the parameter {BASELINE.name}"
+            source = f"from the parameter {_PARAMETER}"
             if kept is not None:
                 source += f"; the history's is not used: {_described_with_date(kept)}"
             log.info(f"baseline {given}, {source}")
@@ -114,24 +131,50 @@ class BaselineInForce:
         if last.baseline != self._monitor.baseline:
             raise RefusalError(
                 f"the baseline of the last ~/set_baseline ({last.baseline}) is not in force any "
-                f"more: set {BASELINE.name}, or call ~/set_baseline"
+                f"more: set {_PARAMETER}, or call ~/set_baseline"
             )
         self._require_no_alarm()
         return await self._change(self._history.replaced_now(last, _RESTORE, self._level()))
 
-    def _require_no_alarm(self) -> None:
+    def values(self) -> dict[str, str]:
+        """Return whether `set` would set a baseline now, and what is missing to it, if not.
+
+        A refused identification leaves the result before it, which may still serve.
+        """
+        lacks = self._monitor.baseline_lacks()
+        if lacks and (of_moves := lack_of_moves(self._evidence.evidence)) is not None:
+            lacks = (*lacks, of_moves)
+        else:
+            lacks = ()
+        if self._forbidding() is not None:
+            lacks = (*lacks, BaselineLack("valve", Lack.HEALTH))
+        values = {"baseline_possible": str(not lacks).lower()}
+        for one in lacks:
+            values[f"baseline_lacks {one.of}"] = one.lack.name
+            if one.lack is Lack.PRECISION:
+                values[f"baseline_lacks {one.of} share [%]"] = number_text(100 * one.share)
+                values[f"baseline_lacks {one.of} largest [%]"] = number_text(100 * one.largest)
+        return values
+
+    def _forbidding(self) -> Diagnosis | Finding | None:
+        """Return the alarm in which no baseline may be set; None without one."""
         found: list[Diagnosis | Finding] = [
             self._monitor.diagnosis(),
             *self._monitor.findings,
             *self._evidence.findings(),
         ]
         worst = max(found, key=lambda one: one.level)
-        allowed = self._node.get_parameter(BASELINE_IN_ALARM.name).value
-        if worst.level >= Level.WARN and not allowed:
-            raise RefusalError(
+        allowed = self._node.get_parameter("baseline_in_alarm").value
+        return worst if worst.level >= Level.WARN and not allowed else None
+
+    def _require_no_alarm(self) -> None:
+        worst = self._forbidding()
+        if worst is not None:
+            raise BaselineRefusalError(
                 f"the valve is in {worst.level.name}, which another baseline may hide "
                 f"({worst.message}): repair it and identify again, or set "
-                f"{BASELINE_IN_ALARM.name} to true if the valve is healthy, and call again"
+                "baseline_in_alarm to true if the valve is healthy, and call again",
+                BaselineLack("valve", Lack.HEALTH),
             )
 
     async def _change(self, kept: KeptBaseline, source: str = "") -> str:
@@ -141,6 +184,8 @@ class BaselineInForce:
             f"baseline: {kept.in_force or 'none'}; before: {kept.replaced or 'none'}"
             f"{self._history.reservation}{source}"
         )
+        if kept.in_force is not None and (remark := kept.in_force.remark):
+            answer = f"{answer}; {remark}"
         self._node.get_logger().info(answer)
         return answer
 
@@ -148,13 +193,13 @@ class BaselineInForce:
         """Compare with this baseline from now on."""
         value = _value(baseline)
         shown = math.nan if value is None else value
-        self._node.set_parameters([Parameter(BASELINE.name, value=shown)])
+        self._node.set_parameters([Parameter(_PARAMETER, value=shown)])
         self._monitor.baseline = baseline  # after the node has followed the parameter
 
     def follow_parameter(self, changes: Iterable[Parameter]) -> None:
         """Follow a change of the parameter, unless its value is in force already."""
-        if BASELINE.name not in {one.name for one in changes}:
+        if _PARAMETER not in {one.name for one in changes}:
             return
-        given = baseline_from(values_of(self._node, (BASELINE,)))
+        given = self._given()
         if given is None or _value(given) != _value(self._monitor.baseline):
             self._monitor.baseline = given

@@ -1,10 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Why commands of the stem cannot be used."""
 
 import math
 
 from valve_friction_ros.health import Finding, Level, StatusSignal
-
-__all__ = ["CommandTrouble"]
+from valve_friction_ros.wording import Code, said
 
 _PATIENCE = 60.0
 """Time, s, for which commands come, and none can be used, before it is found."""
@@ -40,5 +48,5 @@ class CommandTrouble:
         """Return a finding where commands have come for a minute, and none could be used."""
         if not self._last - self._first >= _PATIENCE:
             return []
-        message = f"no command of stem_command can be used: {self._problem}"
-        return [Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, message)]
+        unusable = said(Code.COMMANDS_UNUSABLE, problem=self._problem)
+        return [Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, unusable)]

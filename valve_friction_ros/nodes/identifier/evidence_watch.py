@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The evidence of the moves in service: gathered, kept in the history, shown, and judged."""
 
 import math
@@ -9,6 +18,7 @@ from rclpy.node import Node
 
 from valve_friction_ros.evidence import Evidence, MoveStream, evidence_of
 from valve_friction_ros.health import (
+    OF_ONE_RESULT,
     Baseline,
     Diagnosis,
     Finding,
@@ -21,16 +31,15 @@ from valve_friction_ros.health import (
     reference_by_evidence,
     why_not_compared,
 )
+from valve_friction_ros.history.status_values import number_text, ratio_values
 from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
-from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.nodes.plumbing.worker import Worker
 from valve_friction_ros.streams import Arrivals, utc_second
-
-__all__ = ["EvidenceWatch"]
+from valve_friction_ros.wording import Code, said, sentence
 
 _COMBINE_EVERY = 300_000_000_000
 """Nanoseconds of stamps from one combination to the next: thousands of moves take 0.05 s."""
@@ -65,6 +74,11 @@ class EvidenceWatch:
         return self._evidence
 
     @property
+    def diagnosis(self) -> Diagnosis | None:
+        """The diagnosis by the moves; None where there is nothing to compare."""
+        return self._diagnosis()
+
+    @property
     def source(self) -> str:
         """What the evidence is of, in words."""
         return (
@@ -93,7 +107,9 @@ class EvidenceWatch:
             if self._job is before:
                 self._job, self._combined = None, newest  # what was under way is older
             self._use(found)
-        return replace(baseline_by_evidence(self._evidence), numbers=self._monitor.known.numbers)
+        known = self._monitor.known.numbers
+        numbers = {name: one for name, one in known.items() if name not in OF_ONE_RESULT}
+        return replace(baseline_by_evidence(self._evidence), numbers=numbers)
 
     async def outdates(self, time: int) -> bool:
         """Return whether the moves since a time, ns, alone could be a baseline."""
@@ -136,15 +152,15 @@ class EvidenceWatch:
         diagnosis = self._diagnosis()
         if diagnosis is None or diagnosis.level < Level.WARN or diagnosis.state.is_uncertain:
             return ()
-        message, leads = diagnosis.message, self._leads(diagnosis)
+        statement, leads = diagnosis.statement, self._leads(diagnosis)
         if not leads:
-            message += f" (until {utc_second(self._evidence.until)}, before that identification)"
+            statement = said(Code.UNTIL_BEFORE, of=statement, time=self._evidence.until)
         ratio = math.nan if diagnosis.ratio is None else diagnosis.ratio.value
         return (
             Finding(
                 diagnosis.level,
                 diagnosis.status_signal,
-                message,
+                statement,
                 leads=leads,
                 friction_ratio=ratio,
             ),
@@ -174,7 +190,7 @@ class EvidenceWatch:
         else:
             values |= self._numbers()
             if reason := why_not_compared(found, self._monitor.baseline):
-                values["evidence reason"] = reason
+                values["evidence reason"] = sentence(reason)
         if (reference := self._ledger.reference) is not None:
             values["evidence reference [N]"] = number_text(reference.sliding.value)
             values["evidence reference half width [N]"] = number_text(reference.sliding.half_width)

@@ -1,11 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Whether the history file is still the one that the node began with, and the node's alone."""
 
 import time
 from pathlib import Path
 
-from valve_friction_ros.history.claim import Claim
-
-__all__ = ["HistoryGuard"]
+from valve_friction_ros.history.place import Claim
 
 _HANDOVER = 10.0
 """Time, s, for which a node that ends may still hold the history."""

@@ -1,14 +1,25 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The server that a valve's history goes to, as its diagnostics and log tell of it."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rclpy.node import Node
 
-from valve_friction_ros.history import KeptValve, Sender, sender_of, server_from
-from valve_friction_ros.nodes.identifier.parameters import HISTORY_FILE, HISTORY_URL
+from valve_friction_ros import history as database
+from valve_friction_ros.history import KeptValve, server_from
 from valve_friction_ros.streams import utc_second
 
-__all__ = ["HistorySending"]
+if TYPE_CHECKING:
+    from valve_friction_ros.history import Sender
 
 
 class HistorySending:
@@ -21,14 +32,12 @@ class HistorySending:
         self._node, self._valve = node, valve
         self._untaken: str | None = None
         self._sender: Sender | None = None
-        server = server_from(node.get_parameter(HISTORY_URL.name).value, HISTORY_URL.name)
+        server = server_from(node.get_parameter("history_url").value, "history_url")
         if server is None:
             return
         if path is None:
-            raise ValueError(
-                f"{HISTORY_URL.name} needs {HISTORY_FILE.name}, where rows wait for the server"
-            )
-        self._sender = sender_of(path, server)
+            raise ValueError("history_url needs history_file, where rows wait for the server")
+        self._sender = database.sender_of(path, server)
 
     def take(self) -> None:
         """Take the rows of the valve, where another machine has kept them; wait some seconds."""

@@ -1,17 +1,30 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The history of the plant, as the identifier writes it, and reads it at the start."""
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from rclpy.node import Node
 
-from valve_friction_ros.evidence import Change, Move
+from valve_friction_ros import history as database
+from valve_friction_ros.evidence import FrictionChange, Move
 from valve_friction_ros.health import (
+    Alarm,
+    AlarmKind,
     Baseline,
     FrictionMonitor,
     IdentificationInput,
@@ -23,34 +36,23 @@ from valve_friction_ros.history import (
     AlarmRecording,
     HistoryEntry,
     HistoryError,
-    HistoryFile,
     KeptBaseline,
     KeptValve,
     Trend,
     ValveHistory,
-    alarm_recordings,
-    current_trend,
     entry_of,
-    keep_told_level,
-    read_answers,
-    read_change,
-    read_moves,
-    read_reference,
-    read_told_level,
-    read_usage,
-    valve_histories,
 )
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_guard import HistoryGuard
 from valve_friction_ros.nodes.identifier.history_sending import HistorySending
-from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, HISTORY_FILE
 from valve_friction_ros.nodes.identifier.waiting_changes import WaitingChanges
+from valve_friction_ros.nodes.identifier.workers import HistoryThread
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
-from valve_friction_ros.nodes.plumbing.worker import Worker
-from valve_friction_ros.response import Move as CommandAnswer
+from valve_friction_ros.response import StepAnswer
 from valve_friction_ros.usage import ValveUsage
 
-__all__ = ["HistoryWriter"]
+if TYPE_CHECKING:
+    from valve_friction_ros.history import HistoryFile
 
 _LONGEST = 60.0
 """Time, s, after which a writing that has not ended is a problem; a busy file ends it sooner."""
@@ -60,33 +62,36 @@ _T = TypeVar("_T")
 
 
 class HistoryWriter:
-    """Writes to the history in a thread of its own, so that no slow disk holds up the node.
+    """Writes to the history in another thread, so that no slow disk holds up the node.
 
     What could not be written waits, and is tried again with what comes next.
     """
 
-    def __init__(self, node: Node, monitor: FrictionMonitor, tag: str) -> None:
+    def __init__(
+        self, node: Node, monitor: FrictionMonitor, tag: str, writer: HistoryThread
+    ) -> None:
         self._node = node
         self._monitor = monitor
         self._valve = KeptValve(node.get_fully_qualified_name(), tag)
-        path = node.get_parameter(HISTORY_FILE.name).value
+        path = node.get_parameter("history_file").value
         try:
-            self._file = HistoryFile(Path(path).expanduser()) if path else None
+            self._file = database.HistoryFile(Path(path).expanduser()) if path else None
         except RuntimeError as error:  # pathlib's
             raise ValueError(
-                f"{HISTORY_FILE.name} {path}: {error} Set HOME or ROS_HOME, or name another file"
+                f"history_file {path}: {error} Set HOME or ROS_HOME, or name another file"
             ) from None
         self._guard = None
         if self._file is not None:
             self._guard = HistoryGuard(self._file.path, self._valve.name)
         self._sending = HistorySending(node, self.path, self._valve)
-        self._writer = Worker("history", finishes=True)
+        self._writer = writer
         self._waiting = WaitingChanges()
         self._problem: str | None = None
         self._trend: Trend | None = None
         self._baseline: KeptBaseline | None = None
         self._former: KeptBaseline | None = None
         self._under_way: list[Future[None]] = []
+        self._look: Future[None] | None = None
 
     @property
     def valve(self) -> KeptValve:
@@ -124,7 +129,7 @@ class HistoryWriter:
         """Return what the diagnostics say: that nothing is kept, or how it goes to a server."""
         if self._file is not None:
             return self._sending.values()
-        lost = f"none, as {HISTORY_FILE.name} is empty: diagnosis and baseline end with this node"
+        lost = "none, as history_file is empty: diagnosis and baseline end with this node"
         return {"history": lost}
 
     @property
@@ -147,7 +152,7 @@ class HistoryWriter:
         """
         if self._file is None:
             return None
-        histories = valve_histories(self._file, (self._valve,), 0, _END_OF_TIME)
+        histories = database.valve_histories(self._file, (self._valve,), 0, _END_OF_TIME)
         return histories[0] if histories else None
 
     @property
@@ -162,7 +167,7 @@ class HistoryWriter:
         Returns the last success, if any.
         """
         name = self._valve.name
-        self._tried(HistoryFile.prepare)
+        self._tried(lambda file: file.prepare())
         if self._guard is not None:
             self._guard.ask()
             self._guard.note()
@@ -182,7 +187,7 @@ class HistoryWriter:
         """Compute the trend with the baseline and settings of now."""
         self._trend = self._tried(self._trend_job())
 
-    def _tried(self, job: Callable[[HistoryFile], _T]) -> _T | None:
+    def _tried(self, job: Callable[["HistoryFile"], _T]) -> _T | None:
         """Do a job on the file, if there is one; of several problems the first is reported."""
         if self._file is None:
             return None
@@ -199,7 +204,7 @@ class HistoryWriter:
         """Keep the identification that the monitor has just accepted, or why it was refused."""
         monitor, now = self._monitor, self._node.get_clock().now().nanoseconds
         found = monitor.stamp if refusal is None else None
-        days = self._node.get_parameter(HISTORY_DAYS.name).value
+        days = self._node.get_parameter("history_days").value
         with self._failures_remembered():
             entry = entry_of(monitor, self._valve, *identified, found or now, refusal)
             await self._written(lambda file: file.add(entry, days), identification=True)
@@ -245,53 +250,78 @@ class HistoryWriter:
 
     def usage(self) -> ValveUsage | None:
         """Read what the valve has done; None without a file, or where it cannot be read."""
-        return self._tried(lambda file: read_usage(file, self._valve.name))
+        return self._tried(lambda file: database.read_usage(file, self._valve.name))
 
     def told_level(self) -> Level | None:
         """Read the level that was told last, if any."""
-        return self._tried(lambda file: read_told_level(file, self._valve.name))
+        return self._tried(lambda file: database.read_told_level(file, self._valve.name))
 
     def keep_told_level(self, level: Level) -> None:
         """Keep the level that was told last, soon."""
         valve = self._valve
-        self.keep_soon(lambda file: keep_told_level(file, valve, level))
+        self.keep_soon(lambda file: database.keep_told_level(file, valve, level))
+
+    def alarms(self) -> dict[AlarmKind, Alarm]:
+        """Read the alarms of the valve; none without a file, or where it cannot be read."""
+        return self._tried(lambda file: database.read_alarms(file, self._valve.name)) or {}
+
+    def alarm_news(self) -> dict[AlarmKind, Alarm]:
+        """Return alarms of the valve that have changed in the file, also by another process."""
+        if self._file is None:
+            return {}
+        feed = database.alarm_feed(self._file.path)
+        if self._look is not None and self._look.done():
+            with contextlib.suppress(HistoryError):  # writing says what is wrong
+                self._look.result()
+            self._look = None
+        if self._look is None and feed.is_due(time.monotonic()):
+            self._look = self._writer.submit(feed.look)
+        return feed.take(self._valve.name)
 
     def last_alarm(self) -> AlarmRecording | None:
         """Read the latest recording of an alarm, if any.
 
         Those of a time to come, from before the clock went back, are the latest if all are.
         """
-        found = self._tried(lambda file: alarm_recordings(file, self._valve.name)) or ()
+        found = self._tried(lambda file: database.alarm_recordings(file, self._valve.name)) or ()
         now = self._node.get_clock().now().nanoseconds
         past = [one for one in found if one.time <= now]
         return max(past or found, key=lambda one: one.time, default=None)
 
-    async def keep_change(self, change: Callable[[HistoryFile], None]) -> None:
+    async def keep_change(self, change: Callable[["HistoryFile"], None]) -> None:
         """Make a change in the writer's thread, and wait until it is written."""
         with self._failures_remembered():
             await self._written(change)
 
+    async def keep_step(self, change: Callable[["HistoryFile"], None]) -> None:
+        """Make a change like `keep_change`, which leaves the trend as it is."""
+        if self._file is None:
+            return
+        self._waiting.add(change)
+        with self._failures_remembered():
+            await done_in(self._writer, self._write_waiting, self._file, time.monotonic())
+
     def moves(self) -> tuple[Move, ...]:
         """Read the moves of the valve in service; none without a file."""
         built = self._monitor.settings.valve
-        return self._tried(lambda file: read_moves(file, self._valve.name, built)) or ()
+        return self._tried(lambda file: database.read_moves(file, self._valve.name, built)) or ()
 
     def reference(self) -> Reference | None:
         """Read what the moves of the valve said first; None without a file."""
         built = self._monitor.settings.valve
-        return self._tried(lambda file: read_reference(file, self._valve.name, built))
+        return self._tried(lambda file: database.read_reference(file, self._valve.name, built))
 
-    def change(self) -> Change | None:
+    def change(self) -> FrictionChange | None:
         """Read the last change of friction that the moves showed; None without a file."""
         built = self._monitor.settings.valve
-        return self._tried(lambda file: read_change(file, self._valve.name, built))
+        return self._tried(lambda file: database.read_change(file, self._valve.name, built))
 
-    def answers(self) -> tuple[CommandAnswer, ...]:
+    def answers(self) -> tuple[StepAnswer, ...]:
         """Read the answers of the stem to its command; none without a file."""
         travel = self._monitor.settings.valve.travel
-        return self._tried(lambda file: read_answers(file, self._valve.name, travel)) or ()
+        return self._tried(lambda file: database.read_answers(file, self._valve.name, travel)) or ()
 
-    def keep_soon(self, change: Callable[[HistoryFile], None]) -> None:
+    def keep_soon(self, change: Callable[["HistoryFile"], None]) -> None:
         """Make a change in the writer's thread, and do not wait; `settle` takes its outcome.
 
         A change that waits already is not made twice.
@@ -301,7 +331,9 @@ class HistoryWriter:
         self._waiting.add(change)
         # A job that has begun may have looked for the last time.
         if all(one.running() or one.done() for one in self._under_way):
-            self._under_way.append(self._writer.submit(self._write_waiting, self._file))
+            self._under_way.append(
+                self._writer.submit(self._write_waiting, self._file, time.monotonic())
+            )
 
     def settle(self) -> None:
         """Take the outcomes of `keep_soon` that are there, and claim what was not granted."""
@@ -312,21 +344,22 @@ class HistoryWriter:
             with self._failures_remembered():
                 self._under_way.pop(0).result()
 
-    def _trend_job(self) -> Callable[[HistoryFile], Trend | None]:
+    def _trend_job(self) -> Callable[["HistoryFile"], Trend | None]:
         """Return what computes the trend with the baseline and settings of now, in any thread."""
         monitor, name = self._monitor, self._valve.name
         return partial(
-            current_trend, valve=name, baseline=monitor.baseline, settings=monitor.settings
+            database.current_trend, valve=name, baseline=monitor.baseline, settings=monitor.settings
         )
 
     async def _written(
-        self, change: Callable[[HistoryFile], None], identification: bool = False
+        self, change: Callable[["HistoryFile"], None], identification: bool = False
     ) -> None:
         """Write a change, and what waits since before; then compute the trend."""
         if self._file is None:
             return
         self._waiting.add(change, identification)
-        self._trend = await done_in(self._writer, self._write, self._file, self._trend_job())
+        job = (self._file, time.monotonic(), self._trend_job())
+        self._trend = await done_in(self._writer, self._write, *job)
 
     @contextlib.contextmanager
     def _failures_remembered(self) -> Iterator[None]:
@@ -343,21 +376,22 @@ class HistoryWriter:
             self._complain(error)
 
     def _write(
-        self, file: HistoryFile, trend: Callable[[HistoryFile], Trend | None]
+        self, file: "HistoryFile", asked: float, trend: Callable[["HistoryFile"], Trend | None]
     ) -> Trend | None:
-        """Write, in the writer's thread, all that waits."""
-        self._write_waiting(file)
+        """Write, in the writer's thread, all that waits; asked for at a time (monotonic, s)."""
+        self._write_waiting(file, asked)
         return trend(file)
 
-    def _write_waiting(self, file: HistoryFile) -> None:
+    def _write_waiting(self, file: "HistoryFile", asked: float) -> None:
         if self._guard is None or self._waiting.first() is None:
             return
-        if self._guard.is_another:
-            self._keep_again(file)
-        self._write_all(file)
+        with self._writer.writing(file.path, asked):
+            if self._guard.is_another:
+                self._keep_again(file)
+            self._write_all(file)
         self._guard.note()
 
-    def _keep_again(self, file: HistoryFile) -> None:
+    def _keep_again(self, file: "HistoryFile") -> None:
         """Keep the baseline in force where the file was removed, or another one has none."""
         name, kept = self._valve.name, self._baseline
         told = "its baseline counts after a restart"
@@ -369,7 +403,7 @@ class HistoryWriter:
             f"is gone; {told}"
         )
 
-    def _write_all(self, file: HistoryFile) -> None:
+    def _write_all(self, file: "HistoryFile") -> None:
         while (change := self._waiting.first()) is not None:
             change(file)
             self._waiting.remove(change)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """One identification at a time, in its thread, and what becomes of its result."""
 
 from rclpy.node import Node
@@ -6,15 +15,12 @@ from valve_friction_ros.health import (
     FrictionMonitor,
     IdentificationInput,
     RefusedRecordError,
-    identify_snapshot,
+    identify_with_numbers,
 )
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.identifier.parameters import INPUT_TIMEOUT
 from valve_friction_ros.nodes.identifier.results import NumberTopics
+from valve_friction_ros.nodes.identifier.workers import Workers
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
-from valve_friction_ros.nodes.plumbing.worker import Worker
-
-__all__ = ["Identification"]
 
 
 class Identification:
@@ -25,9 +31,9 @@ class Identification:
     """
 
     def __init__(
-        self, node: Node, monitor: FrictionMonitor, results: NumberTopics, worker: Worker
+        self, node: Node, monitor: FrictionMonitor, results: NumberTopics, workers: Workers
     ) -> None:
-        self._node, self._monitor, self._results, self._worker = node, monitor, results, worker
+        self._node, self._monitor, self._results, self._workers = node, monitor, results, workers
         self._is_running = False
         self._until: int | None = None
         self._last_stamps: tuple[int | None, int | None] = (None, None)
@@ -50,7 +56,7 @@ class Identification:
     def _require_recent(self) -> None:
         """Refuse a record of which a signal has ended longer ago than it may be silent."""
         longest = max(
-            self._monitor.settings.window, self._node.get_parameter(INPUT_TIMEOUT.name).value
+            self._monitor.settings.window, self._node.get_parameter("input_timeout").value
         )
         now = self._node.get_clock().now().nanoseconds
         for name, came, stamp in zip(
@@ -92,8 +98,16 @@ class Identification:
         self._is_running = True
         try:
             with bugs_reported(self._node, known=self._monitor.internal_error):
-                result = await done_in(self._worker, identify_snapshot, *record)
-                self._monitor.accept(result, self._node.get_clock().now().nanoseconds)
+                workers = self._workers
+                result, numbers = await done_in(
+                    workers.identify,
+                    workers.apart.done,
+                    identify_with_numbers,
+                    record.snapshot,
+                    record.settings,
+                )
+                now = self._node.get_clock().now().nanoseconds
+                self._monitor.accept(result, now, numbers)
                 self._results.publish(result, self._monitor)
                 message = self._monitor.diagnosis().message
                 self._node.get_logger().info(f"identified: {message}")

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Changes of a valve's level and faults of its data: each begin and each end is logged once."""
 
 from collections.abc import Mapping
@@ -6,8 +15,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from valve_friction_ros.health import Level
-
-__all__ = ["FaultLog", "LevelLog"]
+from valve_friction_ros.wording import Statement, sentence
 
 _CALM = 10.0
 """Time, s, without a fault after which it is logged as over. Chosen: one that comes and goes is
@@ -45,16 +53,16 @@ class FaultLog:
 
     def __init__(self, node: Node) -> None:
         self._log = node.get_logger()
-        self._begun: dict[str, float] = {}
-        self._seen: dict[str, float] = {}
-        self._repeated: dict[str, int] = {}
+        self._begun: dict[Statement, float] = {}
+        self._seen: dict[Statement, float] = {}
+        self._repeated: dict[Statement, int] = {}
 
-    def follow(self, faults: Mapping[str, str], now: float) -> None:
-        """Take the faults of now: what is wrong, in words that do not change, and one sentence."""
-        for what, sentence in faults.items():
+    def follow(self, faults: Mapping[Statement, Statement], now: float) -> None:
+        """Take the faults of now: what is wrong, which does not change, and all of it."""
+        for what, statement in faults.items():
             if what not in self._begun:
                 self._begun[what] = now
-                self._log.warning(sentence)
+                self._log.warning(sentence(statement))
             self._seen[what] = now
         for what in [one for one, seen in self._seen.items() if now - seen >= _CALM]:
             again = self._repeated.pop(what, 0)
@@ -62,8 +70,8 @@ class FaultLog:
             times = f", {again} times more" if again else ""
             self._log.info(f"over after {lasted:.0f} s{times}: {what}")
 
-    def note(self, what: str, sentence: str, now: float) -> None:
+    def note(self, what: Statement, statement: Statement, now: float) -> None:
         """Take what happens at an instant; a repetition soon after it belongs to the same fault."""
         if what in self._begun:
             self._repeated[what] = self._repeated.get(what, 0) + 1
-        self.follow({what: sentence}, now)
+        self.follow({what: statement}, now)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The moves of the valve and their reference: held here, and kept in the history."""
 
 import time
@@ -5,31 +14,26 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 from rclpy.node import Node
 
+from valve_friction_ros import history as database
 from valve_friction_ros.evidence import (
     MOST_MOVES,
-    Change,
     Evidence,
+    FrictionChange,
     Move,
-    lies_behind_those_ahead,
+    is_clock_reset,
     stamp_problem,
 )
 from valve_friction_ros.health import Reference, reference_by_evidence
-from valve_friction_ros.history import (
-    HistoryFile,
-    KeptValve,
-    forget_moves_after,
-    keep_change,
-    keep_moves,
-    keep_reference,
-)
+from valve_friction_ros.history import KeptValve
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS
 
-__all__ = ["MoveLedger"]
+if TYPE_CHECKING:
+    from valve_friction_ros.history import HistoryFile
 
 _WRITE_EVERY = 5.0
 """Time between two writings, s. A killed node loses so much, and a move that has not ended."""
@@ -52,8 +56,8 @@ class _Batch:
     days: float
     is_written: bool = False
 
-    def __call__(self, file: HistoryFile) -> None:
-        keep_moves(file, self.valve, self.built, self.moves, self.days)
+    def __call__(self, file: "HistoryFile") -> None:
+        database.keep_moves(file, self.valve, self.built, self.moves, self.days)
         self.is_written = True
 
 
@@ -70,7 +74,7 @@ class MoveLedger:
         self._batch: _Batch | None = None
         self._written_at = time.monotonic()
         self.reference: Reference | None = history.reference()
-        self.change: Change | None = history.change()
+        self.change: FrictionChange | None = history.change()
         self.left_out = 0
         self._left_in_a_row = 0
         self._problem = ""
@@ -94,7 +98,7 @@ class MoveLedger:
             if problem := stamp_problem(move, self.newest or None, now):
                 self._leave_out(problem)
                 # A recording that is played tells nothing of the clock.
-                if clock.ros_time_is_active or not lies_behind_those_ahead(move, self.newest, now):
+                if clock.ros_time_is_active or not is_clock_reset(move, self.newest, now):
                     self._behind.clear()
                     continue
                 self._behind.append(move)
@@ -125,7 +129,7 @@ class MoveLedger:
             while kept and kept[-1].end > begin:
                 kept.pop()
         self._batch = None
-        change = partial(forget_moves_after, valve=self._history.valve, time=begin)
+        change = partial(database.forget_moves_after, valve=self._history.valve, time=begin)
         self._history.keep_soon(change)
         self._node.get_logger().warning(
             f"the clock was ahead, and has been set back: {count - len(self._moves)} kept moves in "
@@ -153,16 +157,23 @@ class MoveLedger:
         if self.reference is not None:
             valve = self._history.valve
             self._history.keep_soon(
-                partial(keep_reference, valve=valve, built=self._built, reference=self.reference)
+                partial(
+                    database.keep_reference,
+                    valve=valve,
+                    built=self._built,
+                    reference=self.reference,
+                )
             )
 
-    def note_change(self, change: Change | None) -> None:
+    def note_change(self, change: FrictionChange | None) -> None:
         """Keep a change of friction in place of the one before; None leaves that."""
         if change in (None, self.change):
             return
         self.change = change
         self._history.keep_soon(
-            partial(keep_change, valve=self._history.valve, built=self._built, change=change)
+            partial(
+                database.keep_change, valve=self._history.valve, built=self._built, change=change
+            )
         )
 
     def use(self, built: Valve) -> None:
@@ -199,7 +210,7 @@ class MoveLedger:
 
     def _written_with(self, built: Valve) -> None:
         if self._unwritten:
-            days = self._node.get_parameter(HISTORY_DAYS.name).value
+            days = self._node.get_parameter("history_days").value
             self._batch = _Batch(self._history.valve, built, tuple(self._unwritten), days)
             self._unwritten.clear()
             self._history.keep_soon(self._batch)

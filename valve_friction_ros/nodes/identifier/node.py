@@ -1,10 +1,18 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Node `identifier`: watches one valve and identifies its friction on demand."""
 
 import math
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -14,6 +22,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from valve_friction_ros.health import (
+    AlarmKind,
     Finding,
     FrictionMonitor,
     Level,
@@ -21,8 +30,9 @@ from valve_friction_ros.health import (
     by_severity,
 )
 from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
-from valve_friction_ros.nodes.identifier.alerts import Alerts
+from valve_friction_ros.nodes.identifier.alerts import Alerts, webhook_from
 from valve_friction_ros.nodes.identifier.bag_service import BagSaver
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
@@ -31,12 +41,6 @@ from valve_friction_ros.nodes.identifier.identification import Identification
 from valve_friction_ros.nodes.identifier.level_log import FaultLog, LevelLog
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
-    CLOCK_TOLERANCE,
-    IDENTIFICATION_LIMIT,
-    INPUT_TIMEOUT,
-    NUMBER_TOPICS,
-    PARAMETERS,
-    VALVE_TAG,
     monitor_settings,
     require_valid,
 )
@@ -44,7 +48,6 @@ from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
 from valve_friction_ros.nodes.identifier.schedule import Schedule
-from valve_friction_ros.nodes.identifier.service_parameters import WEBHOOK_URL, webhook_from
 from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     estimate_status,
@@ -58,92 +61,92 @@ from valve_friction_ros.nodes.identifier.watch import Watch
 from valve_friction_ros.nodes.identifier.whole_valve import WholeValve
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError
+from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
     reject_invalid,
     values_of,
     warn_of_columns,
 )
-from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
-from valve_friction_ros.nodes.plumbing.valve_parameters import JOINT
+from valve_friction_ros.settings import NODES
 from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
-
-__all__ = ["PARAMETERS", "Identifier", "main"]
+from valve_friction_ros.wording import Code, Statement, said, sentence
 
 _DIAGNOSTIC_PERIOD = 1.0
-_CLEARED = "the buffer is cleared as stamps go back"
+_PROCESSES = 1
+"""Processes of the executable that identify, at most."""
+_CLEARED = said(Code.CLEARED_AS_STAMPS_GO_BACK)
 _TELLING = "diagnostics"
 
 
-class Identifier(PolledNode):
+class Identifier(ManagedNode):
     """Gathers pressure and stem position, identifies them on request, publishes the diagnosis.
 
     The identification runs in a thread of its own on a copy of the buffer, while the executor
     goes on; its callback awaits it, so the executor's thread alone touches the monitor.
 
+    Add it to any executor of rclpy. Raises rclpy's exceptions for a parameter of the wrong type or
+    range, and ValueError for one that breaks a rule.
+
     Parameters
     ----------
-    workers : Workers
-        Its threads, which identifiers of one process share.
+    workers : Workers, optional
+        Its threads, which identifiers of one process share; its own, if there are none.
     namespace : str, optional
         Namespace of the valve, where it is not given by a ROS argument.
-    number_topics : bool, optional
-        Default of the parameter of this name.
     **named
-        What else `PolledNode` takes.
+        What else `rclpy.node.Node` takes, such as `context` and `parameter_overrides`.
     """
 
     def __init__(
         self,
-        workers: Workers,
+        workers: Workers | None = None,
         namespace: str | None = None,
-        number_topics: bool = True,
         **named: Any,
     ) -> None:
         super().__init__("identifier", namespace=namespace, **named)
         try:
-            self._build(workers, number_topics)
+            declare_parameters(self, NODES["identifier"])
+            reject_invalid(self, CHANGEABLE, require_valid)
+            self.add_post_set_parameters_callback(self._take_parameters)
+            self._shared_workers = workers
+            self._status_name = f"{self.get_fully_qualified_name()}: friction"
+            self._tag = self.get_parameter("valve_tag").value or self.get_namespace().strip("/")
         except BaseException:
-            self._abandon()
+            super().destroy_node()
             raise
+        self.begin()
 
-    def _abandon(self) -> None:
-        """Leave the graph, and the history to others, where the node cannot start."""
-        if (history := getattr(self, "_history", None)) is not None:
-            history.close()
-        self.destroy_node()
-
-    def _build(self, workers: Workers, number_topics: bool) -> None:
-        own = replace(NUMBER_TOPICS, default=number_topics)
-        declare_parameters(self, [own if one is NUMBER_TOPICS else one for one in PARAMETERS])
+    def configure(self) -> None:
+        """Build all that watches the valve, from the parameters."""
+        workers = self._shared_workers or self.opened.enter_context(running_workers())
+        self._workers = workers
         warn_of_columns(self)
         values = values_of(self, CHANGEABLE)
         require_valid(values)
-        reject_invalid(self, CHANGEABLE, require_valid)
-        webhook = webhook_from(self.get_parameter(WEBHOOK_URL.name).value)
-        self._workers = workers
+        webhook = webhook_from(self.get_parameter("webhook_url").value)
         self._monitor = FrictionMonitor(monitor_settings(values))
         self._bags = BagSaver(self, self._monitor)
-        tag = self.get_parameter(VALVE_TAG.name).value or self.get_namespace().strip("/")
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        joint = self.get_parameter(JOINT.name).value
+        joint = self.get_parameter("joint").value
         self._quality = DataQuality(self._monitor.settings.valve)
         self._fault_log = FaultLog(self)
         self._inputs = ValveInputs(self, joint, self._take_samples, self._drop_damaged)
         pressure, stem, _ = self._inputs.names
         self._readiness = Readiness(self, workers.identify, f"identifies {pressure} and {stem}")
-        self._status_name = f"{self.get_fully_qualified_name()}: friction"
         self._level_log = LevelLog(self)
-        self._estimate_topic = EstimateTopic(self)
+        self._estimate_topic = EstimateTopic(self, self.get_parameter("estimate_topic").value)
         results = NumberTopics(self)
-        self._identification = Identification(self, self._monitor, results, workers.identify)
+        self._identification = Identification(self, self._monitor, results, workers)
         self._schedule = Schedule(self, self._identify_as_scheduled, ReentrantCallbackGroup())
-        self._history = HistoryWriter(self, self._monitor, tag)
+        self._history = HistoryWriter(self, self._monitor, self._tag, workers.history)
+        self.opened.callback(self._history.close)
         earlier = self._history.prepare()
         self._evidence = EvidenceWatch(self, self._monitor, self._history, workers.evidence)
+        self.opened.callback(self._evidence.close)
         self._baseline = BaselineInForce(
             self, self._monitor, self._history, self._evidence, self._level
         )
@@ -153,23 +156,31 @@ class Identifier(PolledNode):
             results.publish(earlier, self._monitor)
         self._history.read_trend()
         self._usage = UsageWatch(self, self._monitor, self._history)
+        self.opened.callback(self._usage.close)
         self._monitor.renew(self._usage.usage().renewal)
         self._response = ResponseWatch(self, self._monitor, self._history)
+        self.opened.callback(self._response.close)
         self._reports = ReportWriter(
-            self, self._monitor, self._history, self._usage, self._response
+            self, self._monitor, self._history, self._usage, self._response, workers.apart
         )
         self._alarm = AlarmRecorder(
             self, self._monitor, self._history, self._reports, workers.files
         )
+        whole_valve, standstill = WholeValve(self._monitor), StandstillWatch(self._monitor)
         self._watches: tuple[Watch, ...] = (
-            WholeValve(self._monitor),
-            StandstillWatch(self._monitor),
+            whole_valve,
+            standstill,
             self._evidence,
             self._usage,
             self._response,
         )
-        self._alerts = Alerts(self, workers.alerts, self._history, self._level(), webhook)
-        self.add_post_set_parameters_callback(self._take_parameters)
+        self._watch_of: dict[AlarmKind, Watch] = {
+            AlarmKind.WHOLE_VALVE: whole_valve,
+            AlarmKind.STUCK: standstill,
+            AlarmKind.POSITIONER: self._response,
+        }
+        self._board = AlarmBoard(self, self._monitor, self._history, self._evidence)
+        self._alerts = Alerts(self, workers, self._history, self._level(), webhook)
         for name, work, failure in (
             ("identify", self._identify, ""),
             ("save", self._save, "the buffer was not saved"),
@@ -182,20 +193,13 @@ class Identifier(PolledNode):
             create_trigger_service(self, f"~/{name}", work, failure)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may never come, or stand still
         self.create_timer(_DIAGNOSTIC_PERIOD, self._tell, clock=steady)
-        self._jump_handle = self.get_clock().create_jump_callback(
+        jumps = self.get_clock().create_jump_callback(
             JumpThreshold(
                 min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True
             ),
-            post_callback=self._on_time_jump,
+            post_callback=self.exclusive(self._on_time_jump),
         )
-
-    def close(self) -> None:
-        """Stop the clock's callback, and write what waits."""
-        self._jump_handle.unregister()
-        self._usage.close()
-        self._evidence.close()
-        self._response.close()
-        self._history.close()
+        self.opened.callback(jumps.unregister)
 
     def poll(self) -> None:
         """Take the samples that have arrived."""
@@ -204,7 +208,9 @@ class Identifier(PolledNode):
 
     def overdue(self) -> str | None:
         """Say that the work under way has not ended within its limit, if so."""
-        limit = self.get_parameter(IDENTIFICATION_LIMIT.name).value
+        if not self.is_configured:
+            return None
+        limit = self.get_parameter("identification_limit").value
         identify = self._workers.identify
         busy, thread = max(
             (0.0 if identify.is_preparing else identify.busy_for(), "identifications"),
@@ -215,14 +221,16 @@ class Identifier(PolledNode):
             return None
         return (
             f"the thread of {thread} has not ended its work for {busy:.0f} s, beyond "
-            f"{IDENTIFICATION_LIMIT.name} ({limit:g} s): restart the node"
+            f"identification_limit ({limit:g} s): restart the node"
         )
 
     def stuck_status(self, problem: str) -> DiagnosticStatus:
         """Return the status of a valve that nobody monitors."""
-        return stuck_status(self._status_name, self._history.valve.tag, problem)
+        return stuck_status(self._status_name, self._tag, problem)
 
     def _take_samples(self, arrivals: Arrivals) -> None:
+        if not self.is_active:
+            return
         arrivals = self._monitor.buffer.in_order(arrivals)
         intake = self._monitor.buffer.add_arrivals(arrivals)
         self._identification.follow()
@@ -238,10 +246,12 @@ class Identifier(PolledNode):
 
     def _judge(self, arrivals: Arrivals, intake: Intake) -> None:
         now = self.get_clock().now().nanoseconds  # 0: simulated time has not begun
-        tolerance = self.get_parameter(CLOCK_TOLERANCE.name).value
+        tolerance = self.get_parameter("clock_tolerance").value
         self._quality.see(arrivals, intake, time.monotonic(), now or None, tolerance)
 
     def _take_parameters(self, changes: list[Parameter]) -> None:
+        if not self.is_configured:
+            return
         self._inputs.take(is_all=True)
         self._monitor.change_settings(monitor_settings(values_of(self, CHANGEABLE)))
         self._quality.valve = self._monitor.settings.valve
@@ -251,12 +261,13 @@ class Identifier(PolledNode):
         self._schedule.follow()
 
     def _on_time_jump(self, jump: TimeJump) -> None:
-        cause = f"ROS time jumped by {jump.delta.nanoseconds / 1e9:.3g} s"
+        cause = said(Code.TIME_JUMPED, seconds=jump.delta.nanoseconds / 1e9)
         self._inputs.take(is_all=True)
         self._monitor.buffer.clear(cause)
         self._quality.forget_stamps()
         self._evidence.forget_samples()
-        self._fault_log.note("ROS time jumps", f"{cause}: the buffer was cleared", time.monotonic())
+        cleared = said(Code.BUFFER_CLEARED, because=cause)
+        self._fault_log.note(said(Code.TIME_JUMPS), cleared, time.monotonic())
 
     async def _identify(self) -> str:
         """Identify the buffer, and keep the result or the refusal; return the diagnosis."""
@@ -328,7 +339,7 @@ class Identifier(PolledNode):
 
     async def _clear(self) -> str:
         self._inputs.take(is_all=True)
-        self._monitor.buffer.clear("on request")
+        self._monitor.buffer.clear(said(Code.CLEARED_ON_REQUEST))
         self._evidence.forget_samples()
         return "the buffer is empty; estimate and baseline are kept"
 
@@ -345,10 +356,10 @@ class Identifier(PolledNode):
         clock = self.get_clock()
         if clock.ros_time_is_active and not clock.now().nanoseconds:
             return ["no time on /clock, though use_sim_time is set: play a clock, or unset it"]
-        return self._inputs.problems(self.get_parameter(INPUT_TIMEOUT.name).value)
+        return self._inputs.problems(self.get_parameter("input_timeout").value)
 
-    def _faults(self) -> dict[str, str]:
-        """Return what is wrong with the data: in words that do not change, and one sentence.
+    def _faults(self) -> dict[Statement, Statement]:
+        """Return what is wrong with the data, and all that is to be said of it.
 
         A recording that is played has stamps of its own.
         """
@@ -357,7 +368,7 @@ class Identifier(PolledNode):
         if any(one.is_of_clock for one in found) and self._inputs.is_played():
             found = self._quality.faults(now, is_played=True)
         valve, joint = self._quality.valve, self._inputs.names.joint
-        return {one.what: one.message(valve, joint) for one in found}
+        return {one.what: one.statement(valve, joint) for one in found}
 
     def _data_values(self) -> dict[str, str]:
         """Return how long no sample of each input could be used."""
@@ -399,19 +410,27 @@ class Identifier(PolledNode):
         self._history.settle()
         found = {watch: watch.findings() for watch in self._watches}
         findings = [finding for some in found.values() for finding in some]
+        faults = self._faults()
+        unusable = [*self._silence(), *map(sentence, faults.values())]
+        self._board.follow(
+            {kind: found[watch] for kind, watch in self._watch_of.items()},
+            [*unusable, *map(str, filter(None, [self._monitor.refusals_problem]))],
+            self._usage.usage().renewal,
+            time.monotonic(),
+        )
         estimate = estimate_status(
             self._monitor,
             self._status_name,
             self._history.valve.tag,
             findings,
             self._history.trend,
+            self._board.values(),
         )
         self._estimate_topic.publish(estimate)
         del found[self._usage]  # the life of a packing, which no samples show
         level = self._worst(finding for some in found.values() for finding in some)
         self._alarm.follow(level, estimate.message, self._inputs.names)
-        faults = self._faults()
-        unusable = [*self._silence(), *faults.values()]
+        upkeep = [*self._history.problems, *filter(None, [self._history.conflict])]
         status = friction_status(
             estimate,
             self._monitor,
@@ -420,11 +439,12 @@ class Identifier(PolledNode):
                 *filter(None, [self.overdue()]),
                 *self._evidence.problems,
                 *unusable,
-                *filter(None, [self._monitor.refusals_problem]),
+                *map(str, filter(None, [self._monitor.refusals_problem])),
             ],
-            [*self._history.problems, *filter(None, [self._history.conflict])],
+            upkeep,
             {
                 **{key: value for one in self._watches for key, value in one.values().items()},
+                **self._baseline.values(),
                 **self._alarm.values(),
                 **self._inputs.values(),
                 **self._history.values(),
@@ -437,7 +457,14 @@ class Identifier(PolledNode):
         )
         if failures := (*self.failures, *self._evidence.failures):
             fail(status, failures)
-        self._alerts.follow(status, self._monitor.diagnosis(), findings)
+        beside = self._usage.findings()
+        self._alerts.follow(
+            status,
+            self._monitor.diagnosis(),
+            findings,
+            self._board.alarms,
+            max([Level.OK, *(one.level for one in beside), *[Level.WARN] * bool(upkeep)]),
+        )
         self._level_log.follow(status)
         self._fault_log.follow(faults, time.monotonic())
         if self._readiness.is_slow:
@@ -447,7 +474,7 @@ class Identifier(PolledNode):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node."""
-    with running_workers() as workers:
+    with running_workers(_PROCESSES) as workers:
         return run_node(lambda: Identifier(workers), arguments)
 
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """``~/report``: a page on the identifier's last result."""
 
 from collections.abc import Callable
@@ -10,7 +19,6 @@ from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.history import HistoryError, ValveHistory
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import REPORT_FOLDER, SAVE_MEGABYTES
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.plumbing.background import done_in
@@ -22,9 +30,8 @@ from valve_friction_ros.nodes.plumbing.output_folder import (
     require_room,
     valve_name,
 )
+from valve_friction_ros.nodes.plumbing.processes import ThisProcess, imported
 from valve_friction_ros.streams import utc
-
-__all__ = ["ReportWriter"]
 
 
 class ReportWriter:
@@ -40,10 +47,12 @@ class ReportWriter:
         history: HistoryWriter,
         usage: UsageWatch,
         response: ResponseWatch,
+        apart: ThisProcess,
     ) -> None:
-        self._node, self._monitor, self._history = node, monitor, history
+        self._node, self._apart = node, apart
+        self._monitor, self._history = monitor, history
         self._usage, self._response = usage, response
-        given = node.get_parameter(REPORT_FOLDER.name).value
+        given = node.get_parameter("report_folder").value
         self._folder = OutputFolder(given, "reports", "a report")
 
     async def written(self, worker: ThreadPoolExecutor) -> Path:
@@ -53,7 +62,7 @@ class ReportWriter:
         """
         write_page = self.of_now()
         valve, name = valve_name(self._node), file_name(self._node, self._monitor.stamp or 0)
-        room = 1e6 * self._node.get_parameter(SAVE_MEGABYTES.name).value
+        room = 1e6 * self._node.get_parameter("save_megabytes").value
 
         def write() -> Path:
             with self._folder.opened() as folder:
@@ -91,27 +100,26 @@ class ReportWriter:
         usage_limits = self._usage.limits()
 
         def write(path: Path) -> None:
-            # Costs memory and time at the start, and most nodes never report.
-            from valve_friction_ros import reports  # noqa: PLC0415
-
             before, unread = _read(history)
-            record = reports.IdentifiedRecord(
-                name=title,
-                source=f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
-                dated=f"identified {time:%Y-%m-%d %H:%M} UTC",
-                result=result,
-                baseline=baseline,
-                limits=limits,
-                valve_limits=valve_limits,
-                known=known,
-                notes=(*notes, *unread),
-                healthy=healthy,
-                history=before,
-                usage=usage,
-                usage_limits=usage_limits,
-                response=response,
-            )
-            reports.write_report(reports.identification_report(record), path)
+            facts = {
+                "name": title,
+                "source": f"node {node_name}, identified {time:%Y-%m-%d %H:%M:%S} UTC",
+                "dated": f"identified {time:%Y-%m-%d %H:%M} UTC",
+                "result": result,
+                "baseline": baseline,
+                "limits": limits,
+                "valve_limits": valve_limits,
+                "known": known,
+                "notes": (*notes, *unread),
+                "healthy": healthy,
+                "history": before,
+                "usage": usage,
+                "usage_limits": usage_limits,
+                "response": response,
+            }
+            # Its libraries cost memory, and most nodes never report.
+            room = "valve_friction_ros.reports"
+            self._apart.done(imported, room, "write_identification_report", path, facts)
             give_back_memory()
 
         return write

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The answer of the stem to ``stem_command``, watched in service."""
 
 import math
@@ -12,26 +21,22 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from valve_friction_ros import history as database
 from valve_friction_ros.health import Finding, FrictionMonitor, dead_band
-from valve_friction_ros.history import keep_answers
 from valve_friction_ros.nodes.identifier.command_trouble import CommandTrouble
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.parameters import HISTORY_DAYS, INPUT_TIMEOUT
-from valve_friction_ros.nodes.identifier.service_parameters import (
-    COMMAND_UNIT,
-    RESPONSE_LIMITS,
-    TRAVEL,
-    response_limits,
-)
-from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
-from valve_friction_ros.nodes.plumbing.parameters import values_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream
 from valve_friction_ros.nodes.plumbing.raw_samples import positions_in, readable
-from valve_friction_ros.response import SIZES, Move, ResponseMonitor, ResponseSummary, found
+from valve_friction_ros.response import (
+    SIZES,
+    ResponseLimits,
+    ResponseMonitor,
+    ResponseSummary,
+    StepAnswer,
+    response_findings,
+)
 from valve_friction_ros.streams import Arrivals, Kind, Samples, utc_second
-
-__all__ = ["ResponseWatch"]
 
 _SILENCE = 1.0
 """Time without messages, s, after which the quality of service is suspected."""
@@ -51,8 +56,9 @@ class ResponseWatch:
 
     def __init__(self, node: Node, monitor: FrictionMonitor, history: HistoryWriter) -> None:
         self._node, self._friction, self._history = node, monitor, history
-        self._polled = PolledSubscription(node, JointState, "stem_command", stream(), raw=True)
-        self._input = InputWatch(node, self._polled.subscription)
+        self._polled = PolledSubscription(
+            node, JointState, "stem_command", stream(), raw=True, is_optional=True
+        )
         self._drop()
         self._monitor: ResponseMonitor | None = None
         self._travel = math.nan
@@ -62,8 +68,8 @@ class ResponseWatch:
         self._trouble = CommandTrouble()
         self._standing = self._wrong = ""
 
-    def _begin(self, earlier: Sequence[Move] = ()) -> ResponseMonitor:
-        self._travel = float(self._value(TRAVEL))
+    def _begin(self, earlier: Sequence[StepAnswer] = ()) -> ResponseMonitor:
+        self._travel = self._friction.settings.valve.travel
         self._monitor = ResponseMonitor(self._travel, earlier)
         return self._monitor
 
@@ -97,7 +103,6 @@ class ResponseWatch:
         messages = self._polled.take()
         if not messages:
             return
-        self._input.arrived()
         try:
             found_in = positions_in([one.message for one in messages], "")
         except RuntimeError:
@@ -105,7 +110,8 @@ class ResponseWatch:
             found_in = positions_in([one.message for one in kept], "")
         given = found_in.samples(Kind.POSITION)
         given = Samples(*(part[np.isfinite(given.values)] for part in given))
-        travel, unit = float(self._value(TRAVEL)), self._value(COMMAND_UNIT.name)
+        travel = self._friction.settings.valve.travel
+        unit = self._value("command_unit")
         wrong = ""
         metres = given.values
         good: NDArray[np.bool_] = np.zeros(metres.size, np.bool_)
@@ -132,7 +138,7 @@ class ResponseWatch:
 
     def _work(self) -> None:
         """Hand on what was gathered; another travel, or an empty gathering, begins anew."""
-        travel = float(self._value(TRAVEL))
+        travel = self._friction.settings.valve.travel
         if travel != self._travel:
             self.close()
         if not math.isfinite(travel):
@@ -165,10 +171,12 @@ class ResponseWatch:
         """Write what is not written yet; the writer's thread finishes it."""
         self._written_at = monotonic()
         if self._monitor is not None and (moves := self._monitor.drain()):
-            days = self._node.get_parameter(HISTORY_DAYS.name).value
+            days = self._node.get_parameter("history_days").value
             valve = self._history.valve
             self._history.keep_soon(
-                partial(keep_answers, valve=valve, travel=self._travel, moves=moves, days=days)
+                partial(
+                    database.keep_answers, valve=valve, travel=self._travel, moves=moves, days=days
+                )
             )
 
     def findings(self) -> Sequence[Finding]:
@@ -176,8 +184,12 @@ class ResponseWatch:
         self._follow_publishers()
         findings = self._trouble.findings()
         if self._monitor is not None:
-            limits = response_limits(values_of(self._node, RESPONSE_LIMITS))
-            findings += found(
+            limits = ResponseLimits(
+                self._value("deviation_limit") / 100,
+                self._value("dead_time_limit"),
+                self._value("t86_limit"),
+            )
+            findings += response_findings(
                 self._monitor.summary, limits, self._monitor.hunting, self._dead_band()
             )
         return findings
@@ -189,10 +201,10 @@ class ResponseWatch:
 
     def _follow_publishers(self) -> None:
         """Follow another quality of service; forget a command that nobody gives any more."""
-        silence = self._input.silence()
+        silence = self._polled.watch.silence()
         if silence > _SILENCE:
             self._polled.follow_publishers()
-        is_silent = silence > self._value(INPUT_TIMEOUT.name)
+        is_silent = silence > self._value("input_timeout")
         if not is_silent or self._input_is_offered():
             return
         self._trouble.forget()
@@ -200,7 +212,7 @@ class ResponseWatch:
             self._monitor.forget()
 
     def _input_is_offered(self) -> bool:
-        return bool(self._node.count_publishers(self._input.topic))
+        return bool(self._node.count_publishers(self._polled.topic))
 
     def values(self) -> Mapping[str, str]:
         """Return the figures of the latest moves."""

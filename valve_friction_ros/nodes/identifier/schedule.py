@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Periodic identification, and the reason of the last one that was skipped."""
 
 from collections.abc import Awaitable, Callable
@@ -5,10 +14,6 @@ from collections.abc import Awaitable, Callable
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.timer import Timer
-
-from valve_friction_ros.nodes.identifier.parameters import PERIOD
-
-__all__ = ["Schedule"]
 
 
 class Schedule:
@@ -31,7 +36,7 @@ class Schedule:
 
     def follow(self) -> None:
         """Follow the parameter."""
-        period = self._node.get_parameter(PERIOD.name).value
+        period = self._node.get_parameter("period").value
         if period == self._period:
             return
         if self._timer is not None:

@@ -1,109 +1,43 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The diagnostic status of a monitored valve."""
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from types import MappingProxyType
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from valve_friction_ros.health import (
-    Baseline,
     Diagnosis,
     Finding,
     FrictionMonitor,
     Level,
     StatusSignal,
+    Survey,
     by_severity,
     dead_band,
     dead_band_half_width,
 )
 from valve_friction_ros.history import Trend
+from valve_friction_ros.history.status_values import (
+    baseline_values,
+    exact_time,
+    ratio_values,
+    result_values,
+    trend_values,
+)
 from valve_friction_ros.identification import SLIDING
-from valve_friction_ros.nodes.identifier.value_texts import number_text, ratio_values
-from valve_friction_ros.streams import utc, utc_day, utc_minute
+from valve_friction_ros.wording import Code, said, sentence
 
-__all__ = ["estimate_status", "fail", "friction_status", "stuck_status", "trend_values"]
-
-
-_EVIDENCE_UNITS = {
-    "threshold": " [m/s]",
-    "samples": "",
-    "sigma": " [N]",
-    "r_squared": "",
-    "averaged_samples": "",
-}
-
-
-def _result_values(shown: Mapping[str, Any], band: float, half_width: float) -> dict[str, str]:
-    """Return what the diagnostic shows of a result, or of what is kept of one, as `to_dict`.
-
-    The dead band and half its interval's width are shares of the travel.
-    """
-    values: dict[str, str] = {}
-    for name, parameter in shown["parameters"].items():
-        unit = parameter["unit"]
-        values[f"{name} [{unit}]"] = number_text(parameter["value"])
-        values[f"{name} half width [{unit}]"] = number_text(parameter["half_width"])
-        values[f"{name} verdict"] = parameter["verdict"]
-        if parameter["reason"]:
-            values[f"{name} reason"] = parameter["reason"]
-        if parameter["published"] is not None:
-            values[f"{name} published [{unit}]"] = number_text(parameter["published"])
-    values["sliding_speed [m/s]"] = number_text(shown["sliding_speed"])
-    if math.isfinite(band):
-        values["dead_band [%]"] = number_text(100 * band)
-        values["dead_band half width [%]"] = number_text(100 * half_width)
-    if shown["rms"] is not None:
-        values["fit [%]"] = number_text(100 * shown["fit"])
-        values["rms [µm]"] = number_text(1e6 * shown["rms"])
-    if shown["systematic_misfit"] is not None:
-        values["systematic misfit [µm]"] = number_text(1e6 * shown["systematic_misfit"])
-    values["method"] = shown["method"]
-    if shown.get("derivative_window"):
-        values["derivative_window [samples]"] = str(shown["derivative_window"])
-    for name, unit in _EVIDENCE_UNITS.items():
-        if name in shown.get("evidence", {}):
-            values[name + unit] = number_text(shown["evidence"][name])
-    settings = shown["settings"]
-    values["fixed"] = ", ".join(settings.get("identification", settings).get("fixed", ()))
-    values["warnings"] = "; ".join(shown["warnings"])
-    return values
-
-
-def _baseline_values(baseline: Baseline | None) -> dict[str, str]:
-    values: dict[str, str] = {}
-    if baseline is None:
-        return values
-    if baseline.coulomb_friction is not None:
-        values["baseline_coulomb_friction [N]"] = number_text(baseline.coulomb_friction)
-        values["baseline half width [N]"] = number_text(baseline.half_width)
-    if (sliding := baseline.sliding) is not None:
-        values["baseline_sliding_friction [N]"] = number_text(sliding.value)
-        values["baseline_sliding_friction half width [N]"] = number_text(sliding.half_width)
-        values["baseline_sliding_friction speed [m/s]"] = number_text(sliding.speed)
-    return values
-
-
-def _time(time: int) -> str:
-    """Write a time, ns since 1970, by ISO 8601, as UTC."""
-    return f"{utc(time):%Y-%m-%dT%H:%M:%S.%fZ}"
-
-
-def trend_values(trend: Trend | None) -> dict[str, str]:
-    """Return the values of a drift, if it is significant."""
-    if trend is None or not trend.is_significant:
-        return {}
-    values = {
-        "friction_drift [N/month]": number_text(trend.drift),
-        "friction_drift half width [N/month]": number_text(trend.half_width),
-        "friction_drift of": trend.what,
-    }
-    if trend.crossing is not None:
-        values["limit_expected"] = trend.crossing.limit.value
-        values["limit_expected [date]"] = utc_day(trend.crossing.time)
-        values["limit_expected earliest [date]"] = utc_day(trend.crossing.earliest)
-        values["limit_expected latest [date]"] = utc_day(trend.crossing.latest)
-    return values
+_NO_VALUES: Mapping[str, str] = MappingProxyType({})
 
 
 def estimate_status(
@@ -112,12 +46,13 @@ def estimate_status(
     hardware_id: str,
     findings: Sequence[Finding],
     trend: Trend | None = None,
+    alarms: Mapping[str, str] = _NO_VALUES,
 ) -> DiagnosticStatus:
     """Compose what is known of a valve; the unit of a number is in its key.
 
     It changes only when that does: it has the time of the estimate in place of an age, and nothing
-    of the inputs. What else is found on the valve follows the diagnosis of its friction; the most
-    severe of all sets the level.
+    of the inputs; `alarms` are values, too. What else is found on the valve follows the diagnosis
+    of its friction; the most severe of all sets the level.
     """
     diagnosis, findings = monitor.diagnosis(), by_severity(findings)
     level, signal = diagnosis.level, diagnosis.status_signal
@@ -135,15 +70,18 @@ def estimate_status(
         "NE 107": signal.value,
     }
     if estimate is not None and monitor.stamp is not None:
-        values["estimate_time"] = _time(monitor.stamp)
+        values["estimate_time"] = exact_time(monitor.stamp)
         values["estimate_from"] = "this run" if monitor.earlier is None else "before the restart"
         valve = monitor.settings.valve
-        values |= _result_values(
+        values |= result_values(
             estimate.to_dict(), dead_band(estimate, valve), dead_band_half_width(estimate, valve)
         )
-    values |= _baseline_values(monitor.baseline)
+    values |= baseline_values(monitor.baseline)
     values |= ratio_values(diagnosis.ratio)
+    if diagnosis.survey is not Survey.UNKNOWN:
+        values["survey"] = diagnosis.survey.value
     values |= trend_values(trend)
+    values |= alarms
     message = "; ".join(_sentences(monitor, diagnosis, findings))
     return _status(level, name, hardware_id, message, values)
 
@@ -156,10 +94,10 @@ def _sentences(
     The latest identification comes first, unless a finding on the friction leads: then it is dated.
     """
     leading = [one.message for one in findings if one.leads]
-    told = diagnosis.message
+    told = diagnosis.statement
     if leading and monitor.seen_until is not None:
-        told += f" (identified earlier, {utc_minute(monitor.seen_until)})"
-    return [*leading, told, *(one.message for one in findings if not one.leads)]
+        told = said(Code.DATED_EARLIER, of=told, time=monitor.seen_until)
+    return [*leading, sentence(told), *(one.message for one in findings if not one.leads)]
 
 
 def friction_status(
@@ -196,7 +134,7 @@ def friction_status(
     rejected = monitor.buffer.rejected
     values["samples_rejected"] = str(sum(rejected.values()))
     if rejected:
-        causes = (f"{cause} ({count})" for cause, count in sorted(rejected.items()))
+        causes = sorted(f"{cause} ({count})" for cause, count in rejected.items())
         values["samples_rejected causes"] = "; ".join(causes)
     known = _sentences(monitor, monitor.diagnosis(now, is_watched), by_severity(findings))
     message = "; ".join([*input_problems, *upkeep_problems, *known])

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The usage of the valve: counted from the stem, kept in the history, shown, and limited."""
 
 import contextlib
@@ -5,20 +14,15 @@ import math
 import time
 import uuid
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from rclpy.node import Node
 
+from valve_friction_ros import history as database
 from valve_friction_ros.health import Finding, FrictionMonitor, Level, StatusSignal
-from valve_friction_ros.history import HistoryError, HistoryFile, keep_renewal, keep_usage
-from valve_friction_ros.history.usage_rows import read_usage
+from valve_friction_ros.history import HistoryError
+from valve_friction_ros.history.status_values import number_text
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.identifier.service_parameters import (
-    AIR_TO,
-    COUNTING_DEAD_BAND,
-    REVERSAL_LIMIT,
-    TRAVEL_LIMIT,
-)
-from valve_friction_ros.nodes.identifier.value_texts import number_text
 from valve_friction_ros.streams import Arrivals, Kind, utc_day
 from valve_friction_ros.usage import (
     LimitState,
@@ -32,7 +36,8 @@ from valve_friction_ros.usage import (
     warned_limits,
 )
 
-__all__ = ["UsageWatch"]
+if TYPE_CHECKING:
+    from valve_friction_ros.history import HistoryFile
 
 _WRITE_EVERY = 60.0
 """Time between two writings, s: of the stamps, or of silence. A killed node loses so much."""
@@ -72,7 +77,7 @@ class UsageWatch:
     def follow_parameters(self) -> None:
         """Count with the travel and the dead band in force."""
         travel = self._monitor.settings.valve.travel
-        wanted = travel, float(self._node.get_parameter(COUNTING_DEAD_BAND.name).value)
+        wanted = travel, float(self._node.get_parameter("counting_dead_band").value)
         if wanted == self._counted_with:
             return
         self._gather(is_end=True)
@@ -97,7 +102,7 @@ class UsageWatch:
         """Return the limits that are reached, or will be soon."""
         self._gather()
         return [
-            Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, state.message)
+            Finding(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, state.statement)
             for state in self.limits()
             if state.warns
         ]
@@ -110,7 +115,7 @@ class UsageWatch:
         if self._counter is None:
             return {"usage": "not counted, as the travel is not finite: set travel"}
         used, everything, travel = self._since_renewal, self._total, self._travel
-        at_travel = self._node.get_parameter(AIR_TO.name).value == "close"
+        at_travel = self._node.get_parameter("air_to").value == "close"
         values = {
             "packing_renewed [date]": utc_day(self._renewal) if self._renewal else "not known",
             "travelled_distance [m]": number_text(used.distance),
@@ -127,7 +132,7 @@ class UsageWatch:
         }
         if self._counter.is_raised:
             values["counting_dead_band reason"] = (
-                f"above {COUNTING_DEAD_BAND.name}, as the sensor's noise or resolution demands"
+                "above counting_dead_band, as the sensor's noise or resolution demands"
             )
         if self._earlier is None and self._history.path is not None:
             values["usage"] = "of this run only, as the history cannot be read"
@@ -153,9 +158,9 @@ class UsageWatch:
         self._renewal = now = self._node.get_clock().now().nanoseconds
         self._add_up()  # before others see the new packing, while its renewal is written
 
-        def renew(file: HistoryFile) -> None:
+        def renew(file: "HistoryFile") -> None:
             self._write(file)
-            keep_renewal(file, self._history.valve, now)
+            database.keep_renewal(file, self._history.valve, now)
 
         await self._history.keep_change(renew)
         answer = (
@@ -190,8 +195,8 @@ class UsageWatch:
     @property
     def _limits(self) -> UsageLimits:
         return UsageLimits(
-            self._node.get_parameter(TRAVEL_LIMIT.name).value,
-            self._node.get_parameter(REVERSAL_LIMIT.name).value,
+            self._node.get_parameter("travel_limit").value,
+            self._node.get_parameter("reversal_limit").value,
         )
 
     def _remember_warnings(self) -> None:
@@ -251,13 +256,13 @@ class UsageWatch:
             for key in old:
                 del self._own[key]
 
-    def _write(self, file: HistoryFile) -> None:
+    def _write(self, file: "HistoryFile") -> None:
         """Write, in the writer's thread, what this run has counted since the last writing."""
         valve, rows = self._history.valve, dict(self._unwritten)
         if self._earlier is None and self._found_late is None:
             with contextlib.suppress(HistoryError):
-                self._found_late = read_usage(file, valve.name).condensed()
+                self._found_late = database.read_usage(file, valve.name).condensed()
                 return  # the next writing knows the packing
         days = [UsedDay(day, renewal, usage) for (renewal, day), usage in rows.items()]
-        keep_usage(file, valve, self._run, days)
+        database.keep_usage(file, valve, self._run, days)
         self._written = rows

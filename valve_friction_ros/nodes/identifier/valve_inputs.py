@@ -1,25 +1,33 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The inputs of one valve: two topics of single samples, or one of blocks."""
 
+import math
+import time
 from collections.abc import Callable, Sequence
 
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64MultiArray
 
-from valve_friction_ros.nodes.plumbing.input_watch import InputWatch
 from valve_friction_ros.nodes.plumbing.messages import rows_of
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription, TakenMessage
 from valve_friction_ros.nodes.plumbing.qos import blocks, stream
 from valve_friction_ros.nodes.plumbing.raw_samples import arrivals_of, readable
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Arrivals, Losses, Signal
 
-__all__ = ["ValveInputs"]
-
-
 _SILENCE = 0.5
 """Time without messages, s, after which the quality of service is suspected."""
+_SELDOM = 10.0
+"""Time, s, between two looks for blocks while topics come: each goes through the whole graph."""
 _PLAYER = "rosbag2_player"
 """Name of the node of `ros2 bag play`."""
 
@@ -31,31 +39,14 @@ _LOSS_IS_OVER = 5.0
 """Time without a loss, s, after which losses are over."""
 
 
-class _Input:
-    """One topic: its subscription, and the watch over it."""
+class _Input(PolledSubscription):
+    """One topic, of which messages may be held back."""
 
-    def __init__(
-        self, node: Node, kind: type, topic: str, quality: QoSProfile, raw: bool = False
-    ) -> None:
-        self._node = node
-        self._polled = PolledSubscription(node, kind, topic, quality, raw)
-        self._held_back: list[TakenMessage] = []
-        self.watch = InputWatch(node, self._polled.subscription)
+    _held_back: Sequence[TakenMessage] = ()
 
-    @property
-    def has_more(self) -> bool:
-        return self._polled.has_more
-
-    @property
-    def losses(self) -> Losses:
-        return self._polled.losses
-
-    def take(self, is_all: bool) -> list[TakenMessage]:
-        messages = self._polled.take(is_all)
-        if messages:
-            self.watch.arrived()
-        held_back, self._held_back = self._held_back, []
-        return held_back + messages
+    def take(self, is_all: bool = False) -> list[TakenMessage]:
+        held_back, self._held_back = self._held_back, ()
+        return [*held_back, *super().take(is_all)]
 
     def until(self, taken: list[TakenMessage], received: int) -> list[TakenMessage]:
         """Return what was received until a time, ns; the rest is taken the next time."""
@@ -75,9 +66,9 @@ class _Input:
             "process takes them, or the network drops them: publish fewer, or blocks on ~/samples"
         )
 
-    def follow_publishers(self) -> None:
-        if self.watch.silence() > _SILENCE and self._polled.follow_publishers():
-            quality = self._polled.subscription.qos_profile.reliability.name.lower()
+    def follow(self) -> None:
+        if self.watch.silence() > _SILENCE and self.follow_publishers():
+            quality = self.quality.reliability.name.lower()
             self._node.get_logger().info(f"{self.watch.topic} is taken as {quality}, as published")
 
 
@@ -90,7 +81,7 @@ class ValveInputs:
 
     def __init__(
         self,
-        node: Node,
+        node: PolledNode,
         joint: str,
         hand_on: Callable[[Arrivals], None],
         drop: Callable[[Signal, int], None],
@@ -101,7 +92,8 @@ class ValveInputs:
         self._joint = joint
         self._pressure = _Input(node, FluidPressure, "actuator_pressure", stream(), raw=True)
         self._stem = _Input(node, JointState, "stem_state", stream(), raw=True)
-        self._blocks = _Input(node, Float64MultiArray, "~/samples", blocks())
+        self._blocks = _Input(node, Float64MultiArray, "~/samples", blocks(), is_optional=True)
+        self._looked = -math.inf
         self._bad_block: str | None = None
 
     @property
@@ -160,8 +152,13 @@ class ValveInputs:
         """
         if self._blocks.watch.silence() <= _SILENCE:
             return
-        for one in (self._pressure, self._stem, self._blocks):
-            one.follow_publishers()
+        for one in (self._pressure, self._stem):
+            one.follow()
+        now = time.monotonic()
+        silence = min(self._pressure.watch.silence(), self._stem.watch.silence())
+        if silence > _SILENCE or now - self._looked > _SELDOM:
+            self._looked = now
+            self._blocks.follow()
 
     def is_played(self) -> bool:
         """Return whether a recording is played on the topics in use; it asks the middleware."""

@@ -1,15 +1,24 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Changes that wait for a file of the history that cannot be written."""
 
 from collections.abc import Callable
 from threading import Lock
+from typing import TYPE_CHECKING
 
-from valve_friction_ros.history import HistoryFile
-
-__all__ = ["WaitingChanges"]
+if TYPE_CHECKING:
+    from valve_friction_ros.history import HistoryFile
 
 _MOST = 1000
 
-_Change = Callable[[HistoryFile], None]
+_Change = Callable[["HistoryFile"], None]
 
 
 class WaitingChanges:

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Work in another thread, awaited by a callback, and the report of a bug in it."""
 
 import contextlib
@@ -11,8 +20,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from valve_friction_ros.identification import RefusalError
-
-__all__ = ["InternalError", "bugs_reported", "done_in"]
+from valve_friction_ros.nodes.plumbing.processes import ElsewhereError
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -23,9 +31,13 @@ class InternalError(Exception):
 
 
 def _internal_error(bug: Exception) -> InternalError:
-    place = traceback.extract_tb(bug.__traceback__)[-1]
+    if isinstance(cause := bug.__cause__, ElsewhereError):
+        file, line = cause.file, cause.line
+    else:
+        place = traceback.extract_tb(bug.__traceback__)[-1]
+        file, line = place.filename, place.lineno or 0
     words = " ".join(f"{type(bug).__name__}: {bug}".split())
-    where = f"{Path(place.filename).name}, line {place.lineno}"
+    where = f"{Path(file).name}, line {line}"
     return InternalError(f"internal error: {words} ({where}): report it, with what ~/save writes")
 
 

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """The end of a process that can never work again, though it looks alive.
 
 Two things freeze a node for good, and no thread of Python can help in either. The loop may hang in
@@ -17,8 +26,6 @@ from collections.abc import Sequence
 from std_msgs.msg import Empty
 
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
-
-__all__ = ["Deadman", "arm", "disarm"]
 
 _LOOP_END = 60.0
 """Time, s, after which a process ends whose loop has not turned. A process that was paused for

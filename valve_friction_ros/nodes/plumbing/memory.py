@@ -1,9 +1,16 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Memory that the C library keeps though nobody uses it."""
 
 import contextlib
 import ctypes
-
-__all__ = ["give_back_memory", "keep_little_memory"]
 
 _MALLOC = {-8: 2, -3: 131_072, -1: 131_072}
 """M_ARENA_MAX, M_MMAP_THRESHOLD (bytes) and M_TRIM_THRESHOLD (bytes) of malloc.h."""

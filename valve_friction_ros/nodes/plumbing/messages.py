@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Conversion between messages and plain numbers."""
 
 import math
@@ -11,9 +20,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayou
 
 from valve_friction_ros.identification import Sweep
 from valve_friction_ros.streams import Arrivals, rows_arrived
-from valve_friction_ros.streams.joint_position import joint_position
-
-__all__ = ["position_of", "rows_of", "stamp_of", "sweep_message", "time_message"]
+from valve_friction_ros.streams.samples import joint_position
 
 _NANOSECONDS = 1_000_000_000
 

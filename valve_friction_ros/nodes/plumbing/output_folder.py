@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Files that a node writes on request: their folder, their names, and the room they may take."""
 
 import contextlib
@@ -12,8 +21,6 @@ from rclpy.node import Node
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.records.data_folder import data_folder
 from valve_friction_ros.streams import utc
-
-__all__ = ["OutputFolder", "file_name", "folder_of", "free_path", "require_room", "valve_name"]
 
 _BLOCK = 4096
 """Bytes that the smallest file takes on most disks."""

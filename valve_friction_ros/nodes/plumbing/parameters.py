@@ -1,12 +1,19 @@
-"""Declaration of node parameters, each with a description, a unit and a range."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Settings as parameters of a node: declared, checked, read, and what is built from them."""
 
 import contextlib
+import functools
 import itertools
-import math
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -18,78 +25,72 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from valve_friction_ros.model import KarnoppParameters, Valve
+from valve_friction_ros.nodes.plumbing.rclpy_private import parameter_overrides
 from valve_friction_ros.records.spelling import nearest, resembling
-from valve_friction_ros.records.valve_keys import NODE_NAMES, is_known
-
-__all__ = [
-    "ParameterSpec",
-    "declare_parameters",
-    "optional",
-    "reject_invalid",
-    "values_of",
-    "warn_of_columns",
-]
+from valve_friction_ros.settings import KARNOPP, NODE_NAMES, VALVE, Setting, is_known
 
 _TURNS_SIGNALS = ("columns.inverted_position", "columns.opposing_pressure_column")
 """Keys of a valve file that change the signals of a table, and which topics do not have."""
 
 
-@dataclass(frozen=True)
-class ParameterSpec:
-    """One parameter of a node: its default, which fixes its type, and a description with its unit.
+@functools.cache
+def _descriptor(setting: Setting) -> ParameterDescriptor:
+    """Return the ROS description of a setting, which all nodes of the process share."""
+    descriptor = ParameterDescriptor(
+        description=setting.description,
+        additional_constraints=f"one of {', '.join(setting.choices)}" if setting.choices else "",
+        read_only=setting.read_only,
+        dynamic_typing=setting.default is None,
+    )
+    if setting.limits is not None:
+        lowest, highest = setting.limits
+        if isinstance(setting.default, int):
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(lowest), to_value=int(highest), step=0)
+            ]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=lowest, to_value=highest, step=0.0)
+            ]
+    return descriptor
 
-    `limits` are the lowest and the highest value. A parameter that may be nan ("not given") has
-    none, because ROS counts nan as outside any range; the value types check it all the same. A
-    `read_only` parameter can only be given at start. `choices` are the values that a text may have;
-    any, if empty.
+
+def declare_parameters(node: Node, settings: Iterable[Setting], **defaults: object) -> None:
+    """Declare `settings` on `node`; raises rclpy's parameter exceptions for a bad override.
+
+    `defaults` are those that this node has in place of the declared ones. A number may be set later
+    as its text, because ``ros2 param load`` sends ``.nan`` and ``1e-06`` as texts. Raises
+    ValueError for an override whose name no node of this package has, if it was given by ``-p`` or
+    resembles one; others, as in a file that nodes of several packages share, are logged.
     """
+    declared = tuple(settings)
+    _require_known(node, {one.name for one in declared})
 
-    name: str
-    default: bool | int | float | str | list[str]
-    description: str
-    limits: tuple[float, float] | None = None
-    read_only: bool = False
-    choices: tuple[str, ...] = ()
+    def check(changes: list[Parameter]) -> SetParametersResult:
+        reason = _wrong_type(declared, changes)
+        return SetParametersResult(successful=not reason, reason=reason)
 
-    @cached_property
-    def descriptor(self) -> ParameterDescriptor:
-        """The ROS description of this parameter, which all nodes of the process share."""
-        descriptor = ParameterDescriptor(
-            description=self.description,
-            additional_constraints=f"one of {', '.join(self.choices)}" if self.choices else "",
-            read_only=self.read_only,
-        )
-        if self.limits is not None:
-            lowest, highest = self.limits
-            if isinstance(self.default, int):
-                descriptor.integer_range = [
-                    IntegerRange(from_value=int(lowest), to_value=int(highest), step=0)
-                ]
-            else:
-                descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=lowest, to_value=highest, step=0.0)
-                ]
-        return descriptor
-
-
-def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
-    """Declare `specs` on `node`; raises rclpy's parameter exceptions for a bad override.
-
-    A number may be set later as its text, because ``ros2 param load`` sends ``.nan`` and ``1e-06``
-    as texts. Raises ValueError for an override whose name no node of this package has, if it was
-    given by ``-p`` or resembles one; others, as in a file that nodes of several packages share, are
-    logged.
-    """
-    declared = tuple(specs)
-    _require_known(node, {spec.name for spec in declared})
-    for spec in declared:
-        node.declare_parameter(spec.name, spec.default, spec.descriptor)
-    numbers = {spec.name for spec in declared if isinstance(spec.default, float)}
+    node.add_on_set_parameters_callback(check)
+    for one in declared:
+        node.declare_parameter(one.name, defaults.get(one.name, one.default), _descriptor(one))
+    numbers = {
+        one.name for one in declared if one.default is None or isinstance(one.default, float)
+    }
 
     def read_numbers(changes: list[Parameter]) -> list[Parameter]:
         return [_read(change) if change.name in numbers else change for change in changes]
 
     node.add_pre_set_parameters_callback(read_numbers)
+
+
+def _wrong_type(settings: Iterable[Setting], changes: Iterable[Parameter]) -> str:
+    """Return what is no number of parameters that may be unset, which rclpy leaves open."""
+    unset = {one.name for one in settings if one.default is None}
+    for one in changes:
+        if one.name in unset and one.type_ not in (Parameter.Type.NOT_SET, Parameter.Type.DOUBLE):
+            return f"{one.name}: expected '{Parameter.Type.DOUBLE}' got '{one.type_}'"
+    return ""
 
 
 def _typed_names(arguments: Sequence[str]) -> set[str]:
@@ -100,9 +101,8 @@ def _typed_names(arguments: Sequence[str]) -> set[str]:
 
 def _require_known(node: Node, names: Collection[str]) -> None:
     """Refuse overrides that nothing would ever read."""
-    overrides = getattr(node, "_parameter_overrides", {})  # rclpy offers no other way to them
     typed = _typed_names(sys.argv)
-    for name in overrides:
+    for name in parameter_overrides(node):
         if name in names or is_known(name):
             continue
         close = resembling(name, {*names, *NODE_NAMES})
@@ -116,7 +116,7 @@ def _require_known(node: Node, names: Collection[str]) -> None:
 
 def warn_of_columns(node: Node) -> None:
     """Warn, once, of what a valve file says of its tables and topics must have by themselves."""
-    overrides = getattr(node, "_parameter_overrides", {})
+    overrides = parameter_overrides(node)
     if found := [key for key in _TURNS_SIGNALS if key in overrides and overrides[key].value]:
         node.get_logger().warning(
             f"{' and '.join(found)}: the section columns is of tables and is not applied to "
@@ -135,33 +135,30 @@ def _read(parameter: Parameter) -> Parameter:
 
 
 def values_of(
-    node: Node, specs: Iterable[ParameterSpec], changes: Iterable[Parameter] = ()
+    node: Node, settings: Iterable[Setting], changes: Iterable[Parameter] = ()
 ) -> dict[str, Any]:
-    """Values of the parameters by name, as they would be after `changes`."""
-    values = {spec.name: node.get_parameter(spec.name).value for spec in specs}
+    """Values of the parameters by name, as they would be after `changes`; None where unset."""
+    values = {one.name: node.get_parameter(one.name).value for one in settings}
     for parameter in changes:
         if parameter.name in values:
             values[parameter.name] = parameter.value
     return values
 
 
-def optional(value: float) -> float | None:
-    """Turn the nan that stands for "not given" into None."""
-    return None if math.isnan(value) else value
-
-
 def reject_invalid(
     node: Node,
-    specs: Iterable[ParameterSpec],
+    settings: Iterable[Setting],
     build: Callable[[Mapping[str, Any]], object],
 ) -> None:
     """Have `node` reject any change with which `build`, fed all values, raises ValueError."""
-    watched = tuple(specs)
-    names = {spec.name for spec in watched}
+    watched = tuple(settings)
+    names = {one.name for one in watched}
 
     def check(changes: list[Parameter]) -> SetParametersResult:
         if not any(parameter.name in names for parameter in changes):
             return SetParametersResult(successful=True)
+        if reason := _wrong_type(watched, changes):
+            return SetParametersResult(successful=False, reason=reason)
         try:
             build(values_of(node, watched, changes))
         except ValueError as error:
@@ -169,3 +166,16 @@ def reject_invalid(
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(check)
+
+
+def valve_from(values: Mapping[str, Any]) -> Valve:
+    """Build the valve from parameter values; raises ValueError for an impossible one."""
+    taken = {
+        one.name: one.assumed if values[one.name] is None else values[one.name] for one in VALVE
+    }
+    return Valve(**taken)
+
+
+def karnopp_parameters_from(values: Mapping[str, Any]) -> KarnoppParameters:
+    """Build the model from parameter values; raises ValueError for an impossible one."""
+    return KarnoppParameters(**{one.name: values[one.name] for one in KARNOPP})

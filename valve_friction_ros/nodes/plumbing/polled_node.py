@@ -1,15 +1,35 @@
-"""Nodes that look for their messages themselves, and the executor of their services."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Nodes that look for their messages themselves, and the executor of their services.
+
+In `TurnExecutor`, which the executables use, a node costs little. In any executor of rclpy it does
+the same: its services are ready as those of other nodes are, and a timer polls its streams.
+"""
 
 import contextlib
+import functools
+import inspect
+import threading
 import time
-from collections.abc import Iterator
+import types
+from collections.abc import Callable, Coroutine, Generator, Iterator
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import (
     ConditionReachedException,
+    Executor,
     ShutdownException,
     SingleThreadedExecutor,
     TimeoutException,
@@ -21,17 +41,23 @@ from rclpy.publisher import Publisher
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Task
+from rclpy.timer import Timer
 
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
-
-__all__ = ["NeverReady", "PolledNode", "TurnExecutor"]
-
+from valve_friction_ros.nodes.plumbing.rclpy_private import (
+    awaits_coroutines,
+    take_request,
+    takes_directly,
+)
 
 _LONGEST_TURN = 0.5
 """Time, s, after which what is still ready waits for the next turn."""
 _NO_TYPE_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
-"""The types are those of ROS 2, which everybody has; the service would be two endpoints more."""
+_UNSET = ("null", "None")
+"""What ``ros2 param`` makes of a parameter that is not set, in its file and in its request."""
+_POLL_PERIOD = 0.05
+"""Time, s, from one look for messages to the next in an executor of rclpy's."""
 
 
 class NeverReady(CallbackGroup):
@@ -49,6 +75,28 @@ class NeverReady(CallbackGroup):
         """Do nothing: nothing has begun."""
 
 
+class _TakenInTurns(CallbackGroup):
+    """The callback group of services: a `TurnExecutor` takes their requests, others wait for them.
+
+    Callbacks that are awaiting something let others run, and the node's lock keeps them apart.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.has_turns = False
+
+    def can_execute(self, entity: Any) -> bool:
+        """Return whether an executor may wait for a service."""
+        return not (self.has_turns and takes_directly(entity))
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Return whether an executor may run the callback of a service."""
+        return self.can_execute(entity)
+
+    def ending_execution(self, entity: object) -> None:
+        """Do nothing: others may begin at any time."""
+
+
 class _Silence:
     """In place of a publisher: nothing is published."""
 
@@ -57,38 +105,89 @@ class _Silence:
 
 
 class PolledNode(Node):
-    """A node whose streams and services are polled by `run_nodes` and `TurnExecutor`.
+    """A node that polls its streams, in `run_nodes` and `TurnExecutor` or in any executor.
 
     Its publishers and subscriptions watch no events of the middleware, save where they are given
     callbacks for them. rclpy watches two events of each by default, only to log that a quality of
     service or a type does not match; each would be looked at in every turn of the executor, and
     rmw_fastrtps can lock up while it takes an event.
 
+    Its callbacks exclude each other, also in an executor with several threads, but for what another
+    callback does while one is awaiting something.
+
+    Parameters
+    ----------
+    *arguments, **named
+        What `rclpy.node.Node` takes.
+    start_type_description_service : bool
+        Whether the node has the service ``~/get_type_description``, if its parameter allows.
+
     Attributes
     ----------
     last_heard : float
         When a message of its streams was taken last, s of the monotonic clock; at first its start.
+    awaited : dict of str to str
+        Topics that it subscribes to once somebody publishes them, with their types.
+    offered : dict of str to str
+        Topics that it publishes once somebody subscribes to them, with their types.
+    tells_parameters : bool
+        Whether it has services for its parameters.
+    is_active : bool
+        Whether it works; only a `ManagedNode` may rest.
     """
 
+    is_active = True
+
     def __init__(
-        self, *arguments: Any, start_parameter_services: bool = True, **named: Any
+        self,
+        *arguments: Any,
+        start_parameter_services: bool = True,
+        start_type_description_service: bool = True,
+        **named: Any,
     ) -> None:
         self.last_heard = time.monotonic()
+        self.awaited: dict[str, str] = {}
+        self.offered: dict[str, str] = {}
         self._failures: dict[str, str] = {}
-        self._tells_parameters = start_parameter_services
-        super().__init__(
-            *arguments,
-            start_parameter_services=start_parameter_services,
-            parameter_overrides=[_NO_TYPE_DESCRIPTIONS],
-            **named,
-        )
+        self.tells_parameters = start_parameter_services
+        self._services_in_turns = _TakenInTurns()
+        self._callbacks_lock = threading.RLock()
+        self._poll_timer: Timer | None = None
+        self._is_closed = False
+        if not start_type_description_service:
+            overrides = named.get("parameter_overrides") or ()
+            named["parameter_overrides"] = [*overrides, _NO_TYPE_DESCRIPTIONS]
+        super().__init__(*arguments, start_parameter_services=start_parameter_services, **named)
+
+    @property
+    def executor(self) -> Executor | None:
+        """The executor that the node has been added to; None if there is none."""
+        return Node.executor.fget(self)
+
+    @executor.setter
+    def executor(self, executor: Executor | None) -> None:
+        Node.executor.fset(self, executor)
+        has_turns = isinstance(executor, TurnExecutor)
+        self._services_in_turns.has_turns = has_turns
+        for service in self.services:  # those that rclpy itself has made too
+            service.callback_group = self._services_in_turns
+        for entity in (*self.services, *self.timers):
+            if (callback := getattr(entity.callback, "__wrapped__", None)) is not None:
+                entity.callback = self.exclusive(callback)
+        if self._poll_timer is None and executor is not None and not has_turns:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)  # sim time may stand still
+            poll = self.exclusive(self.poll_guarded)
+            self._poll_timer = Node.create_timer(self, _POLL_PERIOD, poll, clock=steady)
+        elif self._poll_timer is not None and (executor is None or has_turns):
+            self.destroy_timer(self._poll_timer)
+            self._poll_timer = None
 
     def create_publisher(self, kind: Any, topic: str, *arguments: Any, **named: Any) -> Publisher:
         """Create a publisher as rclpy does, without its default callbacks for events.
 
         Nobody is told of the parameters of a node that has no services for them.
         """
-        if topic == "/parameter_events" and not self._tells_parameters:
+        if topic == "/parameter_events" and not self.tells_parameters:
             return _Silence()
         named.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
         return super().create_publisher(kind, topic, *arguments, **named)
@@ -98,15 +197,86 @@ class PolledNode(Node):
         named.setdefault("event_callbacks", SubscriptionEventCallbacks(use_default_callbacks=False))
         return super().create_subscription(*arguments, **named)
 
-    def create_service(self, *arguments: Any, **named: Any) -> Service:
-        """Create a service as rclpy does, whose requests are taken by `TurnExecutor` only."""
-        return super().create_service(*arguments, **(named | {"callback_group": NeverReady()}))
+    def create_service(
+        self, kind: Any, name: str, callback: Callable[..., Any], **named: Any
+    ) -> Service:
+        """Create a service as rclpy does; a `TurnExecutor` looks for its requests itself."""
+        named["callback_group"] = self._services_in_turns
+        return super().create_service(kind, name, self.exclusive(callback), **named)
+
+    def create_timer(
+        self, timer_period_sec: float, callback: Callable[..., Any], *arguments: Any, **named: Any
+    ) -> Timer:
+        """Create a timer as rclpy does."""
+        made = self.exclusive(callback)
+        return super().create_timer(timer_period_sec, made, *arguments, **named)
+
+    def set_parameters_atomically(self, changes: list[Parameter]) -> SetParametersResult:
+        """Set parameters as rclpy does; what would change nothing is no change.
+
+        So ``ros2 param load`` takes what ``ros2 param dump`` has written, though rclpy refuses to
+        set a parameter that can only be given at the start.
+        """
+        new = [one for one in changes if not self._has(one)]
+        return (
+            super().set_parameters_atomically(new) if new else SetParametersResult(successful=True)
+        )
+
+    def _has(self, parameter: Parameter) -> bool:
+        if not self.has_parameter(parameter.name):
+            return False
+        now, wanted = self.get_parameter(parameter.name).value, parameter.value
+        return wanted == now or (now is None and wanted in _UNSET)
+
+    def exclusive(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a callback that runs while no other of this node does, in whatever thread.
+
+        One that is a coroutine lets the others run while it awaits something. Where the executor
+        knows no coroutines, it holds the executor up, and polls the streams meanwhile.
+        """
+        if inspect.iscoroutinefunction(callback):
+
+            @functools.wraps(callback)
+            async def step_by_step(*arguments: Any) -> Any:
+                return await _stepwise(callback(*arguments), self._callbacks_lock)
+
+            @functools.wraps(callback)
+            def to_its_end(*arguments: Any) -> Any:
+                steps = _stepwise(callback(*arguments), self._callbacks_lock)
+                while True:
+                    try:
+                        steps.send(None)
+                    except StopIteration as end:
+                        return end.value
+                    time.sleep(_POLL_PERIOD)
+                    self.poll_guarded()
+
+            return step_by_step if awaits_coroutines(self.executor) else to_its_end
+
+        @functools.wraps(callback)
+        def alone(*arguments: Any) -> Any:
+            with self._callbacks_lock:
+                return callback(*arguments)
+
+        return alone
 
     def poll(self) -> None:
         """Do the work that is due; called in every turn."""
 
     def close(self) -> None:
-        """Do what the node has to do at its end; called once, before any node is destroyed."""
+        """Do what the node has to do at its end; called once, before the node is destroyed."""
+
+    def finish(self) -> None:
+        """Close the node, unless that has been done."""
+        if not self._is_closed:
+            self._is_closed = True
+            with self._callbacks_lock, self.guarded("close"):
+                self.close()
+
+    def destroy_node(self) -> None:
+        """Close the node, and take it off the graph."""
+        self.finish()
+        super().destroy_node()
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -133,7 +303,7 @@ class PolledNode(Node):
 
     def poll_guarded(self) -> None:
         """Do the work that is due."""
-        with self.guarded("poll"):
+        with self._callbacks_lock, self.guarded("poll"):
             self.poll()
 
     def overdue(self) -> str | None:
@@ -151,6 +321,21 @@ class PolledNode(Node):
         return None
 
 
+@types.coroutine
+def _stepwise(
+    work: Coroutine[Any, Any, Any], lock: contextlib.AbstractContextManager[Any]
+) -> Generator[Any, Any, Any]:
+    """Run a coroutine with a lock that is free while it awaits something."""
+    told = None
+    while True:
+        with lock:
+            try:
+                awaited = work.send(told)
+            except StopIteration as end:
+                return end.value
+        told = yield awaited
+
+
 class TurnExecutor(SingleThreadedExecutor):
     """Runs what is ready and returns; it never waits in the middleware.
 
@@ -158,9 +343,6 @@ class TurnExecutor(SingleThreadedExecutor):
 
     A wait of rclpy costs about 10 µs for each service of its nodes, and a look whether one has a
     request 2 µs. So the services of a `PolledNode` are no part of the wait: it is for the timers.
-
-    rclpy offers no public method that takes a request. Its own executors use
-    ``Service.handle.service_take_request``, and so does this class. Checked with rclpy 7.1.6.
     """
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
@@ -191,16 +373,14 @@ class TurnExecutor(SingleThreadedExecutor):
         before = len(self._answers)
         for node in self.get_nodes():
             for service in node.services:
-                if isinstance(service.callback_group, NeverReady):
+                if isinstance(service.callback_group, _TakenInTurns) and takes_directly(service):
                     self._take_request_of(node, service)
         return len(self._answers) > before
 
     def _take_request_of(self, node: Node, service: Service) -> None:
         # One at a time, as rclpy runs the newest of its tasks first.
-        with service.handle:  # so that nothing destroys it meanwhile
-            request, header = service.handle.service_take_request(service.srv_type.Request)
-        if header is not None:
-            self._answers.append(self.create_task(_answer, node, service, request, header))
+        if (found := take_request(service)) is not None:
+            self._answers.append(self.create_task(_answer, node, service, *found))
 
     def _run_ready(self) -> None:
         """Run the tasks and the timers that are ready now."""

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Subscriptions whose messages are taken when the node asks for them.
 
 An executor that waits for a subscription looks at every entity of all its nodes for each message:
@@ -5,27 +14,33 @@ An executor that waits for a subscription looks at every entity of all its nodes
 cheaper, but rclpy has it as an experiment only, and its callbacks run under the middleware's locks,
 which has frozen nodes. So the streams are emptied some 20 times a second.
 
-rclpy offers no public method that takes a message. Its own executors and ``wait_for_message`` use
-``Subscription.handle.take_message``, and so does this file, and no other. Checked with rclpy 7.1.6.
+An executor of rclpy's that ignores callback groups hands the messages over one by one, and so does
+each executor where `rclpy_private` finds no other way; then they wait here until they are taken.
 """
 
 import time
+from collections import deque
 from typing import Any, NamedTuple
 
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
 from valve_friction_ros.nodes.plumbing.polled_node import NeverReady, PolledNode
 from valve_friction_ros.nodes.plumbing.qos import qos_overrides
+from valve_friction_ros.nodes.plumbing.rclpy_private import take_messages, takes_directly
 from valve_friction_ros.streams import LossCounter, Losses
-
-__all__ = ["PolledSubscription", "TakenMessage"]
-
 
 _MOST = 3_000
 """Messages that are taken in a turn: some 30 ms of work, so that a storm on one valve holds up the
 others no longer. At ten turns a second that is 30 kHz."""
+
+
+_LEASE = 20.0
+"""Time, s, after which the middleware (Fast DDS) forgets a node that has ended without farewell. A
+reliable publisher of long queues serves a new node only then."""
 
 
 class TakenMessage(NamedTuple):
@@ -35,50 +50,134 @@ class TakenMessage(NamedTuple):
     received: int
 
 
+class InputWatch:
+    """Says what is wrong with one subscribed topic; silence is real time, also with sim time."""
+
+    def __init__(self, node: Node, topic: str, type_name: str) -> None:
+        self._node = node
+        self._topic, self._type = topic, type_name
+        self._since = time.monotonic()
+        self._has_arrived = False
+
+    @property
+    def topic(self) -> str:
+        """The topic, fully resolved."""
+        return self._topic
+
+    def arrived(self) -> None:
+        """Note that a message has come."""
+        self._since = time.monotonic()
+        self._has_arrived = True
+
+    def silence(self) -> float:
+        """Return the time since the last message, or the start, s."""
+        return time.monotonic() - self._since
+
+    def is_used(self) -> bool:
+        """Return whether a message has ever come, or the topic has a publisher."""
+        return self._has_arrived or self._node.count_publishers(self._topic) > 0
+
+    def problem(self, timeout: float) -> str | None:
+        """Say what is wrong if nothing has come for `timeout` seconds, else None."""
+        silence = self.silence()
+        if silence <= timeout:
+            return None
+        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        others = sorted({info.topic_type for info in publishers} - {self._type})
+        if not publishers:
+            cause = "nobody publishes it"
+        elif others:
+            cause = f"it is published as {', '.join(others)}, not {self._type}"
+        else:
+            cause = "its publisher is silent"
+            if not self._has_arrived and silence < _LEASE:
+                cause += (
+                    f", or still waits for a node that was killed, for up to {_LEASE:g} s: wait"
+                )
+        return f"no data on {self._topic} for {silence:.1f} s: {cause}"
+
+
 class PolledSubscription:
-    """A subscription that no executor waits for.
+    """A subscription that no executor waits for, where that can be helped.
 
     Its history, depth and reliability can be overridden by ``qos_overrides.…`` parameters. The
     depth of `quality` must hold what arrives between two calls of `take`. With `raw` messages are
-    taken as they came, serialised.
+    taken as they came, serialised. With `is_optional` it is no part of the graph, and of what the
+    node `awaits`, until `follow_publishers` finds a publisher.
 
     Attributes
     ----------
+    topic : str
+        Its topic, fully resolved.
+    type_name : str
+        Type of its messages, such as ``sensor_msgs/msg/JointState``.
     has_more : bool
         Whether the last call of `take` may have left some messages.
+    watch : InputWatch
+        Whether messages come.
     """
 
     def __init__(
-        self, node: PolledNode, kind: type, topic: str, quality: QoSProfile, raw: bool = False
+        self,
+        node: PolledNode,
+        kind: type,
+        topic: str,
+        quality: QoSProfile,
+        raw: bool = False,
+        is_optional: bool = False,
     ) -> None:
         self._node = node
-        self._kind, self._raw = kind, raw
-        self._subscription = self._subscribed(topic, quality, qos_overrides())
-        self._reliability = quality.reliability  # as overridden
+        self._kind, self._raw, self._quality = kind, raw, quality
+        self.topic: str = node.resolve_topic_name(topic)
+        self.type_name = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+        self.watch = InputWatch(node, self.topic, self.type_name)
+        self._handed_over: deque[tuple[Any, dict[str, Any]]] = deque(maxlen=quality.depth)
         self._counter = LossCounter()
         self.has_more = False
+        self._subscription: Subscription | None = None
+        if is_optional and not node.count_publishers(self.topic):
+            node.awaited[self.topic] = self.type_name
+        else:
+            self._begin()
+
+    def _begin(self) -> None:
+        self._subscription = self._subscribed(self._quality, qos_overrides())
+        self._reliability = self._quality.reliability  # as overridden
 
     def _subscribed(
-        self, topic: str, quality: QoSProfile, overrides: QoSOverridingOptions | None
+        self, quality: QoSProfile, overrides: QoSOverridingOptions | None
     ) -> Subscription:
-        return self._node.create_subscription(
+        made = self._node.create_subscription(
             self._kind,
-            topic,
-            self._refuse,
+            self.topic,
+            self._hand_over,
             quality,
             callback_group=NeverReady(),
             qos_overriding_options=overrides,
             raw=self._raw,
         )
+        if not takes_directly(made):
+            made.callback_group = ReentrantCallbackGroup()
+            made.callback_group.add_entity(made)
+        return made
 
-    @staticmethod
-    def _refuse(message: object) -> None:
-        raise NotImplementedError(f"an executor has taken {message} from a polled subscription")
+    def _hand_over(self, message: Any) -> None:
+        """Keep a message that an executor has taken; the oldest goes where the depth is reached.
+
+        Its details stay unasked: rclpy's EventsExecutor fails where a callback wants them.
+        """
+        self._handed_over.append((message, {"received_timestamp": time.time_ns()}))
 
     @property
-    def subscription(self) -> Subscription:
-        """The subscription of rclpy."""
-        return self._subscription
+    def quality(self) -> QoSProfile:
+        """The quality of service that it asks for."""
+        return self._quality if self._subscription is None else self._subscription.qos_profile
+
+    def end(self) -> None:
+        """Unsubscribe."""
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = None
 
     def follow_publishers(self) -> bool:
         """Ask for what the publishers offer, if they are there; tell if that is something new.
@@ -86,18 +185,21 @@ class PolledSubscription:
         That is best effort, which hears all of them, if one of them is; else what was asked for
         at first. What has arrived and was not taken is lost, so this is for a silent topic.
         """
-        topic, quality = self._subscription.topic_name, self._subscription.qos_profile
-        if not self._node.count_publishers(topic):
+        if not self._node.count_publishers(self.topic):
             return False
-        publishers = self._node.get_publishers_info_by_topic(topic)
+        if self._subscription is None:
+            del self._node.awaited[self.topic]
+            self._begin()
+        quality = self.quality
+        publishers = self._node.get_publishers_info_by_topic(self.topic)
         offered = {info.qos_profile.reliability for info in publishers}
         best_effort = ReliabilityPolicy.BEST_EFFORT in offered
         wanted = ReliabilityPolicy.BEST_EFFORT if best_effort else self._reliability
         if not offered or wanted == quality.reliability:
             return False
-        self._node.destroy_subscription(self._subscription)
+        self.end()
         quality.reliability = wanted
-        self._subscription = self._subscribed(topic, quality, None)
+        self._subscription = self._subscribed(quality, None)
         self._counter.forget()
         return True
 
@@ -107,19 +209,20 @@ class PolledSubscription:
         What exceeds 3,000 messages waits for the next turn; with `is_all` all is taken that the
         queue can have held at the call.
         """
-        kind, raw = self._subscription.msg_type, self._subscription.raw
-        most = max(_MOST, self._subscription.qos_profile.depth) if is_all else _MOST
-        taken: list[TakenMessage] = []
-        numbers: list[int | None] = []
-        handle = self._subscription.handle
-        with handle:  # so that nothing destroys it meanwhile
-            while len(taken) < most and (found := handle.take_message(kind, raw)) is not None:
-                message, details = found
-                taken.append(TakenMessage(message, details["received_timestamp"]))
-                numbers.append(details.get("publication_sequence_number"))
+        if self._subscription is None:
+            return []
+        most = max(_MOST, self.quality.depth) if is_all else _MOST
+        found: list[tuple[Any, dict[str, Any]]] = []
+        while self._handed_over and len(found) < most:
+            found.append(self._handed_over.popleft())
+        if takes_directly(self._subscription):
+            found += take_messages(self._subscription, most - len(found))
+        taken = [TakenMessage(message, details["received_timestamp"]) for message, details in found]
+        numbers = [details.get("publication_sequence_number") for _, details in found]
         if taken:
             now = time.monotonic()
             self._node.last_heard = now
+            self.watch.arrived()
             known = [number for number in numbers if number is not None]
             if len(known) == len(numbers):  # a middleware need not number them
                 self._counter.take(known, now)

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Samples out of serialised messages, by the block.
 
 In the messages of a publisher only stamps and numbers change; frame, joint names and counts are the
@@ -18,9 +27,7 @@ from sensor_msgs.msg import FluidPressure, JointState
 from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
 from valve_friction_ros.nodes.plumbing.polled_subscription import TakenMessage
 from valve_friction_ros.streams import Arrivals, Kind, Samples
-from valve_friction_ros.streams.joint_position import joint_index
-
-__all__ = ["arrivals_of", "positions_in", "pressures_in", "readable"]
+from valve_friction_ros.streams.samples import joint_index
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _BODY = 4

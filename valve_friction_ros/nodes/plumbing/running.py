@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Starting and stopping nodes as a process."""
 
 import os
@@ -18,8 +27,6 @@ from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecut
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
 from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
 from valve_friction_ros.nodes.plumbing.worker import workers_have_ended
-
-__all__ = ["WRONG_REQUESTS", "cannot_start", "join_graph", "run_node", "run_nodes"]
 
 _PAUSE = 0.1
 _LIVELY_PAUSE = 0.02
@@ -187,8 +194,7 @@ def _close(nodes: Sequence[Node], executors: Mapping[Context, TurnExecutor]) -> 
     """
     for node in nodes:
         if isinstance(node, PolledNode):
-            with node.guarded("close"):
-                node.close()
+            node.finish()
     # An executor that still holds the node's entities would keep them alive.
     for executor in executors.values():
         executor.shutdown()

@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Ctrl-C and SIGTERM: the loop is asked to end, and a process whose loop does not end is ended."""
 
 import faulthandler
@@ -5,17 +14,15 @@ import os
 import signal
 import socket
 import sys
-import threading
-from types import TracebackType
 
-__all__ = ["StopRequest"]
+from valve_friction_ros.nodes.plumbing.worker import Companion
 
 _PATIENCE = 2.5
 """Time, s, from the request to the end of the process at the latest."""
 _REQUESTS = (signal.SIGINT, signal.SIGTERM)
 
 
-class StopRequest:
+class StopRequest(Companion):
     """Whether Ctrl-C or SIGTERM has come, as long as the context lasts.
 
     A handler that raised could strike within rclpy's own code, and rclpy's own handler shuts the
@@ -34,37 +41,31 @@ class StopRequest:
     """
 
     def __init__(self) -> None:
+        super().__init__("stop")
         self.has_come = self.is_followed = False
-        self._has_ended = threading.Event()
         self._reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)
 
-    def __enter__(self) -> "StopRequest":
+    def begin(self) -> None:
+        """Take the signals."""
         for request in _REQUESTS:
             signal.signal(request, self._note)
         self._before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
-        threading.Thread(target=self._enforce, name="stop", daemon=True).start()
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def end(self) -> None:
+        """Give the signals back."""
         signal.set_wakeup_fd(self._before)
-        self._has_ended.set()
         self._writer.close()  # ends the thread, if no request has come
 
     def _note(self, *_: object) -> None:
         self.has_come = True
 
-    def _enforce(self) -> None:
-        """Wait for a request, then for the end; in a thread of its own."""
+    def run(self) -> None:
+        """Wait for a request, then for the end."""
         while number := self._reader.recv(1):
             if number[0] in _REQUESTS:
                 break
-        if self._has_ended.wait(_PATIENCE) or not number:
+        if self.has_ended.wait(_PATIENCE) or not number:
             return
         if not self.is_followed:
             line = f"stuck: it did not end within {_PATIENCE:g} s of the request, and is left so"

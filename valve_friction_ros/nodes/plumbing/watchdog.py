@@ -1,18 +1,24 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A thread that looks whether the nodes of a process still work, and says so where they do not."""
 
 import contextlib
 import faulthandler
-import threading
 from collections.abc import Sequence
-from types import TracebackType
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.systemd import notify, watchdog_time
-
-__all__ = ["LOOP_LIMIT", "Watchdog"]
+from valve_friction_ros.nodes.plumbing.worker import Companion
 
 LOOP_LIMIT = 10.0
 """Time, s, after which a loop that has not turned counts as stuck."""
@@ -22,7 +28,7 @@ _REPEAT = 1.0
 """Time between two messages, s."""
 
 
-class Watchdog:
+class Watchdog(Companion):
     """Watches the loop of some nodes from a thread of its own, as long as the context lasts.
 
     systemd's watchdog is served as long as the loop turns and no node has overdue work. When the
@@ -32,6 +38,7 @@ class Watchdog:
     """
 
     def __init__(self, nodes: Sequence[PolledNode]) -> None:
+        super().__init__("watchdog")
         self._nodes = nodes
         # Made in time: a loop that is stuck may hold what the making of a publisher needs.
         self._publisher: Publisher | None = None
@@ -40,33 +47,25 @@ class Watchdog:
         within = watchdog_time()
         self._look = _LOOK if within is None else min(_LOOK, max(within / 4, 0.05))
         self._turns = 0
-        self._has_ended = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
 
-    def __enter__(self) -> "Watchdog":
-        self._thread.start()
+    def begin(self) -> None:
+        """Tell systemd that the nodes are there."""
         notify("READY=1")
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._has_ended.set()
+    def end(self) -> None:
+        """Tell systemd that they end."""
         notify("STOPPING=1")
-        self._thread.join(1.0)  # it may be within the middleware, which is to be shut down
+        self.thread.join(1.0)  # it may be within the middleware, which is to be shut down
 
     def turned(self) -> None:
         """Note that the loop has turned."""
         self._turns += 1
 
-    def _watch(self) -> None:
-        """Look again and again; in a thread of its own."""
+    def run(self) -> None:
+        """Look again and again."""
         seen, idle = -1, 0
         allowed, each = round(LOOP_LIMIT / self._look), round(_REPEAT / self._look)
-        while not self._has_ended.wait(self._look):
+        while not self.has_ended.wait(self._look):
             turns = self._turns
             idle = 0 if turns != seen else idle + 1
             seen = turns

@@ -1,16 +1,24 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """Threads for work that takes its time: how long it has lasted, and how the process ends."""
 
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any, ParamSpec, TypeVar
 from weakref import WeakSet
 
-__all__ = ["Worker", "workers_have_ended"]
-
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
+_Companion = TypeVar("_Companion", bound="Companion")
 
 _PAUSE = 0.02
 
@@ -23,7 +31,7 @@ class Worker(ThreadPoolExecutor):
     name : str
         Name of the thread.
     prepare : callable, optional
-        What each thread does first.
+        What is done first, while all threads wait.
     finishes : bool
         Whether the end of the process waits a little for what has been submitted.
     threads : int
@@ -41,8 +49,11 @@ class Worker(ThreadPoolExecutor):
         self.finishes = finishes
         self._unfinished: set[Future[Any]] = set()
         self._begun: dict[int, float] = {}
-        wanted = () if prepare is None else (prepare,) * threads
-        self._preparations = [self.submit(one) for one in wanted]
+        self._preparation: Future[object] | None = None
+        if prepare is not None:
+            self._preparation = self.submit(prepare)
+            for _ in range(threads - 1):
+                super().submit(wait, [self._preparation])
         _workers.add(self)
 
     def submit(
@@ -73,13 +84,53 @@ class Worker(ThreadPoolExecutor):
 
     @property
     def is_preparing(self) -> bool:
-        """Whether what the threads do first is not done yet."""
-        return not all(one.done() for one in self._preparations)
+        """Whether what is done first is not done yet."""
+        return self._preparation is not None and not self._preparation.done()
 
     def busy_for(self) -> float:
         """Return how long the longest work under way has lasted, s; 0 if there is none."""
         begun = [*self._begun.values()]
         return time.monotonic() - min(begun) if begun else 0.0
+
+
+class Companion:
+    """A daemon thread that runs as long as the context lasts; the end does not wait for it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the thread.
+
+    Attributes
+    ----------
+    has_ended : threading.Event
+        Whether the context has ended.
+    thread : threading.Thread
+        What runs.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.has_ended = threading.Event()
+        self.thread = threading.Thread(target=self.run, name=name, daemon=True)
+
+    def __enter__(self: _Companion) -> _Companion:
+        self.begin()
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.has_ended.set()
+        self.end()
+
+    def begin(self) -> None:
+        """Do what comes first."""
+
+    def run(self) -> None:
+        """Do the work of the thread."""
+        raise NotImplementedError
+
+    def end(self) -> None:
+        """Do what comes last."""
 
 
 _workers: WeakSet[Worker] = WeakSet()

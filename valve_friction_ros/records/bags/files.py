@@ -1,22 +1,197 @@
-"""Storage files of a bag: their names, their formats, and how each is opened."""
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Storage files of a bag: names, formats, how each is opened, and the salvage of damaged ones."""
 
 import contextlib
+import io
+import os
 import re
 import shutil
-from collections.abc import Iterator
+import sqlite3
+import struct
+from binascii import crc32
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO
 
 import yaml
 from backports import zstd
+from lz4.frame import LZ4FrameDecompressor
 
-from valve_friction_ros.records.bags.kind import MCAP, ROS_1, SQLITE, ZSTD, first_bytes
 from valve_friction_ros.records.bags.rosbags_internals import McapFile
-from valve_friction_ros.records.bags.salvage import SalvagedMcap
-from valve_friction_ros.records.bags.sqlite_file import SqliteFile
-from valve_friction_ros.records.bags.storage import Storage
+from valve_friction_ros.records.bags.storage import (
+    MCAP,
+    ROS_1,
+    SQLITE,
+    ZSTD,
+    DamagedFileError,
+    Storage,
+    first_bytes,
+)
+from valve_friction_ros.records.bags.topics import Topic
 
-__all__ = ["opened", "storage_files"]
+_HEADER = struct.Struct(">16xH10xI")
+"""Page size, where 1 stands for 65536, and number of pages: https://sqlite.org/fileformat2.html"""
+
+
+class SqliteFile:
+    """A SQLite3 file, read row by row; if it is damaged, until SQLite meets the damage.
+
+    Rows that are still in a write-ahead log beside the file are read as well. `path` is the file
+    that messages name, `file` the same or what was unpacked of it. Without `salvage`, a damaged
+    file raises DamagedFileError, now or while its messages are gone through.
+    """
+
+    def __init__(self, path: Path, file: Path, salvage: bool) -> None:
+        self._path = path
+        self._salvage = salvage
+        with file.open("rb") as stream:
+            page_size, pages = _HEADER.unpack(stream.read(32).ljust(32, b"\0"))
+        page_size = 65536 if page_size == 1 else max(page_size, 1)
+        there, surplus = divmod(file.stat().st_size, page_size)
+        self._loss = f"; it holds {there} of {pages} pages" if there < pages else ""
+        self._folder: TemporaryDirectory[str] | None = None
+        is_logged = file.with_name(f"{file.name}-wal").exists()
+        if is_logged and not salvage:
+            raise DamagedFileError(path, "its recorder did not close it")
+        if surplus and not is_logged and salvage:
+            # SQLite would fill up the last page with zeros, and believe them.
+            self._folder = TemporaryDirectory()
+            file = Path(shutil.copy(file, self._folder.name))
+            os.truncate(file, there * page_size)
+        self._uri = f"{file.absolute().as_uri()}?{'mode=ro' if is_logged else 'immutable=1'}"
+        rows = self._rows("SELECT id, name, type FROM topics")
+        self._topics = {number: Topic(name, kind) for number, name, kind in rows}
+        self.topics: Collection[Topic] = set(self._topics.values())
+
+    def _rows(self, query: str, values: Sequence[int] = ()) -> Iterator[tuple[Any, ...]]:
+        connection = sqlite3.connect(self._uri, uri=True)
+        try:
+            if self._salvage:
+                # Else SQLite refuses to open a file that is shorter than its header says.
+                connection.execute("PRAGMA writable_schema = ON")
+            yield from connection.execute(query, values)
+        except sqlite3.Error as error:
+            if not self._salvage:
+                raise DamagedFileError(self._path, f"{error}{self._loss}") from None
+        finally:
+            connection.close()
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
+        """Go through the messages of some topics in the order of their recording."""
+        wanted = {number: topic for number, topic in self._topics.items() if topic in topics}
+        order = "id" if self._salvage else "timestamp, id"
+        query = (
+            f"SELECT topic_id, data FROM messages {'NOT INDEXED' if self._salvage else ''} "  # noqa: S608
+            f"WHERE topic_id IN ({','.join('?' * len(wanted))}) ORDER BY {order}"
+        )
+        for number, data in self._rows(query, [*wanted]):
+            if isinstance(data, bytes):
+                yield wanted[number], data
+
+    def close(self) -> None:
+        """Remove what was copied."""
+        if self._folder is not None:
+            self._folder.cleanup()
+
+
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x03, 0x04, 0x05, 0x06
+_ENDS = {0x00, 0x0F}
+"""No record of MCAP, but what a disk leaves after a loss of power; and the end of the data."""
+_MAGIC_SIZE = 8
+_WANTED = {_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK}
+_MESSAGE_HEADER = struct.Struct("<HIQQ")
+_CHUNK_HEADER = struct.Struct("<QQQI")
+
+
+def _text(stream: io.BytesIO) -> str:
+    (size,) = struct.unpack("<I", stream.read(4))
+    return stream.read(size).decode()
+
+
+def _chunk_content(chunk: bytes) -> bytes:
+    """Uncompressed content of a chunk; of a cut chunk, the part that is there; empty if damaged."""
+    stream = io.BytesIO(chunk)
+    try:
+        *_, size, checksum = _CHUNK_HEADER.unpack(stream.read(_CHUNK_HEADER.size))
+        compression = _text(stream)
+        stream.read(8)
+        content = stream.read()
+        if compression == "zstd":
+            content = zstd.ZstdDecompressor().decompress(content)
+        elif compression == "lz4":
+            content = LZ4FrameDecompressor().decompress(content)
+    except (struct.error, UnicodeDecodeError, zstd.ZstdError, RuntimeError):
+        return b""
+    is_damaged = len(content) == size and checksum and crc32(content) != checksum
+    return b"" if is_damaged else content
+
+
+def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
+    """Go through records of MCAP, opcode and content, up to the first that is not whole.
+
+    A chunk is opened; of one that is cut, what there is of it comes last.
+    """
+    while len(head := stream.read(9)) == 9:
+        opcode, length = struct.unpack("<BQ", head)
+        rest = size - stream.tell()
+        if opcode in _ENDS or (length > rest and opcode != _CHUNK):
+            return
+        if opcode not in _WANTED:
+            stream.seek(length, io.SEEK_CUR)
+            continue
+        content = stream.read(min(length, rest))
+        if opcode != _CHUNK:
+            yield opcode, content
+            continue
+        records = _chunk_content(content)
+        yield from _records(io.BytesIO(records), len(records))
+        if not records:
+            return
+
+
+class SalvagedMcap:
+    """An MCAP file read from its beginning to its end or first damage, without its index."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._channels: dict[int, Topic] = {}
+        types: dict[int, str] = {}
+        for opcode, content in self._walk():
+            record = io.BytesIO(content)
+            try:
+                if opcode == _SCHEMA:
+                    (schema,) = struct.unpack("<H", record.read(2))
+                    types[schema] = _text(record)
+                elif opcode == _CHANNEL:
+                    channel, schema = struct.unpack("<HH", record.read(4))
+                    self._channels[channel] = Topic(_text(record), types.get(schema, ""))
+            except (struct.error, UnicodeDecodeError):
+                break
+        self.topics: Collection[Topic] = set(self._channels.values())
+
+    def _walk(self) -> Iterator[tuple[int, bytes]]:
+        with self._path.open("rb") as stream:
+            stream.seek(_MAGIC_SIZE)
+            yield from _records(stream, self._path.stat().st_size)
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
+        """Go through the messages of some topics in the order of their recording."""
+        wanted = {number: topic for number, topic in self._channels.items() if topic in topics}
+        for opcode, content in self._walk():
+            if opcode == _MESSAGE and len(content) >= _MESSAGE_HEADER.size:
+                channel, *_ = _MESSAGE_HEADER.unpack_from(content)
+                if channel in wanted:
+                    yield wanted[channel], content[_MESSAGE_HEADER.size :]
+
 
 _STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
 

@@ -1,4 +1,13 @@
-"""Private names of rosbags, in this file only.
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Messages of a bag, and private names of rosbags, which are in this file only.
 
 Checked with rosbags 0.11.9; `test_rosbags_internals.py` names what a newer version lacks.
 
@@ -16,12 +25,11 @@ from typing import Any
 from backports import zstd
 from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from valve_friction_ros.records.bags.storage import DamagedFileError
 from valve_friction_ros.records.bags.topics import Topic
-
-__all__ = ["TYPES", "McapFile", "decoded"]
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 """Message types; those of pressure and stem have not changed since ROS 2 began."""
@@ -89,3 +97,47 @@ class McapFile:
     def close(self) -> None:
         """Close the file."""
         self._reader.close()
+
+
+_ZSTD = b"\x28\xb5\x2f\xfd"
+_NANOSECONDS = 1_000_000_000
+
+
+class UndecodableError(ValueError):
+    """Bytes that are no message of their topic's type."""
+
+
+def decode(data: bytes, kind: str) -> Any:
+    """Decode a message, compressed by its recorder or not.
+
+    Raises UndecodableError if the bytes are no such message.
+    """
+    if data.startswith(_ZSTD):
+        try:
+            data = zstd.decompress(data)
+        except zstd.ZstdError as error:
+            raise UndecodableError(str(error)) from None
+    if len(data) < 4 or data[0] != 0 or data[1] > 1:
+        raise UndecodableError("not in CDR")
+    try:
+        return decoded(data[4:], kind, bool(data[1]))
+    except (SerdeError, struct.error, ValueError, IndexError) as error:
+        raise UndecodableError(str(error)) from None
+
+
+def encode(message: object, kind: str) -> bytes:
+    """Encode a message."""
+    return bytes(TYPES.serialize_cdr(message, kind))
+
+
+def stamp_of(message: Any) -> int:
+    """Header stamp of a message, ns."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * _NANOSECONDS + int(stamp.nanosec)
+
+
+def header(stamp: int) -> Any:
+    """Header with a stamp in ns."""
+    seconds, nanoseconds = divmod(stamp, _NANOSECONDS)
+    time = TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
+    return TYPES.types["std_msgs/msg/Header"](stamp=time, frame_id="")

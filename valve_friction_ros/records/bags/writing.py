@@ -1,3 +1,12 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
 """A buffer's content as a bag, so that it can be kept, sent and identified again."""
 
 import contextlib
@@ -18,13 +27,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.messages import encode, header
-from valve_friction_ros.records.bags.rosbags_internals import TYPES
+from valve_friction_ros.records.bags.rosbags_internals import TYPES, encode, header
 from valve_friction_ros.records.bags.topics import PRESSURE_TYPE, STEM_TYPE, StreamNames
 from valve_friction_ros.streams.record_buffer import Snapshot
 from valve_friction_ros.streams.samples import Samples
-
-__all__ = ["VALVE_FILE", "write_bag"]
 
 VALVE_FILE = "valve.yaml"
 """The description of the valve, in the folder of the bag."""
@@ -127,7 +133,7 @@ def write_bag(
     It is written in a hidden folder beside its place and then renamed, so that nobody reads
     half a bag. The folder is made if it is not there; where the name is taken, a number is put
     after it. Rejected samples are only counted, in the metadata. A valve file lies in the bag, with
-    the settings of the identification by the names of `records.valve_keys`: `valve_friction
+    the settings of the identification by the names of `settings.IDENTIFICATION`: `valve_friction
     identify BAG` gives the numbers that the snapshot gives. A bag of this folder that is
     `replaced` goes once the new one is whole.
 

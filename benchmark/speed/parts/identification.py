@@ -1,0 +1,90 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Identification of a minute by the default method, in a running process and as a command."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from benchmark.plants import PLANTS
+from benchmark.speed.records import PERIOD, SAMPLES, pressure
+from benchmark.speed.rows import Row, Settings, medians
+from valve_friction_ros.identification import RefusalError, identify, published_estimate
+from valve_friction_ros.model import Recording, SensorNoise, Valve
+
+__all__ = ["measure"]
+
+_RECORDS = {
+    "100 Hz, 10 µm / 100 Pa": (10, SensorNoise(10e-6, 100.0, 1)),
+    "1 kHz, ideal": (1, None),
+    "1 kHz, 10 µm / 100 Pa": (1, SensorNoise(10e-6, 100.0, 1)),
+    "1 kHz, 28.6 µm / 165 Pa": (1, SensorNoise(28.6e-6, 165.0, 1)),
+}
+"""Of the samples at 1 kHz one in so many, and the noise of both sensors."""
+
+_WARM, _MOST = 0.3, 2.0
+"""Processor time, s: of a minute at 100 Hz and of an ideal one of a Karnopp valve, and of any."""
+
+_EXAMPLES = Path(__file__).parents[3] / "examples"
+_COMMANDS = {
+    "identify one_minute.csv": (["one_minute.csv", "--valve", "fv_101.yaml"], 1.0),
+    "identify --help": (["--help"], 0.2),
+}
+"""Arguments of a command, and its goal, s."""
+
+
+def _tried(
+    identification: Callable[[Recording, Valve], object], one: Recording, valve: Valve
+) -> None:
+    """Identify, or be refused; both take their time."""
+    try:
+        identification(one, valve)
+    except RefusalError:
+        return
+
+
+def measure(settings: Settings) -> Iterator[Row]:
+    """Measure the default method beside the published one, then the command."""
+    for name, plant in PLANTS.items():
+        driving = pressure("square", SAMPLES)
+        clean = Recording(PERIOD, driving, plant.respond(driving, PERIOD))
+        for words, (stride, noise) in _RECORDS.items():
+            signals = clean.drive[::stride], clean.position[::stride]
+            record = Recording(stride * PERIOD, *signals)
+            record = record if noise is None else noise.applied_to(record)
+            item = f"{name}, {words}"
+            settings.say(f"identification, {item}")
+            seconds = medians(
+                {
+                    each.__name__: lambda do=each, one=record, valve=plant.valve: _tried(
+                        do, one, valve
+                    )
+                    for each in (identify, published_estimate)
+                },
+                settings.repeats,
+            )
+            is_easy = plant.is_karnopp and (noise is None or stride > 1)
+            goal = _WARM if is_easy else _MOST
+            ours = seconds["identify"]
+            peer = 1e3 * seconds["published_estimate"]
+            told = "the published method alone", f"{1e3 * goal:.0f} ms", ours <= goal
+            yield Row(item, 1e3 * ours, "ms", peer, *told)
+    for item, (arguments, goal) in _COMMANDS.items():
+        settings.say(item)
+        seconds = medians({item: lambda given=arguments: _command(given)}, settings.repeats)
+        yield Row(item, seconds[item], "s", None, "", f"{goal:g} s", seconds[item] <= goal)
+
+
+def _command(arguments: list[str]) -> None:
+    """Run the command as a process of its own."""
+    command = [sys.executable, "-m", "valve_friction_ros", "identify", *arguments]
+    subprocess.run(command, cwd=_EXAMPLES, check=True, capture_output=True, env=os.environ)

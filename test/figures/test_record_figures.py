@@ -1,0 +1,691 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Figures of a record: what is drawn, read back from the axes."""
+
+import dataclasses
+import math
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from valve_friction_ros.figures import (
+    Case,
+    friction_figure,
+    identification_figure,
+    require_picture_file,
+    validation_figure,
+)
+from valve_friction_ros.figures.panels import COLOURS, titled_figure
+from valve_friction_ros.figures.record_figures import (
+    comparison_figure,
+    evidence_figure,
+    noise_figures,
+    record_figure,
+    residual_figure,
+    signature_loop_figure,
+)
+from valve_friction_ros.identification import (
+    Drawing,
+    Parameter,
+    Verdict,
+    identify_plant,
+    identify_signature,
+    validate,
+)
+from valve_friction_ros.identification.friction_drawing import (
+    FRICTION_CURVE,
+    IMPERFECTIONS_FOUND,
+    friction_drawing,
+)
+from valve_friction_ros.identification.published.sweep_drawing import chosen_region
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    Drive,
+    KarnoppParameters,
+    Recording,
+    SensorNoise,
+    TriangleWave,
+    Valve,
+    simulate,
+)
+
+NAN = math.nan
+LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
+
+
+@pytest.fixture(scope="module")
+def figure(result):
+    return identification_figure(result)
+
+
+def panels(figure):
+    """The axes of a figure by name."""
+    return {axes.get_label(): axes for axes in figure.axes}
+
+
+def title_of(figure):
+    return " ".join(figure._suptitle.get_text().split())
+
+
+def points(line):
+    return np.array(line.get_data())
+
+
+class TestPanels:
+    def test_every_axis_has_a_unit(self, figure):
+        """Axes that stand over one another share the lower one's label."""
+        found = panels(figure)
+        assert set(found) == LABELS
+        labels = {name: (axes.get_xlabel(), axes.get_ylabel()) for name, axes in found.items()}
+        assert labels == {
+            "pressure": ("", "pressure [kPa]"),
+            "stem": ("time [s]", "stem [mm]"),
+            "coulomb": ("", "Coulomb friction $F_c$ [N]"),
+            "sigma": ("threshold δv [m/s]", "$\\sigma_s$ [N]"),
+            "signature": ("pressure [kPa]", "stem [mm]"),
+        }
+        for upper, lower in (("pressure", "stem"), ("coulomb", "sigma")):
+            assert found[upper].get_shared_x_axes().joined(found[upper], found[lower])
+
+    def test_the_record_is_drawn_in_these_units(self, figure, record):
+        found = panels(figure)
+        (pressure,), (stem, _) = found["pressure"].lines, found["stem"].lines
+        (signature,) = found["signature"].lines
+        kilopascals, millimetres = record.pressure / 1e3, record.position * 1e3
+        np.testing.assert_array_equal(points(pressure), [record.time, kilopascals])
+        np.testing.assert_array_equal(points(stem), [record.time, millimetres])
+        np.testing.assert_array_equal(points(signature), [kilopascals, millimetres])
+
+    def test_the_simulated_stem_lies_on_the_measured_one(self, figure, record):
+        """Dotted over the whole record, and no further away than the noise."""
+        _, simulated = panels(figure)["stem"].lines
+        assert simulated.get_linestyle() == ":"
+        time, position = points(simulated)
+        assert time[0] == record.time[0]
+        assert record.time[-1] - time[-1] <= record.sample_period
+        measured = np.interp(time, record.time, record.position * 1e3)
+        rms = np.sqrt(np.mean((position - measured) ** 2))
+        assert rms < 1.2 * 10e-3
+
+    def test_there_is_none_without_a_simulated_model(self, result):
+        """As of a machine without a spring."""
+        regressed = dataclasses.replace(result, stem=None, misfit=None, rms=math.nan)
+        found = identification_figure(regressed)
+        assert len(panels(found)["stem"].lines) == 1
+        assert "fit" not in title_of(found)
+
+    def test_the_published_sweep_with_the_chosen_threshold(self, figure, result):
+        published = result.estimate
+        sweep, marker, _ = panels(figure)["coulomb"].lines
+        expected = [published.sweep.thresholds, published.sweep.estimates["coulomb_friction"]]
+        np.testing.assert_array_equal(points(sweep), expected)
+        chosen = [[published.threshold], [published.coulomb_friction]]
+        np.testing.assert_array_equal(points(marker), chosen)
+        sigma, upright = panels(figure)["sigma"].lines
+        np.testing.assert_array_equal(points(sigma)[0], published.sweep.thresholds)
+        assert set(upright.get_xdata()) == {published.threshold}
+
+    def test_a_method_without_a_sweep_has_none_to_draw(self, result):
+        alone = dataclasses.replace(result, exhibit=None)
+        assert Case.of("recording", alone).drawing.panels == ()
+        assert {*panels(identification_figure(alone))} == {"pressure", "stem", "signature"}
+
+    def test_the_identified_friction_with_its_band_and_verdict(self, with_parameters):
+        found = with_parameters(coulomb_friction=(152.25, 3.5, Verdict.WEAK))
+        axes = panels(identification_figure(found))["coulomb"]
+        level = axes.lines[2]
+        assert level.get_linestyle() == "--"
+        assert set(level.get_ydata()) == {152.25}
+        (band,) = axes.patches
+        low, high = band.get_extents().transformed(axes.transData.inverted()).intervaly
+        assert (low, high) == (pytest.approx(148.75), pytest.approx(155.75))
+        (note,) = axes.texts
+        assert note.get_text() == "$F_c$ = 152.2 ± 3.5 N: weak"
+
+    def test_a_given_friction_has_no_interval(self, with_parameters):
+        found = with_parameters(coulomb_friction=(152.5, 0.0, Verdict.FIXED))
+        (note,) = panels(identification_figure(found))["coulomb"].texts
+        assert note.get_text() == "$F_c$ = 152.5 N: fixed"
+
+    @pytest.mark.parametrize("coulomb", [40.0, 152.0, 1520.0])
+    def test_both_frictions_are_in_sight(self, with_parameters, coulomb):
+        found = with_parameters(coulomb_friction=(coulomb, 1.0, Verdict.IDENTIFIED))
+        axes = panels(identification_figure(found))["coulomb"]
+        low, high = axes.get_ylim()
+        assert low < coulomb < high
+        assert low < found.estimate.coulomb_friction < high
+
+    def test_force_of_a_machine_without_diaphragm(self, record, result):
+        force = dataclasses.replace(record, driven_by=Drive.FORCE)
+        found = panels(identification_figure(dataclasses.replace(result, recording=force)))
+        assert found["pressure"].get_ylabel() == "drive force [N]"
+        assert found["signature"].get_xlabel() == "drive force [N]"
+        np.testing.assert_array_equal(found["pressure"].lines[0].get_ydata(), record.pressure)
+
+    def test_long_records_are_thinned(self, record, result):
+        """Not below 20000 points, and to their whole length."""
+        many = Recording(1e-3, np.tile(record.pressure, 60), np.tile(record.position, 60))
+        found = identification_figure(dataclasses.replace(result, recording=many))
+        line = panels(found)["stem"].lines[0]
+        assert 20_000 <= line.get_xdata().size < 40_000
+        step = line.get_xdata()[1] - line.get_xdata()[0]
+        assert line.get_xdata()[-1] > many.duration - step
+
+
+class TestVerdict:
+    @pytest.fixture
+    def known(self, with_parameters):
+        return with_parameters(
+            coulomb_friction=(152.7, 1.0, Verdict.IDENTIFIED),
+            static_friction=(NAN, NAN, Verdict.NOT_IDENTIFIABLE),
+            viscous_friction=(4865.0, 400.0, Verdict.WEAK),
+            spring_constant=(2.05e5, 0.0, Verdict.FIXED),
+        )
+
+    def test_each_number_has_its_verdict(self, known):
+        """2·152.7 N over 2.05e5 N/m and 28.575 mm is 5.2 %."""
+        known = dataclasses.replace(known, warnings=())
+        assert title_of(identification_figure(known)) == (
+            "$F_c$ 152.7 N (identified); $F_v$ 4865 N·s/m (weak); $k$ 205000 N/m (fixed); "
+            f"dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
+        )
+
+    def test_a_number_without_a_verdict_is_never_shown(self, nothing_known):
+        """What is withheld leaves no number in the title, and no line, band or note of it."""
+        figure = identification_figure(nothing_known)
+        told = title_of(figure).split("; ")[:3]
+        assert told == [f"${name}$ not identifiable" for name in ("F_c", "F_v", "k")]
+        assert "dead band" not in title_of(figure)
+        axes = panels(figure)["coulomb"]
+        (note,) = axes.texts
+        assert note.get_text() == "$F_c$ not identifiable"
+        assert len(axes.lines) == 2
+        assert not axes.patches
+        everything = " ".join([title_of(figure), *(t.get_text() for t in axes.texts)])
+        assert "nan" not in everything
+
+    def test_warnings_are_told(self, known):
+        """Below the panels, and as they are, not as maths: they may hold text from outside."""
+        doubt = "the Karnopp model does not describe this valve: 98 µm are not noise"
+        doubted = dataclasses.replace(known, warnings=(doubt, r"check $\foo{$ and $x^2$"))
+        figure = identification_figure(doubted)
+        assert figure._supxlabel.get_text() == f"note: {doubt}\nnote: check $\\foo{{$ and $x^2$"
+        assert doubt not in title_of(figure)
+        figure.draw_without_rendering()
+
+    def test_many_and_long_warnings_stay_within_the_page(self, known):
+        doubted = dataclasses.replace(known, warnings=("many words " * 20, *"abcd"))
+        figure = identification_figure(doubted)
+        figure.draw_without_rendering()
+        for text in (figure._suptitle, figure._supxlabel):
+            box = text.get_window_extent()
+            assert figure.bbox.x0 < box.x0 < box.x1 < figure.bbox.x1
+        told = figure._supxlabel.get_text().splitlines()
+        assert len(told) == 5
+        assert told[-1] == "and 2 more notes, which the command prints"
+
+    def test_one_warning_more_than_fits_is_told(self, known):
+        """A line that counts it would need as much room."""
+        told = identification_figure(dataclasses.replace(known, warnings=(*"abcd",)))
+        assert told._supxlabel.get_text().splitlines() == [f"note: {one}" for one in "abcd"]
+
+    def test_a_number_keeps_its_percent_sign(self):
+        """Wherever the line of a title breaks."""
+        for length in range(85, 100):
+            title = f"{'x' * length} 14 % of travel"
+            lines = titled_figure(title)._suptitle.get_text().splitlines()
+            assert not any(line.startswith("%") for line in lines)
+
+    def test_the_friction_stands_clear_of_the_sweep(self, known):
+        """No point of the curve lies below the words that name F_c."""
+        figure = identification_figure(known)
+        figure.draw_without_rendering()
+        axes = panels(figure)["coulomb"]
+        (note,) = axes.texts
+        box = note.get_window_extent()
+        curve = axes.transData.transform(points(axes.lines[0]).T)
+        covered = [box.contains(x, y) for x, y in curve]
+        assert len(covered) > 100
+        assert not any(covered)
+
+    def test_the_scale_of_sigma_can_be_read(self, known):
+        figure = identification_figure(known)
+        figure.draw_without_rendering()
+        axes = panels(figure)["sigma"]
+        low, high = axes.get_ylim()
+        ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
+        assert len(ticks) >= 3
+        assert all(label.get_text() for label in axes.get_yticklabels())
+
+    def test_the_model_is_seen_on_the_measured_stem(self, known):
+        """Also in black and white: a thin dark line on a wide pale one."""
+        measured, model = panels(identification_figure(known))["stem"].lines
+        assert measured.get_linewidth() > 2 * model.get_linewidth()
+        assert measured.get_alpha() < 0.5
+        assert model.get_color() == "k"
+
+    def test_beyond_the_travel(self, with_parameters):
+        tight = with_parameters(
+            coulomb_friction=(4e3, 1.0, Verdict.IDENTIFIED),
+            static_friction=(4e3, 1.0, Verdict.IDENTIFIED),
+            spring_constant=(2.05e5, 0.0, Verdict.FIXED),
+        )
+        title = title_of(identification_figure(tight))
+        assert "dead band 137 % of travel" in title
+
+    def test_without_a_travel(self, result):
+        endless = Valve(BENCH_VALVE.diaphragm_area, BENCH_VALVE.pressure_reference)
+        assert "dead band" not in title_of(
+            identification_figure(dataclasses.replace(result, valve=endless))
+        )
+
+
+class TestSeveralCases:
+    def case(self, record, result, number):
+        later = Recording(0.01, record.pressure, record.position, 100.0 + 30.0 * number)
+        return Case.of(f"case {number}", dataclasses.replace(result, recording=later))
+
+    @pytest.mark.parametrize("count", [2, len(COLOURS)])
+    def test_each_has_its_line_colour_and_name(self, record, result, count):
+        cases = [self.case(record, result, number) for number in range(count)]
+        found = panels(friction_figure(cases, "verdict"))
+        for name in ("pressure", "stem", "signature"):
+            drawn = [line.get_color() for line in found[name].lines if line.get_linestyle() == "-"]
+            assert drawn == list(COLOURS[:count])
+        names = [text.get_text() for text in found["signature"].get_legend().get_texts()]
+        assert names == [case.label for case in cases]
+        assert len(found["coulomb"].texts) == count
+
+    def test_time_runs_from_the_first_record(self, record, result):
+        cases = [self.case(record, result, number) for number in (0, 1)]
+        lines = panels(friction_figure(cases, "verdict"))["stem"].lines
+        assert [line.get_xdata()[0] for line in lines] == [0.0, 0.0, 30.0, 30.0]
+        ends = [line.get_xdata()[-1] for line in lines[2:]]
+        assert ends == pytest.approx([30.0 + record.duration] * 2, abs=record.sample_period)
+
+    def test_one_alone_needs_no_legend(self, figure):
+        assert panels(figure)["signature"].get_legend() is None
+
+    @pytest.mark.parametrize("count", [0, 1 + len(COLOURS)])
+    def test_none_or_too_many(self, record, result, count):
+        cases = [self.case(record, result, number) for number in range(count)]
+        with pytest.raises(ValueError, match=f"^one to 4 cases can be drawn, got {count}$"):
+            friction_figure(cases, "verdict")
+
+
+def test_case_of_a_result(result):
+    case = Case.of("loose", result)
+    coulomb, sigma, _ = case.drawing.panels
+    assert coulomb.curves[1].y == [result.estimate.coulomb_friction]
+    assert sigma.chosen == result.estimate.threshold
+    assert coulomb.level is result.parameters["coulomb_friction"]
+    assert case.stem is result.stem
+    assert case.recording.driven_by is Drive.PRESSURE
+
+
+class TestPictures:
+    def test_png(self, figure, tmp_path):
+        """The curves of the three colours of the page, the text and the line are there."""
+        path = tmp_path / "figure.png"
+        require_picture_file(path)
+        figure.savefig(path)
+        pixels = np.round(255 * matplotlib.image.imread(path)[..., :3]).astype(int)
+        width, height = figure.get_size_inches() * figure.dpi
+        assert pixels.shape[:2] == (round(height), round(width))
+        blue = [int(COLOURS[0][place : place + 2], 16) for place in (1, 3, 5)]
+        assert np.count_nonzero((pixels == blue).all(axis=2)) > 1000
+        assert np.count_nonzero((pixels == 255).all(axis=2)) > pixels.shape[0] * pixels.shape[1] / 2
+
+    @pytest.mark.parametrize("name", ["figure.png", "figure.PNG", "figure.pdf", "figure.svg"])
+    def test_formats(self, tmp_path, name):
+        require_picture_file(tmp_path / name)
+
+    @pytest.mark.parametrize("name", ["figure", "figure.", "figure.csv", "figure.gif", "png"])
+    def test_no_format(self, tmp_path, name):
+        with pytest.raises(
+            ValueError, match=r"the ending is not a picture format; choose \.png, \.pdf or \.svg$"
+        ):
+            require_picture_file(tmp_path / name)
+
+    def test_no_folder(self, tmp_path):
+        with pytest.raises(ValueError, match="there is no folder") as refusal:
+            require_picture_file(tmp_path / "none" / "figure.png")
+        assert str(refusal.value).startswith(str(tmp_path / "none" / "figure.png"))
+
+
+SPEED, CURVE_FRICTION = [-4e-3, -1e-3, 2e-3, 8e-3], [-70.0, -55.0, 60.0, 90.0]
+CURVE = {
+    "speed": SPEED,
+    "friction": CURVE_FRICTION,
+    "standard_error": [1.0, 2.0, 3.0, 4.0],
+    "lag": 0.012,
+}
+SLIDING_SPEED = 5e-3
+MODEL = KarnoppParameters(1.0, 4e3, 50.0, 80.0, 2e5, stribeck_velocity=1e-3)
+
+
+def parameter(name, value, half_width, withheld=(NAN, NAN)):
+    verdict = Verdict.IDENTIFIED if math.isfinite(value) else Verdict.NOT_IDENTIFIABLE
+    return Parameter(name, value, half_width / 2, half_width, verdict, withheld=withheld)
+
+
+def drawn(model=None, lag=None, **numbers):
+    """The curves of the panel, for values and half widths by name."""
+    parameters = {name: parameter(name, *one) for name, one in numbers.items()}
+    evidence = {FRICTION_CURVE: CURVE}
+    if lag is not None:
+        evidence[IMPERFECTIONS_FOUND] = {"lag": {"value": lag, "half_width": 1e-3}}
+    (panel,) = friction_drawing(Drawing(), evidence, parameters, model, SLIDING_SPEED).panels
+    return panel.curves
+
+
+LINEAR = {
+    "coulomb_friction": (50.0, 3.0),
+    "viscous_friction": (4e3, 500.0),
+    "sliding_friction": (70.0, 2.0),
+}
+
+
+class TestLaw:
+    def test_the_record_in_millimetres_per_second_with_its_intervals(self):
+        bins = drawn()[0]
+        np.testing.assert_allclose(bins.x, [-4.0, -1.0, 2.0, 8.0])
+        assert bins.y.tolist() == CURVE_FRICTION
+        np.testing.assert_allclose(bins.half_width, 1.95996 * np.array([1, 2, 3, 4]), rtol=1e-5)
+
+    def test_the_line_is_that_of_the_result_in_both_directions(self):
+        """As far as the fastest bin."""
+        _, law, _ = drawn(**LINEAR)
+        speed = np.asarray(law.x) / 1e3
+        assert (speed.min(), speed.max()) == pytest.approx((-8e-3, 8e-3))
+        np.testing.assert_allclose(law.y, np.sign(speed) * (50.0 + 4e3 * np.abs(speed)))
+
+    def test_friction_that_falls_with_speed(self):
+        values = {
+            "coulomb_friction": (50.0, 1.0),
+            "viscous_friction": (4e3, 100.0),
+            "static_friction": (80.0, 7.0),
+            "stribeck_velocity": (1e-3, 1e-4),
+        }
+        law = drawn(**values)[1]
+        np.testing.assert_allclose(law.y, MODEL.sliding_friction(np.asarray(law.x) / 1e3))
+        middle = np.asarray(law.x).size // 2
+        assert law.y[middle] == pytest.approx(80.0, rel=1e-3)
+
+    def test_the_band_holds_the_intervals_that_are_known(self):
+        """That of F_c at rest, that of the sliding friction at its speed."""
+        _, law, _ = drawn(**LINEAR)
+        speed = np.asarray(law.x) / 1e3
+        band = np.interp([1e-6, SLIDING_SPEED], speed, law.half_width)
+        np.testing.assert_allclose(band, [3.0, 2.0], rtol=2e-3)
+        assert law.label == "fitted law ± 95 %"
+
+    def test_no_band_where_an_interval_is_unknown(self):
+        _, law = drawn(MODEL, viscous_friction=(NAN, NAN), coulomb_friction=(50.0, 3.0))
+        assert np.isnan(law.half_width).all()
+        assert law.label == "fitted law"
+
+    def test_a_withheld_value_is_drawn_with_its_interval(self):
+        withheld = {**LINEAR, "viscous_friction": (NAN, NAN, (4e3, 5e3))}
+        _, law, _ = drawn(**withheld)
+        speed = np.asarray(law.x) / 1e3
+        np.testing.assert_allclose(np.abs(law.y), 50.0 + 4e3 * np.abs(speed))
+        assert np.isfinite(law.half_width).all()
+
+    def test_no_line_without_a_law(self):
+        assert [one.style for one in drawn(sliding_friction=(70.0, 2.0))] == ["o", "D"]
+
+    def test_the_sliding_friction_at_its_speed_both_ways(self):
+        *_, sliding = drawn(**LINEAR)
+        assert sliding.x == [-5.0, 5.0]
+        assert (sliding.y, sliding.half_width) == ([-70.0, 70.0], [2.0, 2.0])
+        assert sliding.label == "sliding friction 70 ± 2 N"
+
+    def test_a_record_without_a_curve_has_no_panel(self):
+        assert friction_drawing(Drawing(), {FRICTION_CURVE: {}}, {}, MODEL, NAN).panels == ()
+
+    def test_the_record_is_shown_with_the_lag_of_the_fit(self):
+        """A stem that is seen 2 ms later looks as one with F_v less by k·2 ms."""
+        bins = drawn(lag=0.010, spring_constant=(2e5, 1e3))[0]
+        np.testing.assert_allclose(bins.y, np.add(CURVE_FRICTION, 400.0 * np.array(SPEED)))
+        assert drawn(lag=0.010)[0].y.tolist() == CURVE_FRICTION
+
+
+@pytest.fixture(scope="module")
+def rested(record):
+    """The record between rests of 6 s and 3 s."""
+    ends = (600, 300)
+    quiet = SensorNoise(position=10e-6, pressure=100.0, seed=2)
+    padded = Recording(
+        0.01, *(np.pad(one, ends, "edge") for one in (record.drive, record.position))
+    )
+    return identify_plant(quiet.applied_to(padded), BENCH_VALVE)
+
+
+def panel_of(figure):
+    (found,) = [axes for axes in figure.axes if axes.get_label() == "friction"]
+    return found
+
+
+class TestFigure:
+    @pytest.fixture(scope="class")
+    def figure(self, rested):
+        return identification_figure(rested)
+
+    def test_it_takes_the_place_of_the_published_sweep(self, rested, figure):
+        assert rested.estimate is not None
+        names = {axes.get_label() for axes in figure.axes}
+        assert names == {"pressure", "stem", "friction", "signature"}
+        axes = panel_of(figure)
+        assert axes.get_xlabel() == "stem speed [mm/s]"
+        assert axes.get_ylabel() == "friction [N]"
+
+    def test_the_record_lies_on_the_law(self, rested):
+        bins, law, _ = rested.drawing.panels[0].curves
+        assert min(bins.x) < 0.0 < max(bins.x)
+        expected = np.interp(bins.x, law.x, law.y)
+        friction = rested.parameters["sliding_friction"].value
+        assert np.max(np.abs(bins.y - expected)) < 0.05 * friction
+
+    def test_the_legend_hides_nothing(self, figure):
+        axes = panel_of(figure)
+        figure.canvas.draw()
+        box = axes.get_legend().get_window_extent()
+        for line in axes.lines:
+            for x, y in axes.transData.transform(line.get_xydata()):
+                assert not box.contains(x, y)
+
+    def test_the_model_is_drawn_at_its_own_time(self, rested, figure):
+        """Rests before and after the motion are not simulated."""
+        (axes,) = [one for one in figure.axes if one.get_label() == "stem"]
+        measured, model = axes.lines
+        time, position = model.get_data()
+        assert time[0] > 3.0
+        assert time[-1] < measured.get_xdata()[-1] - 0.5
+        apart = position - np.interp(time, *measured.get_data())
+        assert np.sqrt(np.mean(apart**2)) == pytest.approx(rested.rms * 1e3, rel=0.3)
+
+    def test_a_case_without_a_curve_beside_one_that_has_it(self, rested):
+        bare = dataclasses.replace(rested, exhibit=None, evidence={})
+        cases = [Case.of("none", bare), Case.of("curve", rested)]
+        axes = panel_of(friction_figure(cases, "two"))
+        assert len(axes.get_legend().get_texts()) == 3
+
+    def test_in_a_report(self, rested):
+        drawing = rested.drawing
+        (axes,) = evidence_figure(drawing).axes
+        assert axes.get_xlabel() == "stem speed [mm/s]"
+        assert "No law of friction is assumed" in drawing.caption
+
+
+@pytest.fixture(scope="module")
+def signature_record(benches):
+    """Five strokes at 100 Hz."""
+    pressure = TriangleWave().sample(np.arange(15_000) / 100)
+    position = simulate(*benches["high"], pressure, 0.01).position
+    return Recording(0.01, pressure, position)
+
+
+@pytest.fixture(scope="module")
+def found(signature_record):
+    return identify_signature(signature_record, BENCH_VALVE)
+
+
+def signature_and_validation_panels(figure):
+    return {axes.get_label(): axes for axes in figure.axes}
+
+
+def lines(axes):
+    return {line.get_label(): line for line in axes.lines}
+
+
+class TestSignature:
+    @pytest.fixture(scope="class")
+    def figure(self, found):
+        return identification_figure(found)
+
+    def test_points(self, figure, found):
+        drawn = lines(signature_and_validation_panels(figure)["signature"])
+        for label, points in (
+            ("$P_1$", found.signature.upward_points),
+            ("$P_2$", found.signature.downward_points),
+        ):
+            expected = [[1e-3 * one.drive, 1e3 * one.position] for one in points]
+            np.testing.assert_allclose(drawn[label].get_xydata(), expected, rtol=1e-12)
+
+    def test_lines_lie_on_the_sliding_stem(self, figure, found):
+        """Drawn in kPa and mm: within what the speed's onset leaves, 0.1 kPa."""
+        drawn = lines(signature_and_validation_panels(figure)["signature"])
+        for way, label in zip(found.signature.ways, ("up", "down"), strict=True):
+            line = drawn[f"slides {label}, slope $S_a$/k"].get_xydata()
+            sliding = way[0].sliding
+            pressure = 1e-3 * BENCH_VALVE.actuator_drive(sliding.force[[0, -1]])
+            np.testing.assert_allclose(line[:, 0], pressure, atol=0.1)
+            np.testing.assert_allclose(line[:, 1], 1e3 * sliding.position[[0, -1]])
+
+    def test_stem_and_model(self, figure, found, signature_record):
+        measured, model, points = signature_and_validation_panels(figure)["stem"].lines
+        np.testing.assert_array_equal(measured.get_ydata(), signature_record.position * 1e3)
+        np.testing.assert_array_equal(model.get_ydata(), found.stem.simulated * 1e3)
+        assert points.get_xdata().size == 5
+
+    def test_words(self, figure, found):
+        title = " ".join(figure._suptitle.get_text().split())
+        assert f"$F_c$ {found.values['coulomb_friction']:.4g} N (weak)" in title
+        assert f"fit {100 * found.fit:.2f} %" in title
+        assert "dead zone 29.6" in signature_and_validation_panels(figure)["signature"].get_title()
+        assert signature_and_validation_panels(figure)["signature"].get_xlabel() == "pressure [kPa]"
+        assert signature_and_validation_panels(figure)["signature"].get_ylabel() == "stem [mm]"
+
+
+class TestValidation:
+    @pytest.fixture(scope="class")
+    def validation(self, benches, signature_record):
+        return validate(signature_record, BENCH_VALVE, benches["low"].parameters)
+
+    def test_what_is_drawn(self, validation):
+        drawn = signature_and_validation_panels(validation_figure(validation, BENCH_VALVE))
+        measured, simulated = drawn["stem"].lines
+        np.testing.assert_array_equal(measured.get_ydata(), validation.recording.position * 1e3)
+        np.testing.assert_array_equal(simulated.get_ydata(), validation.simulated * 1e3)
+        (residual,) = drawn["residual"].lines
+        np.testing.assert_array_equal(residual.get_ydata(), validation.residual * 1e3)
+        (pressure,) = drawn["pressure"].lines
+        np.testing.assert_array_equal(pressure.get_ydata(), validation.recording.pressure / 1e3)
+        assert drawn["pressure"].get_xlabel() == "time [s]"
+        assert "[mm]" in drawn["stem"].get_ylabel()
+
+    def test_title_and_file(self, validation, tmp_path):
+        figure = validation_figure(validation, BENCH_VALVE)
+        title = " ".join(figure._suptitle.get_text().split())
+        assert title.startswith(f"fit {100 * validation.fit:.2f} %; rms ")
+        assert "of travel" in title
+        figure.savefig(tmp_path / "validation.png")
+        assert matplotlib.image.imread(tmp_path / "validation.png").shape[0] > 500
+
+
+MILLIMETRE = 1 / 25.4
+PRINTABLE = 180.0  # mm between the margins of an A4 page
+
+
+@pytest.fixture(scope="module")
+def figures(record, result):
+    comparison = result.stem
+    return {
+        "record": record_figure(record),
+        "loop": signature_loop_figure(result),
+        "sweep": evidence_figure(result.drawing),
+        "comparison": comparison_figure(comparison),
+        "residual": residual_figure(comparison),
+        **dict(zip(("histogram", "correlation"), noise_figures(comparison), strict=True)),
+    }
+
+
+def report_figures_lines(axes):
+    return [np.asarray(line.get_xydata()).T for line in axes.lines]
+
+
+@pytest.mark.parametrize("name", ["record", "loop", "sweep", "comparison", "residual"])
+def test_every_axis_has_its_unit_and_the_width_fits(figures, name):
+    figure = figures[name]
+    assert 0.95 * PRINTABLE * MILLIMETRE < figure.get_figwidth() <= 1.01 * PRINTABLE * MILLIMETRE
+    assert figure.axes
+    for axes in figure.axes:
+        assert "[" in axes.get_ylabel() or axes.get_ylabel() == "samples"
+        shown = axes.get_subplotspec().is_last_row()
+        assert ("[" in axes.get_xlabel()) == shown
+
+
+@pytest.mark.parametrize("name", ["histogram", "correlation"])
+def test_two_of_half_the_width_stand_beside_each_other(figures, name):
+    figure = figures[name]
+    assert 2 * figure.get_figwidth() < PRINTABLE * MILLIMETRE
+    (axes,) = figure.axes
+    assert "[" in axes.get_xlabel()
+
+
+def test_the_loop_of_the_baseline_lies_below_that_of_now(record, result):
+    healthy = Recording(0.01, record.pressure * 1.1, record.position)
+    (axes,) = signature_loop_figure(result, healthy).axes
+    before, now = axes.lines
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["baseline", "now"]
+    np.testing.assert_allclose(before.get_xdata(), healthy.pressure / 1e3)
+    np.testing.assert_allclose(now.get_xdata(), record.pressure / 1e3)
+    assert before.get_color() != now.get_color()
+
+
+def test_record_and_loop_show_what_was_measured(figures, record):
+    pressure, stem = (report_figures_lines(axes)[0] for axes in figures["record"].axes)
+    np.testing.assert_allclose(pressure, [record.time, record.pressure / 1e3])
+    np.testing.assert_allclose(stem, [record.time, record.position * 1e3])
+    (loop,) = report_figures_lines(figures["loop"].axes[0])
+    np.testing.assert_allclose(loop, [record.pressure / 1e3, record.position * 1e3])
+
+
+def test_the_sweep_marks_choice_and_region_in_every_panel(figures, result):
+    threshold = result.estimate.threshold
+    low, high = chosen_region(result.estimate.sweep, threshold)
+    assert low <= threshold <= high
+    for axes in figures["sweep"].axes:
+        spans = [patch.get_extents() for patch in axes.patches]
+        edges = [axes.transData.inverted().transform(span)[:, 0] for span in spans]
+        assert any(np.allclose(edge, (low, high)) for edge in edges)
+        assert any(threshold in np.asarray(line.get_xdata()) for line in axes.lines)
+
+
+def test_comparison_and_residual_belong_together(figures, result):
+    measured, simulated = report_figures_lines(figures["comparison"].axes[0])
+    assert len(figures["comparison"].legends) == 1
+    residual = report_figures_lines(figures["residual"].axes[0])[0]
+    np.testing.assert_allclose(residual[1] / 1e3, simulated[1] - measured[1], atol=1e-9)
+    np.testing.assert_allclose(residual[1], result.stem.residual * 1e6, atol=1e-6)
+    correlation = report_figures_lines(figures["correlation"].axes[0])[0]
+    assert correlation[1][0] == 1

@@ -1,0 +1,357 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A folder is a plant: exports of several forms, one table of valves, a history by tag and time."""
+
+import asyncio
+import contextlib
+import csv
+import io
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from zoneinfo import ZoneInfo
+
+import numpy as np
+import pytest
+from browser import Tab, chromium
+from local_server import free_port
+
+from valve_friction_ros.commands.main import run
+from valve_friction_ros.dashboard import Plant, ServiceRequest
+from valve_friction_ros.dashboard.context import ValveFiles
+from valve_friction_ros.dashboard.kept_valves import HistoryOperator, KeptValves
+from valve_friction_ros.dashboard.plant_rows import state_of
+from valve_friction_ros.fleet.filing import kept_valve
+from valve_friction_ros.fleet.plant import read_plant, tags_in
+from valve_friction_ros.history import AlarmFilter, HistoryFile
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, SineWave, simulate
+from valve_friction_ros.model.recording import Recording
+
+TABLE = (
+    "tag;area [cm2];travel [mm];spring;range\n"
+    "FV-101;445;28.575;0.2..1.4 bar;-0.1..4 bar\n"
+    "FV-102;445;28.575;0.2..1.4 bar;-0.1..4 bar\n"
+)
+GROWTH = 0.2
+"""Of the friction, a quarter."""
+MONTHS = ((2025, 7), (2025, 10), (2026, 1), (2026, 4), (2026, 7))
+QUARTERS = [datetime(year, month, 3, 8, tzinfo=timezone.utc) for year, month in MONTHS]
+
+
+def stroke(friction, seed):
+    """Twenty seconds of a sine at 100 Hz, pressure as gauge."""
+    pressure = SineWave(period=10.0).sample(np.arange(2000) / 100)
+    packing = replace(LOW_FRICTION, coulomb_friction=friction, static_friction=friction)
+    stem = simulate(BENCH_VALVE, packing, pressure, 0.01).position
+    noisy = SensorNoise(2e-6, 20.0, seed=seed).applied_to(Recording(0.01, pressure, stem))
+    return noisy.pressure - BENCH_VALVE.pressure_reference, noisy.position
+
+
+def german(begin, pressure, position):
+    rows = ["Zeit;Stelldruck (bar);Ventilstellung (%)"]
+    for index, (one, other) in enumerate(zip(pressure, position, strict=True)):
+        time = begin + timedelta(milliseconds=10 * index)
+        share = 100 * other / BENCH_VALVE.travel
+        fraction = time.microsecond // 1000
+        rows.append(f"{time:%d.%m.%Y %H:%M:%S},{fraction:03d};{one / 1e5:.5f};{share:.4f}")
+    head, *others = rows
+    return "\n".join([head, *(re.sub(r";(-?\d+)\.(\d+)", r";\1,\2", row) for row in others)])
+
+
+def long_form(begin, tag, pressure, position):
+    rows = ["Tag,Time,Value,Status"]
+    for index, (one, other) in enumerate(zip(pressure, position, strict=True)):
+        time = (begin + timedelta(milliseconds=10 * index)).isoformat(timespec="milliseconds")
+        rows += [
+            f"{tag} pressure (kPa),{time},{one / 1e3:.3f},Good",
+            f"{tag} position (mm),{time},{other * 1e3:.4f},Good",
+        ]
+    return "\n".join(rows)
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory):
+    """Five quarters of FV-101, whose packing is tightened, one of FV-102, and two bad exports."""
+    folder = tmp_path_factory.mktemp("plant")
+    (folder / "valves.csv").write_text(TABLE)
+    exports = folder / "exports"
+    for number, begin in enumerate(QUARTERS):
+        quarter = exports / f"Q{number + 1}"
+        quarter.mkdir(parents=True)
+        grown = stroke(150.0 * (1 + GROWTH * number), number)
+        (quarter / "fv101 stroke.csv").write_text(german(begin, *grown))
+    last = long_form(QUARTERS[-1], "FV-102", *stroke(150.0, 10))
+    (exports / "trend.txt").write_text(last)
+    for name in ("a", "b"):
+        (exports / f"FV-102 {name}.csv").write_text("Time,Position,Pressure\n0,1,2\n0.1,1,2\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(plant):
+    """The code of a run."""
+    arguments = [
+        "identify-folder", str(plant / "exports"), "--plant", str(plant / "valves.csv"),
+        "--history", str(plant / "history.sqlite"), "--first-is-baseline", "--jobs", "1",
+        "--output", str(plant / "friction.csv"), "--output", str(plant / "friction.html"),
+        "--no-reports", "--time-zone", "Europe/Berlin", "--fix", "mass=1.6",
+    ]  # fmt: skip
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = run(arguments)
+    return code, out.getvalue(), err.getvalue(), arguments
+
+
+def entries(plant, tag):
+    history = HistoryFile(plant / "history.sqlite")
+    return history.entries([kept_valve(tag).name], 0, 2**63 - 1)
+
+
+def test_each_quarter_is_filed_under_its_tag_and_time(plant, done):
+    """The German export has local times, the long form names UTC."""
+    assert done[0] == 1
+    of_first = entries(plant, "FV-101")
+    assert {one.valve.tag for one in of_first} == {"FV-101"}
+    local = [one.replace(tzinfo=ZoneInfo("Europe/Berlin")).timestamp() for one in QUARTERS]
+    assert [one.span.begin / 1e9 for one in of_first] == pytest.approx(local, abs=1e-3)
+    (other,) = entries(plant, "FV-102")
+    assert other.span.begin / 1e9 == pytest.approx(QUARTERS[-1].timestamp(), abs=1e-3)
+
+
+def test_the_growth_is_a_trend(plant, done):
+    assert done
+    ratios = [one.diagnosis.ratio.value for one in entries(plant, "FV-101")]
+    assert ratios == pytest.approx([1, 1.2, 1.4, 1.6, 1.8], rel=0.05)
+    assert [one.diagnosis.level.name for one in entries(plant, "FV-101")] == [
+        "OK",
+        "OK",
+        "WARN",
+        "WARN",
+        "WARN",
+    ]
+
+
+def test_rows_have_the_tag_the_time_and_the_ratio(plant, done):
+    assert done
+    with (plant / "friction.csv").open() as stream:
+        rows = {row["recording"]: row for row in csv.DictReader(stream)}
+    row = rows["Q5/fv101 stroke.csv"]
+    assert (row["valve"], row["began"]) == ("FV-101", "2026-07-03T06:00:00Z")
+    assert float(row["ratio"]) == pytest.approx(1.8, rel=0.05)
+    page = (plant / "friction.html").read_text()
+    assert "2026-07-03 08:00 Europe/Berlin" in page
+
+
+def test_equal_faults_are_one_line(done):
+    _, out, err, _ = done
+    assert err.count("cannot tell the unit of the pressure") == 1
+    assert "2 refused: cannot tell the unit of the pressure" in out
+
+
+def test_the_next_run_has_nothing_to_do(plant, done, capsys):
+    assert run(done[3]) == 1
+    assert "0 to do" in capsys.readouterr().err
+    assert len(entries(plant, "FV-101")) == len(QUARTERS)
+
+
+def test_a_first_survey_ranks_by_the_dead_band_and_says_what_to_do(tmp_path, capsys):
+    """The dead band (F_c + F_s)/k over the travel is 5, 15 and 27 %, the limits are 10 and 20."""
+    (tmp_path / "valves.csv").write_text(TABLE + "FV-103;445;28.575;0.2..1.4 bar;-0.1..4 bar\n")
+    (tmp_path / "exports").mkdir()
+    for tag, friction in (("FV-101", 150.0), ("FV-102", 800.0), ("FV-103", 450.0)):
+        text = german(QUARTERS[0], *stroke(friction, 1))
+        (tmp_path / "exports" / f"{tag}.csv").write_text(text)
+    arguments = ["--plant", str(tmp_path / "valves.csv"), "--jobs", "1", "--fix", "mass=1.6"]
+    arguments += ["--output", str(tmp_path / "survey.csv"), "--time-zone", "Europe/Berlin"]
+    assert run(["identify-folder", str(tmp_path / "exports"), *arguments]) == 0
+    out = capsys.readouterr().out
+    first, second = out.index("bad FV-102.csv FV-102"), out.index("watch FV-103.csv FV-103")
+    assert first < out.index("plan work on the packing") < second
+    assert second < out.index("record it again within three months")
+    assert "FV-101" not in out
+    with (tmp_path / "survey.csv").open() as stream:
+        rows = {row["valve"]: row for row in csv.DictReader(stream)}
+    assert [rows[tag]["survey"] for tag in sorted(rows)] == ["good", "bad", "watch"]
+    shares = [float(rows[tag]["dead_band_of_travel"]) for tag in sorted(rows)]
+    exact = [2 * f / (LOW_FRICTION.spring_constant * BENCH_VALVE.travel) for f in (150, 800, 450)]
+    assert shares == pytest.approx(exact, rel=0.03)
+
+
+def test_the_reports_of_a_later_run_know_the_kept_baseline(plant, done, tmp_path):
+    """Titled by the tag, in the stated zone, under a name that the dashboard finds."""
+    assert done
+    exports = tmp_path / "exports"
+    exports.mkdir()
+    shutil.copy(plant / "exports" / "Q5" / "fv101 stroke.csv", exports)
+    shutil.copy(plant / "history.sqlite", tmp_path)
+    arguments = [
+        "--plant",
+        str(plant / "valves.csv"),
+        "--history",
+        str(tmp_path / "history.sqlite"),
+    ]
+    arguments += ["--output", str(tmp_path / "q5.html"), "--time-zone", "Europe/Berlin"]
+    assert (
+        run(["identify-folder", str(exports), *arguments, "--jobs", "1", "--fix", "mass=1.6"]) == 0
+    )
+    files = ValveFiles({"reports": tmp_path / "q5_reports"}).offered("/fv_101")
+    (offered,) = files
+    assert offered.path.startswith("fv_101_20260703T060000Z_")
+    page = (tmp_path / "q5_reports" / offered.path).read_text()
+    assert "<title>Friction of FV-101</title>" in page
+    assert "Recorded 2026-07-03 08:00 Europe/Berlin" in page
+    assert "friction has grown" in page
+
+
+class TestDashboard:
+    """What the dashboard makes of the history alone."""
+
+    @pytest.fixture
+    def shown(self, plant, done):
+        assert done
+        place, valves = plant / "history.sqlite", Plant(math.inf)
+        kept = KeptValves(place, valves)
+        kept.refresh()
+        return place, valves, kept
+
+    def view(self, valves):
+        heard = {one.view.tag: one for one in valves.valves(1e9)}
+        return heard["FV-101"]
+
+    def test_it_shows_the_trend_and_when_the_limit_is_crossed(self, shown):
+        """The truth: 10 N a month; 2 x (150 N and 24 N of viscous friction) on 2026-12-15."""
+        one = self.view(shown[1])
+        assert (state_of(one), one.view.signal.value) == ("warn", "M")
+        assert one.view.ratio.value == pytest.approx(1 + 4 * GROWTH, rel=0.05)
+        drift = one.view.drift
+        assert abs(drift.value - 10.0) < drift.half_width < 5.0
+        assert drift.expected.earliest < "2026-12-15" < drift.expected.latest
+        assert one.view.parameter("spring_constant").value == pytest.approx(2.05e5, rel=0.01)
+        assert [str(q.name) for q in one.view.baseline] == ["coulomb_friction", "sliding_friction"]
+
+    def test_its_alarms_are_raised_at_their_record_and_are_answered(self, shown):
+        place, valves, kept = shown
+        operator = HistoryOperator(place)
+
+        def ask(service, **more):
+            values = {"alarm_kind": "friction_high", "alarm_who": "Anna", "alarm_text": "",
+                      "alarm_hours": 8.0, **more}  # fmt: skip
+            node = kept_valve("FV-101").name
+            return asyncio.run(operator.call(node, ServiceRequest(service, values)))
+
+        (raised,) = kept.alarms(AlarmFilter(), is_journal=True)
+        local = QUARTERS[2].replace(tzinfo=ZoneInfo("Europe/Berlin")).timestamp()
+        assert raised.event.time / 1e9 == pytest.approx(local + 20.0, abs=0.1)
+        assert self.view(valves).view.advice == "Plan new packing for the next stop."
+        assert ask("acknowledge").success
+        assert "cannot be acknowledged" in ask("acknowledge").message
+        assert not ask("identify").success
+        assert "who is empty" in ask("comment", alarm_who="").message
+        kept.refresh()
+        (alarm,) = self.view(valves).view.alarms
+        assert (alarm.kind, alarm.state) == ("friction_high", "acknowledged")
+
+    def test_pages_in_a_browser_where_ros_cannot_be_imported(self, shown):
+        pytest.importorskip("nicegui", reason="NiceGUI is not installed")
+        port = free_port()
+        arguments = [sys.executable, "-c", WITHOUT_ROS, "dashboard", str(shown[0]),
+                     "--time-zone", "Europe/Berlin", "--port", str(port)]  # fmt: skip
+        usual = {name: one for name, one in os.environ.items() if not name.startswith("PYTEST")}
+        process = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True, env=usual)
+        with chromium() as browser:
+            try:
+                assert process.stderr.readline().startswith("ready: open http://127.0.0.1")
+                tab = Tab(browser, f"http://127.0.0.1:{port}")
+                with contextlib.closing(tab):
+                    page = tab.open("/")
+                    page.wait_for_selector(".vf-row")
+                    assert page.locator(".vf-row").count() == 2
+                    assert "1.79" in page.locator(".vf-row").first.inner_text()
+                    assert "live" not in page.inner_text("table")
+                    page.get_by_role("link", name="FV-101").click()
+                    page.get_by_text("N a month; excess expected").wait_for()
+                    assert page.title() == "FV-101 · valve friction"
+                    assert "2026-07-03 08:00:19 CEST" in page.inner_text("article")
+                    assert not page.get_by_role("button", name="Identify").count()
+                    tab.open("/alarms").get_by_text("Plan new packing").wait_for()
+                    page = tab.open("/compare?a=/fv_101/identifier&b=/fv_102/identifier")
+                    page.get_by_text("differs").first.wait_for()
+            finally:
+                process.terminate()
+                assert "Traceback" not in process.communicate(timeout=60)[1]
+
+    def test_what_is_no_history_is_refused(self, tmp_path, capsys):
+        assert run(["dashboard", str(tmp_path / "none.sqlite")]) == 2
+        assert "there is no such file" in capsys.readouterr().err
+
+
+WITHOUT_ROS = """
+import sys
+class Without:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("rclpy", "diagnostic_msgs", "std_srvs", "rcl_interfaces"):
+            raise ImportError(f"{name} is not installed")
+sys.meta_path.insert(0, Without())
+from valve_friction_ros.commands.main import main
+sys.exit(main())
+"""
+
+
+class TestTable:
+    @pytest.mark.parametrize(
+        ("text", "cause"),
+        [
+            ("tag,area\nFV-1,445 cm2\n", "row 2: FV-1: travel missing"),
+            ("tag,area,travel\nFV-1,445,20 mm\n", "row 2: area: '445': there is no unit"),
+            ("area,travel\n445 cm2,20 mm\n", "there is no column tag"),
+            ("tag,aera,travel\nFV-1,445 cm2,20 mm\n", "unknown column 'aera'; did you mean"),
+            ("tag,area,travel\nA,90 cm2,20 mm\nA,90 cm2,20 mm\n", "row 3: a second A"),
+        ],
+    )
+    def test_faults(self, tmp_path, text, cause):
+        path = tmp_path / "valves.csv"
+        path.write_text(text)
+        with pytest.raises(ValueError, match=re.escape(cause.replace("; did", ": did"))):
+            read_plant(path)
+
+    def test_all_faults_at_once(self, tmp_path):
+        path = tmp_path / "valves.csv"
+        path.write_text("tag,area,travel\nA,1,2 mm\nB,1 cm2,\n")
+        with pytest.raises(ValueError, match=r"row 2: .*row 3: ") as refusal:
+            read_plant(path)
+        assert "\n" not in str(refusal.value)
+
+    def test_what_it_says(self, tmp_path):
+        path = tmp_path / "valves.csv"
+        path.write_text(TABLE)
+        found = read_plant(path)["FV-101"]
+        assert found.valve.diaphragm_area == pytest.approx(0.0445)
+        assert found.valve.pressure_maximum == pytest.approx(4e5)
+        assert found.known["spring_constant"] == pytest.approx(0.0445 * 1.2e5 / 0.028575)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("FV-101 stroke.csv", ["FV-101"]),
+        ("fv101_2026-07.csv", ["FV-101"]),
+        ("FV_101.PT", ["FV-101"]),
+        ("FV-1012.csv", []),
+        ("XFV-101.csv", []),
+        ("FV-101A.csv", ["FV-101A"]),
+    ],
+)
+def test_tags(text, found):
+    assert tags_in([text], ["FV-101", "FV-101A", "FV-10"]) == found

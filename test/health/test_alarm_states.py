@@ -1,0 +1,195 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The life of an alarm: whatever happens, in any order, no step is impossible and none is lost."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from valve_friction_ros.health import Level, StatusSignal
+from valve_friction_ros.health.alarms import (
+    LONGEST_ABSENCE,
+    LONGEST_SHELVING,
+    NO_CONDITION,
+    TRANSITIONS,
+    Alarm,
+    AlarmAction,
+    AlarmError,
+    AlarmKind,
+    AlarmRequest,
+    AlarmState,
+    Condition,
+    alarm_summary,
+    followed_by,
+    requested,
+)
+
+HOUR = 3600.0
+NOW = 1_800_000_000_000_000_000
+HIGH = AlarmKind.FRICTION_HIGH
+WARN = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+ERROR = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+DURATION = {AlarmAction.SHELVE: 8 * HOUR, AlarmAction.TAKE_OUT: 100 * HOUR}
+
+
+def request(action, text="seen", **given):
+    return AlarmRequest(action, "A. Operator", text, given.get("duration", DURATION.get(action, 0)))
+
+
+def after(*steps, time=NOW):
+    """Return the alarm after conditions and actions, a second apart."""
+    alarm = Alarm(HIGH)
+    for number, step in enumerate(steps):
+        now = time + number * 10**9
+        if isinstance(step, Condition):
+            for event in followed_by(alarm, step, now):
+                alarm = event.alarm
+        else:
+            alarm = requested(alarm, request(step), now).alarm
+    return alarm
+
+
+@pytest.mark.parametrize(
+    ("steps", "state"),
+    [
+        ((WARN,), AlarmState.UNACKNOWLEDGED),
+        ((WARN, AlarmAction.ACKNOWLEDGE), AlarmState.ACKNOWLEDGED),
+        ((WARN, AlarmAction.ACKNOWLEDGE, NO_CONDITION), AlarmState.NORMAL),
+        ((WARN, NO_CONDITION), AlarmState.RETURNED),
+        ((WARN, NO_CONDITION, AlarmAction.ACKNOWLEDGE), AlarmState.NORMAL),
+        ((WARN, NO_CONDITION, WARN), AlarmState.UNACKNOWLEDGED),
+        ((WARN, AlarmAction.ACKNOWLEDGE, ERROR), AlarmState.UNACKNOWLEDGED),
+        ((ERROR, AlarmAction.ACKNOWLEDGE, WARN), AlarmState.ACKNOWLEDGED),
+        ((WARN, AlarmAction.SHELVE, ERROR, NO_CONDITION, WARN), AlarmState.SHELVED),
+        ((WARN, AlarmAction.SHELVE, AlarmAction.UNSHELVE), AlarmState.UNACKNOWLEDGED),
+        ((WARN, AlarmAction.SHELVE, NO_CONDITION, AlarmAction.UNSHELVE), AlarmState.NORMAL),
+        ((AlarmAction.TAKE_OUT, WARN, AlarmAction.PUT_BACK), AlarmState.UNACKNOWLEDGED),
+        ((WARN, AlarmAction.SHELVE, AlarmAction.TAKE_OUT), AlarmState.OUT_OF_SERVICE),
+        ((WARN, AlarmAction.COMMENT), AlarmState.UNACKNOWLEDGED),
+    ],
+)
+def test_the_life_of_isa_18_2(steps, state):
+    assert after(*steps).state is state
+
+
+def test_shelving_ends_by_itself_and_the_condition_decides():
+    shelved = after(WARN, AlarmAction.SHELVE)
+    assert not followed_by(shelved, WARN, shelved.until - 1)
+    (event,) = followed_by(shelved, WARN, shelved.until)
+    assert (event.action, event.alarm.state) == (AlarmAction.EXPIRE, AlarmState.UNACKNOWLEDGED)
+    assert event.alarm.raised == NOW, "it is the same alarm still"
+    expired, cleared = followed_by(shelved, NO_CONDITION, shelved.until + 1)
+    assert expired.alarm.state is AlarmState.UNACKNOWLEDGED
+    assert (cleared.action, cleared.alarm.state) == (AlarmAction.CLEAR, AlarmState.RETURNED)
+
+
+def test_an_event_holds_who_and_what_and_the_sentence_stays():
+    event = requested(after(WARN), request(AlarmAction.ACKNOWLEDGE, " repack on Monday "), NOW)
+    assert (event.who, event.text) == ("A. Operator", "repack on Monday")
+    assert event.alarm.message == "friction has grown"
+    assert event.before is AlarmState.UNACKNOWLEDGED
+
+
+@pytest.mark.parametrize(
+    ("action", "who", "text", "hours", "says"),
+    [
+        (AlarmAction.ACKNOWLEDGE, "  ", "", 0, "who is empty"),
+        (AlarmAction.ACKNOWLEDGE, "x" * 81, "", 0, "at most 80"),
+        (AlarmAction.ACKNOWLEDGE, "a\nb", "", 0, "one line"),
+        (AlarmAction.COMMENT, "A", " ", 0, "text is empty"),
+        (AlarmAction.COMMENT, "A", "x" * 501, 0, "at most 500"),
+        (AlarmAction.SHELVE, "A", "", math.inf, "for inf h"),
+        (AlarmAction.SHELVE, "A", "", math.nan, "for nan h"),
+        (AlarmAction.SHELVE, "A", "", 0, "for 0 h"),
+        (AlarmAction.SHELVE, "A", "", LONGEST_SHELVING / 3.6e12 + 1, "up to 720 h"),
+        (AlarmAction.TAKE_OUT, "A", "", LONGEST_ABSENCE / 3.6e12 + 1, "up to 8784 h"),
+        (AlarmAction.RAISE, "A", "", 0, "by the valve"),
+    ],
+)
+def test_what_nobody_may_ask_is_refused_with_one_line(action, who, text, hours, says):
+    with pytest.raises(AlarmError, match=says) as refused:
+        AlarmRequest(action, who, text, hours * HOUR)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("steps", "action"),
+    [
+        ((), AlarmAction.ACKNOWLEDGE),
+        ((WARN,), AlarmAction.UNSHELVE),
+        ((WARN,), AlarmAction.PUT_BACK),
+        ((WARN, AlarmAction.ACKNOWLEDGE), AlarmAction.ACKNOWLEDGE),
+        ((AlarmAction.TAKE_OUT,), AlarmAction.SHELVE),
+    ],
+)
+def test_what_the_state_does_not_allow_is_refused_and_says_what_it_does(steps, action):
+    with pytest.raises(AlarmError, match=r"friction high: .* it can be .*commented"):
+        requested(after(*steps), request(action), NOW)
+
+
+CONDITIONS = st.sampled_from([NO_CONDITION, WARN, ERROR])
+STEPS = st.lists(
+    st.tuples(st.integers(0, 200), st.one_of(CONDITIONS, st.sampled_from([*AlarmAction]))),
+    max_size=40,
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(STEPS)
+def test_no_order_of_steps_leaves_the_table_or_contradicts_itself(steps):
+    """Each event is one of the table, none is silent, and what the valve shows is never lost."""
+    alarm, now, shown = Alarm(HIGH), NOW, NO_CONDITION
+    for hours, step in steps:
+        now += hours * 3_600_000_000_000
+        shown = step if isinstance(step, Condition) else shown
+        events = followed_by(alarm, shown, now)
+        if events:
+            alarm = events[-1].alarm
+        if (alarm.state, step) in TRANSITIONS and step.is_of_person:
+            asked = requested(alarm, request(step), now)
+            events, alarm = (*events, asked), asked.alarm
+        for event in events:
+            assert TRANSITIONS[event.before, event.action] in (None, event.alarm.state)
+            is_ended = event.alarm.state in (AlarmState.NORMAL, AlarmState.ACKNOWLEDGED)
+            assert event.who or not (event.before.needs_answer and is_ended), "nobody has seen it"
+            assert event.who or event.action is not AlarmAction.COMMENT
+        chain = [event.before for event in events]
+        assert chain[1:] == [event.alarm.state for event in events[:-1]]
+        assert alarm.condition.level == shown.level
+        assert alarm.is_told == (shown.level > Level.OK and not alarm.state.is_suppressed)
+        assert alarm.until is None or alarm.until > now
+        assert not followed_by(alarm, shown, now), "the same again is no event"
+
+
+def test_every_state_can_be_left_and_reached():
+    reached = {to for to in TRANSITIONS.values() if to is not None}
+    assert reached == {*AlarmState}
+    for state in AlarmState:
+        assert {to for (one, _), to in TRANSITIONS.items() if one is state} - {state}
+
+
+def test_an_alarm_that_contradicts_itself_cannot_be():
+    for wrong in (
+        {"state": AlarmState.SHELVED},
+        {"state": AlarmState.UNACKNOWLEDGED},
+        {"state": AlarmState.NORMAL, "condition": WARN},
+        {"state": AlarmState.NORMAL, "until": NOW},
+    ):
+        with pytest.raises(ValueError, match="an alarm that is"):
+            Alarm(HIGH, **wrong)
+
+
+def test_a_summary_names_what_is_not_normal():
+    assert not alarm_summary([Alarm(HIGH)])
+    assert alarm_summary([after(WARN), Alarm(AlarmKind.STUCK)]) == "friction high: unacknowledged"
+    shelved = alarm_summary([after(WARN, AlarmAction.SHELVE)])
+    assert shelved == "friction high: shelved until 2027-01-15 16:00 UTC"

@@ -1,0 +1,330 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Alarms in the history: each step a row, whatever ends in between; listed and filtered."""
+
+import csv
+import io
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from full_history import all_of
+from histories import DAY, OTHER, SECOND, START, VALVE
+
+from valve_friction_ros.health import (
+    AlarmAction,
+    AlarmError,
+    AlarmKind,
+    AlarmRequest,
+    AlarmState,
+    Condition,
+    Level,
+    StatusSignal,
+)
+from valve_friction_ros.health.alarms import TRANSITIONS
+from valve_friction_ros.history import (
+    AlarmFeed,
+    AlarmFilter,
+    History,
+    HistoryFile,
+    KeptValve,
+    alarm_events,
+    alarms_as_csv,
+    area_of,
+    copied,
+    follow_alarms,
+    read_alarms,
+    request_alarms,
+    request_many,
+    standing_alarms,
+    tables,
+)
+from valve_friction_ros.history.database import writing
+from valve_friction_ros.history.outbox import count_unsent, follow
+from valve_friction_ros.history.rows import valve_id
+from valve_friction_ros.history.tables import put
+
+HERE = Path(__file__).parent
+WRITER = HERE / "alarm_writer.py"
+HIGH, DATA = AlarmKind.FRICTION_HIGH, AlarmKind.DATA_QUALITY
+WARN = Condition(Level.WARN, StatusSignal.MAINTENANCE_REQUIRED, "friction has grown")
+FAULT = Condition(Level.WARN, StatusSignal.CHECK_FUNCTION, "no sample of the stem")
+ACKNOWLEDGED = AlarmRequest(AlarmAction.ACKNOWLEDGE, "A. Operator", "seen")
+
+
+@pytest.fixture
+def history(tmp_path):
+    return HistoryFile(tmp_path / "history.sqlite")
+
+
+def test_what_goes_in_comes_out(history):
+    assert [one.action for one in follow_alarms(history, VALVE, {HIGH: WARN}, START).events] == [
+        AlarmAction.RAISE
+    ]
+    (event,) = request_alarms(history, VALVE, None, ACKNOWLEDGED, START + SECOND).events
+    assert read_alarms(history, VALVE.name) == {HIGH: event.alarm}
+    assert alarm_events(history)[0].event == event
+    assert event.alarm.state is AlarmState.ACKNOWLEDGED
+    assert not follow_alarms(history, VALVE, {HIGH: WARN}, START + 2 * SECOND).events
+    assert read_alarms(history, OTHER.name) == {}
+
+
+def test_a_refused_request_leaves_no_row(history):
+    with pytest.raises(AlarmError, match="no alarm can be acknowledged now: all alarms"):
+        request_alarms(history, VALVE, None, ACKNOWLEDGED, START)
+    follow_alarms(history, VALVE, {HIGH: WARN}, START)
+    request_alarms(history, VALVE, HIGH, ACKNOWLEDGED, START)
+    with pytest.raises(AlarmError, match="friction high: acknowledged and cannot be acknowledged"):
+        request_alarms(history, VALVE, HIGH, ACKNOWLEDGED, START)
+    assert len(alarm_events(history)) == 2
+
+
+def test_old_events_go_and_the_alarm_stays(history):
+    follow_alarms(history, VALVE, {HIGH: WARN}, START)
+    follow_alarms(history, VALVE, {DATA: FAULT}, START)
+    follow_alarms(history, VALVE, {DATA: Condition()}, START + 99 * DAY, days=10.0)
+    assert [one.event.alarm.kind for one in alarm_events(history)] == [DATA, HIGH]
+    assert read_alarms(history, VALVE.name)[HIGH].state is AlarmState.UNACKNOWLEDGED
+
+
+def killed(path, step):
+    done = subprocess.run(
+        [sys.executable, str(WRITER), str(path), "A. Operator", str(step)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    return done.returncode, len(done.stdout.split("\n")) - 1
+
+
+@pytest.mark.parametrize("step", range(10))
+def test_a_process_killed_within_a_step_has_made_all_before_it_and_not_it(history, step):
+    history.prepare()
+    code, finished = killed(history.path, step)
+    assert (code, finished) == (-signal.SIGKILL, step)
+    events = [one.event for one in reversed(alarm_events(history))]
+    assert [one.time for one in events] == [START + SECOND * k for k in range(step)]
+    alarms = read_alarms(history, VALVE.name)
+    assert alarms.get(HIGH) == (events[-1].alarm if events else None)
+    with closing(sqlite3.connect(history.path)) as connection:
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+
+
+def test_two_processes_make_one_chain_and_lose_no_step(history):
+    """Both do the same to one alarm; one of them is killed in the midst of it."""
+    both = [
+        subprocess.Popen(
+            [sys.executable, str(WRITER), str(history.path), name],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for name in ("A", "B")
+    ]
+    finished = {"A": 0, "B": 0}
+    try:
+        for name, process in zip("AB", both, strict=True):
+            told = [process.stdout.readline() for _ in range(40)]
+            finished[name] = sum(not one.startswith("valve") for one in told)
+        for name, process in zip("AB", both, strict=True):
+            process.kill()
+            rest = process.stdout.read().split("\n")[:-1]
+            finished[name] += sum(not one.startswith("valve") for one in rest)
+    finally:
+        for process in both:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+    with closing(sqlite3.connect(history.path)) as connection:
+        query = "SELECT state_before, action, state, who FROM alarm_event ORDER BY id"
+        rows = connection.execute(query).fetchall()
+    state = AlarmState.NORMAL
+    for before, action, after, _ in rows:
+        assert AlarmState[before] is state
+        assert TRANSITIONS[state, AlarmAction[action]] in (None, AlarmState[after])
+        state = AlarmState[after]
+    for name, count in finished.items():
+        kept = sum(who == name for *_, who in rows)
+        assert kept in (count, count + 1), "at most the one under way besides what was told"
+
+
+def test_a_followed_file_of_version_8_opens_and_sends_alarms(tmp_path):
+    path = tmp_path / "history.sqlite"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript((HERE / "history_of_version_8.sql").read_text())
+    history = HistoryFile(path)
+    before = all_of(history)
+    assert len(history.entries()) == 6
+    assert read_alarms(history, VALVE.name) == {}
+    assert standing_alarms(history) == ()
+    follow_alarms(history, VALVE, {HIGH: WARN}, START)
+    assert count_unsent(path).waiting == 0
+    follow(path)
+    assert count_unsent(path).waiting == 1, "what came before it was followed"
+    follow_alarms(history, VALVE, {DATA: FAULT}, START)
+    follow(path)
+    assert count_unsent(path).waiting == 2
+    assert [one for one in all_of(history) if one not in before] != []
+
+
+# Lists
+
+
+def fill_many(place, count):
+    """Write events of 500 valves in ten areas, as `follow_alarms` does, in one transaction."""
+    kinds, states = [*AlarmKind], [*AlarmState]
+    with writing(place) as connection:
+        valves = [
+            valve_id(connection, KeptValve(f"/area_{k % 10}/fv_{k}/identifier", f"FV-{k}"))
+            for k in range(500)
+        ]
+        rows = []
+        for k in range(count):
+            state = states[k % 6]
+            level = int(state in (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED))
+            until = START + DAY if state.is_suppressed else None
+            rows.append(
+                {
+                    "valve_id": valves[k % 500],
+                    "uid": f"{k}",
+                    "time_ns": START + k * 60 * SECOND,
+                    "kind": kinds[k // 500 % 6].value,
+                    "action": "RAISE",
+                    "state_before": "NORMAL",
+                    "state": state.name,
+                    "level": level,
+                    "status_signal": "M" if level else "",
+                    "message": f"friction has grown by {k % 100} %",
+                    "raised_ns": START,
+                    "until_ns": until,
+                    "who": "A. Operator" if k % 7 == 0 else "",
+                    "text": "",
+                }
+            )
+        put(connection, tables.alarm_event, rows)
+
+
+def test_ten_thousand_events_are_listed_and_filtered(history):
+    fill_many(history.path, 10_000)
+    everything = alarm_events(history)
+    assert len(everything) == 10_000
+    some = AlarmFilter(
+        since=START + 10 * 60 * SECOND,
+        area="/area_3",
+        states=frozenset({AlarmState.UNACKNOWLEDGED}),
+        words="grown FV-",
+    )
+    found = alarm_events(history, some)
+    assert {one.area for one in found} == {"/area_3"}
+    assert {one.event.alarm.state for one in found} == {AlarmState.UNACKNOWLEDGED}
+    expected = [
+        one
+        for one in everything
+        if one.area == "/area_3"
+        and one.event.alarm.state is AlarmState.UNACKNOWLEDGED
+        and one.event.time >= some.since
+    ]
+    assert found == tuple(expected)
+    standing = standing_alarms(history)
+    last = {(one.valve, one.event.alarm.kind): one for one in reversed(everything)}
+    assert {*standing} == {
+        one for one in last.values() if one.event.alarm.state is not AlarmState.NORMAL
+    }
+
+
+@pytest.mark.parametrize(
+    ("chosen", "count"),
+    [
+        (AlarmFilter(), 3),
+        (AlarmFilter(area="/area_2"), 1),
+        (AlarmFilter(area="/area"), 0),
+        (AlarmFilter(area="/area__"), 0),
+        (AlarmFilter(valve=VALVE.name), 2),
+        (AlarmFilter(kinds=frozenset({DATA})), 1),
+        (AlarmFilter(states=frozenset({AlarmState.ACKNOWLEDGED})), 1),
+        (AlarmFilter(since=START + SECOND), 1),
+        (AlarmFilter(until=START + SECOND), 2),
+        (AlarmFilter(words="operator seen"), 1),
+        (AlarmFilter(words="100%"), 0),
+        (AlarmFilter(words="lv-7"), 1),
+    ],
+)
+def test_a_filter_keeps_what_it_says(history, chosen, count):
+    follow_alarms(history, VALVE, {HIGH: WARN}, START)
+    follow_alarms(history, OTHER, {DATA: FAULT}, START)
+    request_alarms(history, VALVE, HIGH, ACKNOWLEDGED, START + SECOND)
+    assert len(alarm_events(history, chosen)) == count
+
+
+def test_the_csv_has_a_line_for_each_event_and_no_formula(history):
+    follow_alarms(history, VALVE, {HIGH: WARN._replace(message="=1+1, it says")}, START)
+    shelving = AlarmRequest(AlarmAction.SHELVE, "B", "until\u2028Monday".replace("\u2028", " "), 60)
+    request_alarms(history, VALVE, HIGH, shelving, START + SECOND)
+    rows = [*csv.DictReader(io.StringIO(alarms_as_csv(alarm_events(history))))]
+    assert [row["event"] for row in rows] == ["shelved", "raised"]
+    assert rows[0]["until"] == "2026-09-21T14:14:21Z"
+    assert rows[1]["message"] == "'=1+1, it says"
+    assert rows[0]["area"] == "/"
+
+
+def test_the_area_is_what_the_namespace_lies_in():
+    assert area_of("/plant/unit_3/fv_101/identifier") == "/plant/unit_3"
+    assert area_of("/fv_101/identifier") == "/"
+
+
+def test_a_server_has_the_same(history, database):
+    follow_alarms(history, VALVE, {HIGH: WARN}, START)
+    request_alarms(history, VALVE, HIGH, ACKNOWLEDGED, START + SECOND)
+    copied(history.path, database)
+    assert alarm_events(History(database)) == alarm_events(history)
+    assert standing_alarms(History(database)) == standing_alarms(history)
+    found = alarm_events(History(database), AlarmFilter(words="OPERATOR", area="/"))
+    assert len(found) == 1
+
+
+def test_five_hundred_are_acknowledged_at_once_and_their_nodes_learn_it(history):
+    valves = [KeptValve(f"/area/fv_{k}/identifier", f"FV-{k}") for k in range(500)]
+    with writing(history.path) as connection:
+        rows = [
+            {
+                "valve_id": valve_id(connection, one),
+                "uid": one.tag,
+                "time_ns": START,
+                "kind": HIGH.value,
+                "action": "RAISE",
+                "state_before": "NORMAL",
+                "state": "UNACKNOWLEDGED",
+                "level": 1,
+                "status_signal": "M",
+                "message": "friction has grown",
+                "raised_ns": START,
+                "until_ns": None,
+                "who": "",
+                "text": "",
+            }
+            for one in valves
+        ]
+        put(connection, tables.alarm_event, rows)
+    feed = AlarmFeed(history.path)
+    feed.look()
+    asked = [(one, HIGH) for one in valves]
+    count = request_many(history, asked, ACKNOWLEDGED, START + SECOND)
+    assert count == 500
+    assert request_many(history, asked, ACKNOWLEDGED, START + SECOND) == 0
+    assert feed.take(valves[0].name) == {}
+    feed.look()
+    news = feed.take(valves[7].name)
+    assert news == read_alarms(history, valves[7].name)
+    assert news[HIGH].state is AlarmState.ACKNOWLEDGED
+    assert feed.take(valves[7].name) == {}

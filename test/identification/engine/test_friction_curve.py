@@ -1,0 +1,370 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Friction over speed without a simulation: what it recovers, and what it may not say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from valve_friction_ros.identification.engine import friction_curve
+from valve_friction_ros.identification.engine.balance_regression import LagPrior
+from valve_friction_ros.identification.engine.friction_curve import (
+    FrictionCurve,
+    checked_by_curve,
+    curve_evidence,
+    curve_numbers,
+    friction_curves,
+)
+from valve_friction_ros.identification.engine.intervals import Budget, Estimated
+from valve_friction_ros.identification.engine.sliding_averages import averaged_twice
+from valve_friction_ros.model import KarnoppParameters, StemState, Valve, advance, simulate
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+
+PERIOD = 1e-3
+TIME = np.arange(40_000) * PERIOD
+NO_LAG = LagPrior(0.0)
+BALANCE = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload")
+SLIDING = "sliding_friction"
+
+
+@pytest.mark.parametrize(("lags", "least"), [([0.0, 0.019], 0.0), ([0.0, 0.021], 0.1)])
+def test_averaging_times_that_contradict_each_other_leave_other_lags_possible(lags, least):
+    (found,) = friction_curve._believed([np.array([0.0, -800.0])], lags)
+    assert np.exp(found[1]) == pytest.approx(least)
+    assert np.exp(found[0]) == pytest.approx(1.0 + least)
+
+
+def drawn(seed, slip=False):
+    """Draw a valve from the smallest to the largest, and a packing in proportion to it."""
+    generator = np.random.default_rng(seed)
+    area, spring, travel, dry, delay = np.exp(
+        generator.uniform(*np.log([[4e-3, 2e4, 8e-3, 0.01, 0.02], [0.12, 2e6, 0.08, 0.2, 0.3]]))
+    )
+    dry, preload = dry * spring * travel, 0.3 * generator.random() * spring * travel
+    static = dry * generator.uniform(1.15, 2.0) if slip else dry
+    stribeck = 0.02 * travel * generator.uniform(0.3, 1.0) if slip else 0.0
+    packing = KarnoppParameters(
+        50 * area, spring * delay, dry, static, spring, preload, stribeck_velocity=stribeck
+    )
+    return Valve(area, 41_740.0, travel), packing
+
+
+def moved(valve, packing, place, noise=0.0, late=0.0, seed=0):
+    """Simulate a stem that a friction compensation takes about to `place`, a share of travel."""
+    wanted = valve.travel * place
+    push = np.tanh(np.gradient(wanted, PERIOD) / (2e-3 * valve.travel))
+    force = packing.spring_constant * wanted + packing.spring_preload
+    force += 1.3 * packing.static_friction * push
+    pressure = valve.pressure_reference + force / valve.diaphragm_area
+    position = simulate(valve, packing, pressure, PERIOD).position
+    white = np.random.default_rng(seed).standard_normal((2, TIME.size))
+    drive = pressure + noise * np.ptp(pressure) * white[0]
+    stem = position + noise * valve.travel * white[1]
+    return StampedRecord(
+        StampedSignal(TIME, drive),
+        StampedSignal(TIME + late, stem),
+    )
+
+
+WAVES = 0.5 + 0.2 * np.sin(0.7 * TIME) + 0.15 * np.sin(1.9 * TIME + 1.0)
+LEVELS = np.convolve(
+    np.repeat(np.random.default_rng(3).uniform(0.15, 0.85, 14), 3000)[: TIME.size + 799],
+    np.hanning(800) / np.sum(np.hanning(800)),
+    "valid",
+)
+
+
+class TestRecovery:
+    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize("place", [WAVES, LEVELS], ids=["waves", "levels"])
+    def test_what_a_noiseless_record_holds(self, seed, place):
+        """Averages obey the law of the samples, so only interpolation is left as an error."""
+        valve, packing = drawn(seed)
+        curves = friction_curves(moved(valve, packing, place), valve, NO_LAG)
+        numbers = curve_numbers(curves)
+        for name in BALANCE:
+            assert numbers[name].value == pytest.approx(getattr(packing, name), rel=5e-4), name
+        for curve in curves:
+            law = packing.coulomb_friction * np.sign(curve.speed)
+            law += packing.viscous_friction * curve.speed
+            np.testing.assert_allclose(curve.friction, law, atol=5e-3 * np.abs(law).max())
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_stick_slip(self, seed):
+        """The stem moves faster than the Stribeck speed, so F_c shows itself."""
+        valve, packing = drawn(seed, slip=True)
+        curves = friction_curves(moved(valve, packing, WAVES), valve, NO_LAG)
+        numbers = curve_numbers(curves)
+        for name in ("spring_constant", "spring_preload"):
+            assert numbers[name].value == pytest.approx(getattr(packing, name), rel=5e-3), name
+        dry = numbers["coulomb_friction"]
+        assert abs(dry.value - packing.coulomb_friction) <= dry.half_width
+        assert dry.half_width < 0.2 * dry.value
+        for curve in curves:
+            one = curve.numbers[SLIDING]
+            steady = packing.coulomb_friction + packing.viscous_friction * curve.sliding_speed
+            assert steady < one.value + one.half_width
+            assert one.value < packing.static_friction + packing.viscous_friction * curve.speed[-1]
+
+    def test_known_parameters_stay_out(self):
+        valve, packing = drawn(1)
+        fixed = {name: getattr(packing, name) for name in ("viscous_friction", "spring_constant")}
+        record = moved(valve, packing, WAVES)
+        for curve in friction_curves(record, valve, NO_LAG, fixed):
+            assert not fixed.keys() & curve.numbers.keys()
+            dry = curve.numbers["coulomb_friction"].value
+            assert dry == pytest.approx(packing.coulomb_friction, rel=1e-3)
+
+    def test_noise_of_the_velocity_does_not_bias_its_friction(self):
+        """Errors of one factor that the other does not share average out; they would draw F_v to 0.
+
+        Ten records: three standard errors of their mean, and far less than plain least squares.
+        """
+        valve, packing = drawn(0)
+        found, plain = [], []
+        for seed in range(10):
+            record = moved(valve, packing, WAVES, 1e-3, seed=seed)
+            curve = friction_curves(record, valve, NO_LAG)[0]
+            found.append(curve.numbers["viscous_friction"].value / packing.viscous_friction - 1)
+            plain.append(attenuated(record, valve, curve) / packing.viscous_friction - 1)
+        assert np.mean(plain) < -3 * np.std(plain)
+        assert abs(np.mean(found)) < 3 * np.std(found) / np.sqrt(10)
+        assert abs(np.mean(found)) < 0.2 * abs(np.mean(plain))
+
+    @pytest.mark.parametrize("late", [-0.02, 0.02])
+    def test_a_lag_is_found_on_random_levels(self, late):
+        valve, packing = drawn(2)
+        record = moved(valve, packing, LEVELS, 1e-4, late)
+        curves = friction_curves(record, valve)
+        assert [curve.lag for curve in curves] == pytest.approx([late] * len(curves), abs=3e-3)
+        numbers = curve_numbers(curves)
+        for name in BALANCE:
+            one = numbers[name]
+            assert abs(one.value - getattr(packing, name)) <= one.half_width, name
+
+
+def attenuated(record, valve, curve):
+    """Return F_v by least squares of the signals averaged alike, in which noise is in both."""
+    length = round(curve.averaging_time / PERIOD)
+    position = averaged_twice(record.position.value, length)
+    force = averaged_twice(valve.actuator_force(record.drive.value), length)
+    velocity = np.gradient(position, PERIOD)
+    slides = np.abs(velocity) > 0.1 * np.abs(velocity).max()
+    columns = np.column_stack([np.sign(velocity), velocity, position, np.ones(position.size)])
+    size = np.abs(columns).max(axis=0)
+    return (np.linalg.lstsq(columns[slides] / size, force[slides], rcond=None)[0] / size)[1]
+
+
+class TestPoorMotion:
+    def test_partial_stroke_from_the_stop(self):
+        """Ten percent down and back, once, by an actuator that takes some time to fill."""
+        valve, packing = drawn(3)
+        ramp = np.interp(TIME, [10, 15, 17, 22], [1.05, 0.9, 0.9, 1.05])
+        filling = np.hanning(1600) / np.sum(np.hanning(1600))
+        ramp = np.convolve(np.pad(ramp, 800, mode="edge"), filling, "same")[800:-800]
+        curves = friction_curves(moved(valve, packing, ramp, 2e-5), valve)
+        one, speed = curve_numbers(curves)[SLIDING], curves[0].sliding_speed
+        truth = packing.coulomb_friction + packing.viscous_friction * speed
+        assert abs(one.value - truth) <= one.half_width < 0.1 * truth
+
+    def test_hunting_loop(self):
+        """An integrating controller and stick-slip: the stem rests, and jumps for 40 ms."""
+        valve = Valve(0.0445, 41_740.0, 0.028575)
+        packing = KarnoppParameters(1.6, 2e4, 300.0, 500.0, 2.05e5, 230.0, stribeck_velocity=1e-3)
+        state, pressure, integral, rows = StemState(0.0137), 106e3, 0.0, []
+        for _ in range(30_000):
+            error = 0.0142 - state.position
+            integral += 2e-3 * error
+            after = 106e3 + 2e6 * error + 2e7 * integral
+            state = advance(state, valve, packing, (pressure, after), 2e-3)
+            pressure = after
+            rows.append((pressure, state.position, state.velocity))
+        drive, stem, velocity = np.array(rows).T
+        assert np.count_nonzero(np.diff(np.sign(stem - np.mean(stem)))) >= 8
+        truth = np.average(packing.sliding_friction(np.abs(velocity)), weights=np.abs(velocity))
+        time, white = 0.01 * np.arange(6000), np.random.default_rng(0).standard_normal((2, 6000))
+        record = StampedRecord(
+            StampedSignal(time, drive[::5] + 50.0 * white[0]),
+            StampedSignal(time, stem[::5] + 3e-6 * white[1]),
+        )
+        one = curve_numbers(friction_curves(record, valve))[SLIDING]
+        assert abs(one.value - truth) <= one.half_width < 0.1 * truth
+
+    def test_an_actuator_of_another_valve_leaves_work_that_scatters(self):
+        """A random walk does some work on any stem, in each stroke another one."""
+        valve, packing = drawn(1)
+        record = moved(valve, packing, WAVES, 1e-4)
+        for seed in range(5):
+            walk = np.cumsum(np.random.default_rng(seed).standard_normal(TIME.size))
+            drive = StampedSignal(TIME, 1e5 + 2e4 * walk / np.ptp(walk))
+            curves = friction_curves(StampedRecord(drive, record.position), valve)
+            one = curve_numbers(curves)[SLIDING]
+            assert one.half_width > 0.4 * abs(one.value), seed
+
+    def test_one_direction_has_no_friction(self):
+        valve, packing = drawn(4)
+        rising = np.linspace(0.1, 0.9, TIME.size)
+        assert friction_curves(moved(valve, packing, rising), valve) == []
+        assert curve_numbers([]) == curve_evidence([]) == {}
+
+    @given(
+        st.integers(3, 400),
+        st.floats(1e-4, 10.0),
+        st.sampled_from(["constant", "noise", "steps", "line"]),
+        st.sampled_from(["constant", "noise", "steps", "line"]),
+        st.sampled_from([None, 0.0, 0.03]),
+        st.integers(0, 99),
+    )
+    def test_nothing_is_raised(self, size, period, drive, stem, lag, seed):
+        generator = np.random.default_rng(seed)
+        shapes = {
+            "constant": np.ones(size),
+            "noise": generator.standard_normal(size),
+            "steps": np.sign(np.sin(np.arange(size) / 7.0)),
+            "line": np.linspace(0.0, 1.0, size),
+        }
+        time = period * np.arange(size)
+        record = StampedRecord(
+            StampedSignal(time, 1e5 + 1e4 * shapes[drive]),
+            StampedSignal(time, 0.01 + 0.005 * shapes[stem]),
+        )
+        for curve in friction_curves(record, Valve(0.04, travel=0.03), LagPrior(lag)):
+            assert all(np.isfinite(one.value) for one in curve.numbers.values())
+
+
+@pytest.mark.parametrize("length", [1, 2, 7, 30])
+def test_averaging_keeps_a_straight_line(length):
+    line = 3.0 - 0.25 * np.arange(200.0)
+    inner = slice(2 * length, 200 - 2 * length)
+    found = averaged_twice(line, length)
+    assert found.size == line.size
+    np.testing.assert_allclose(found[inner], line[inner], rtol=1e-12)
+
+
+class TestLagPrior:
+    LAGS = np.linspace(-2.0, 2.0, 400_001)
+
+    def test_unstated(self):
+        """Student's t: half within 0.8 of 10 ms, 95 % within 43 ms; never impossible."""
+        density = np.exp(LagPrior().log_density(self.LAGS))
+        share = [np.sum(density[np.abs(self.LAGS) < reach]) for reach in (8.165e-3, 43.03e-3)]
+        assert np.array(share) / np.sum(density) == pytest.approx([0.5, 0.95], abs=1e-3)
+        assert not LagPrior().is_known
+
+    def test_stated(self):
+        """A Gaussian."""
+        density = LagPrior(0.02).log_density(np.array([0.0, 0.02, 0.06]))
+        np.testing.assert_allclose(density - density[0], [0.0, -0.5, -4.5])
+        assert LagPrior(0.02).precision(0.3) == pytest.approx(0.02**-2)
+
+    def test_its_precision_falls_where_it_is_flat(self):
+        assert LagPrior().precision(0.0) > LagPrior().precision(0.05) > 0.0
+
+    def test_known(self):
+        assert LagPrior(0.0).is_known
+
+
+def number(value, half_width):
+    return Estimated(value, half_width, Budget(half_width / 2, 0.0, {}))
+
+
+def curve(**numbers):
+    nothing = np.empty(0)
+    return FrictionCurve(
+        0.1, nothing, nothing, nothing, numbers, 0.0, 0.0, 0.0, 1.0, True, 1.0, 0.0
+    )
+
+
+class TestNumbersOfSeveralAveragingTimes:
+    SPRING = number(2e5, 1.0)
+
+    def of(self, *pairs):
+        curves = [curve(friction=number(*one), spring_constant=self.SPRING) for one in pairs]
+        return curve_numbers(curves)["friction"]
+
+    def test_the_one_that_knows_best_gives_the_value(self):
+        found = self.of((100.0, 20.0), (110.0, 6.0))
+        assert found.value == 110.0
+        assert found.half_width == pytest.approx(np.hypot(np.hypot(6.0, 2 * 5.0), 0.015 * 110))
+
+    def test_those_that_know_far_less_do_not_widen_it(self):
+        assert self.of((100.0, 10.0), (300.0, 60.0)).half_width == pytest.approx(
+            np.hypot(10.0, 1.5)
+        )
+
+    def test_none_is_narrower_than_a_force_balance_can_be(self):
+        """Least of all where no second averaging time confirms it, or no spring returns it."""
+        assert self.of((100.0, 1e-9), (100.0, 1e-9)).half_width == pytest.approx(1.5)
+        assert self.of((100.0, 1e-9)).half_width == pytest.approx(6.0)
+        machine = curve_numbers([curve(friction=number(100.0, 1e-9))] * 2)["friction"]
+        assert machine.half_width == pytest.approx(4.0)
+
+
+class TestCheckOfASimulation:
+    @pytest.mark.parametrize(
+        ("simulated", "balanced", "follows", "expected"),
+        [
+            ((100.0, 9.0), (104.0, 3.0), True, (104.0, 3.0)),
+            ((100.0, 2.0), (104.0, 3.0), True, (100.0, 2.0)),
+            ((100.0, 9.0), (120.0, 3.0), True, (100.0, 9.0)),
+            ((100.0, 2.0), (101.0, 3.0), False, (101.0, 3.0)),
+            ((100.0, 2.0), (120.0, 3.0), False, (120.0, 20.0)),
+        ],
+        ids=["sharper", "blunter", "apart", "misfit, alike", "misfit, apart"],
+    )
+    def test_rules(self, simulated, balanced, follows, expected):
+        found = checked_by_curve(
+            {SLIDING: number(*simulated)}, {SLIDING: number(*balanced)}, follows
+        )
+        assert (found[SLIDING].value, found[SLIDING].half_width) == expected
+
+    @pytest.mark.parametrize("name", ["spring_constant", "spring_preload"])
+    @pytest.mark.parametrize(("apart", "width"), [(0.0, 4.0), (9.0, 5.0)])
+    def test_a_spring_that_only_transients_know_is_known_less(self, name, apart, width):
+        """A third of what both differ, and the half width of 4: 3 and 4 are 5."""
+        simulated, balanced = {name: number(100.0, 4.0)}, {name: number(100.0 + apart, 30.0)}
+        found = checked_by_curve(simulated, balanced, follows=True)[name]
+        assert (found.value, found.half_width) == (100.0, pytest.approx(width))
+
+    @pytest.mark.parametrize(
+        ("simulated", "balanced", "follows", "slip_force", "expected"),
+        [
+            ((100.0, 2.0), (104.0, 3.0), True, 0.0, (100.0, 2.0)),
+            ((100.0, 9.0), (104.0, 3.0), True, 0.0, (104.0, 5.0)),
+            ((100.0, 2.0), (104.0, 3.0), False, 0.0, (104.0, 5.0)),
+            ((100.0, 9.0), (104.0, 3.0), True, 40.0, (100.0, 9.0)),
+            ((100.0, 9.0), (104.0, 3.0), False, 40.0, (104.0, 13.0)),
+        ],
+        ids=["sharper", "blunter", "misfit", "slips", "slips, misfit"],
+    )
+    def test_what_the_friction_is_made_of(self, simulated, balanced, follows, slip_force, expected):
+        """The half widths are 3 and 4, and 0.3 of the slip force: 5, 12 and 13."""
+        found = checked_by_curve(
+            {"coulomb_friction": number(*simulated)},
+            {"coulomb_friction": number(*balanced)},
+            follows,
+            slip_force,
+        )["coulomb_friction"]
+        assert (found.value, found.half_width) == (expected[0], pytest.approx(expected[1]))
+
+    def test_a_slow_sensor_that_the_simulation_excludes_is_no_rival(self):
+        ours = replace(number(100.0, 9.0), rival=100.0)
+        theirs = replace(number(104.0, 3.0), rival=60.0)
+        assert theirs.has_rival
+        assert not checked_by_curve({SLIDING: ours}, {SLIDING: theirs}, True)[SLIDING].has_rival
+        assert checked_by_curve({SLIDING: ours}, {SLIDING: theirs}, False)[SLIDING].has_rival
+
+    def test_an_impossible_friction_checks_nothing(self):
+        ours = {SLIDING: number(100.0, 9.0)}
+        impossible = {SLIDING: number(-5.0, 200.0)}
+        assert checked_by_curve(ours, impossible, False) == ours

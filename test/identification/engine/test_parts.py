@@ -1,0 +1,145 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Parts of the fit with imperfections, each against what can be derived."""
+
+import re
+
+import numpy as np
+import pytest
+
+from valve_friction_ros.identification.engine.bounded_step import bounded_minimum
+from valve_friction_ros.identification.engine.broad_model import ABSENT, BroadModel
+from valve_friction_ros.identification.engine.fitted_record import fitted_record
+from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.intervals import Budget
+from valve_friction_ros.identification.engine.remarks import sampling_remarks
+from valve_friction_ros.identification.engine.sentences import main_doubt
+from valve_friction_ros.identification.engine.starts import lagging
+from valve_friction_ros.identification.engine.weights import inflation
+from valve_friction_ros.identification.trust.verdict import interval_share
+from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.signals import stamped_noise
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+@pytest.mark.parametrize("lost", [0.0, 0.2])
+def test_noise_does_not_depend_on_the_stamps(jitter, lost):
+    generator = np.random.default_rng(1)
+    time = np.arange(20_000) * 1e-3 + 1e-3 * jitter * generator.uniform(-1, 1, 20_000)
+    time = time[generator.random(time.size) >= lost]
+    values = np.sin(time) + 0.01 * generator.standard_normal(time.size)
+    assert stamped_noise(StampedSignal(time, values)) == pytest.approx(0.01, rel=0.03)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("lost", [0.0, 0.02, 0.1])
+def test_samples_are_missing_only_where_some_were_lost(jitter, lost):
+    """Stamps in whole milliseconds of an 80 Hz clock: their median pause is 12 ms, not 12.5 ms."""
+    generator = np.random.default_rng(7)
+    time = (np.arange(8000) + jitter * generator.uniform(-1, 1, 8000)) / 80
+    time = np.round(time[generator.random(time.size) >= lost], 3)
+    signal = StampedSignal(time, np.sin(time))
+    said = [one for one in sampling_remarks(StampedRecord(signal, signal)) if "missing" in one]
+    if lost == 0:
+        assert said == []
+    else:
+        share = float(re.match(r"([\d.]+) % of", said[0])[1]) / 100
+        assert share == pytest.approx(1 - time.size / 8000, rel=0.15)
+
+
+def test_minimum_inside_the_bounds_is_that_of_the_form():
+    curvature, slope = np.array([[1.0, 0.3], [0.3, 1.0]]), np.array([1.0, 2.0])
+    found = bounded_minimum(curvature, slope, np.full(2, -np.inf))
+    np.testing.assert_allclose(found, np.linalg.solve(curvature, slope))
+
+
+def test_minimum_at_a_bound_moves_the_other_coordinate():
+    """With q₀ held at 0, q₁ is b₁/A₁₁."""
+    curvature, slope = np.array([[1.0, 0.9], [0.9, 1.0]]), np.array([-1.0, 0.5])
+    found = bounded_minimum(curvature, slope, np.array([0.0, -np.inf]))
+    np.testing.assert_allclose(found, [0.0, 0.5])
+
+
+def test_white_residuals_are_not_inflated():
+    scaled = np.random.default_rng(0).standard_normal(100_000)
+    assert inflation(scaled, 1000) == pytest.approx(1.0, abs=0.6)
+
+
+def test_lasting_residuals_are_inflated_by_their_length():
+    """Blocks of 64 equal numbers: a mean over them has 64 times the variance of white noise."""
+    scaled = np.repeat(np.random.default_rng(0).standard_normal(4096), 64)
+    assert inflation(scaled, 64) == pytest.approx(64.0, rel=0.1)
+
+
+def test_starts_with_a_lag_keep_the_whole_delay():
+    """A sliding stem follows the force by F_v/k and the lags together."""
+    at = {"spring_constant": 2e5, "viscous_friction": 1.2e4, **ABSENT}
+    starts = lagging(at, 0.04)
+    assert len(starts) == 25
+    for start in starts:
+        lags = sum(start[name] for name in TIMING)
+        assert start["stem_lag"] >= 0
+        if start["viscous_friction"] > 0.1 * at["viscous_friction"]:
+            assert lags + start["viscous_friction"] / 2e5 == pytest.approx(0.06)
+        else:
+            assert lags >= 0.054
+
+
+@pytest.fixture(scope="module")
+def model():
+    """Return the model of a slow triangle, with noise of the pressure only."""
+    time = np.arange(20_000) * 1e-3
+    pressure = 1e5 + 2e4 * np.abs((time / 10.0) % 2.0 - 1.0)
+    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 1e-3).position
+    generator = np.random.default_rng(0)
+    record = StampedRecord(
+        StampedSignal(time, pressure + 50.0 * generator.standard_normal(time.size)),
+        StampedSignal(time, position + 1e-6 * generator.standard_normal(time.size)),
+    )
+    return BroadModel(fitted_record(record, BENCH_VALVE), LOW_FRICTION.spring_constant)
+
+
+TRUE = {
+    **ABSENT,
+    "mass": LOW_FRICTION.mass,
+    "viscous_friction": LOW_FRICTION.viscous_friction,
+    "coulomb_friction": LOW_FRICTION.coulomb_friction,
+    "spring_constant": LOW_FRICTION.spring_constant,
+    "spring_preload": LOW_FRICTION.spring_preload,
+}
+
+
+def test_presliding_leaves_the_sliding_level(model):
+    """F_c is what a sliding stem needs, however far its bristles bend before."""
+    at = {**TRUE, "start_position": model.record.start}
+    stiff, soft = (model.readings({**at, "presliding": bend})[0] for bend in (0.0, 2e-5))
+    velocity = np.abs(model.simulate(at).velocity)[model.record.cells.astype(int)]
+    cells = np.arange(velocity.size)
+    sliding = (velocity > 1e-4) & (cells > 0.2 * cells.size)
+    away = np.abs(soft - stiff)
+    assert np.median(away[sliding]) < 1e-7
+    assert away.max() > 1e-5
+
+
+def test_difference_of_the_halves_is_foreseen(model):
+    """The squares of half the difference sum up to what the noise of the pressure explains."""
+    at = {**TRUE, "start_position": model.record.start}
+    even, odd = (model.record.position - model.readings(at)) * model.weights
+    apart = 0.25 * float(np.sum((even - odd) ** 2))
+    assert 0.2 * model.foreseen_difference < apart < 1.2 * model.foreseen_difference
+
+
+def test_every_source_has_words():
+    """Also the place of the stem at first, which is no imperfection of a plant."""
+    for name in (*ABSENT, "start_position"):
+        doubt = main_doubt(Budget(1.0, 0.0, {name: 2.0}), interval_share(1.0, 0.2))
+        assert doubt.startswith("its interval is ±20 % of its value: the record does not determine")
+    assert main_doubt(Budget(1.0, 0.0, {"drift": 0.1}), 0.2).endswith("leaves of the motion")

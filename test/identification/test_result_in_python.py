@@ -1,0 +1,168 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What people who write Python expect of a result: covariance, bands, models compared, pickles."""
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import valve_friction_ros as vf
+from valve_friction_ros.identification import SLIDING, Verdict
+from valve_friction_ros.identification.trust.model_comparison import (
+    Support,
+    independent_samples,
+    models_compared,
+)
+from valve_friction_ros.identification.trust.verdict import PRELOAD_SCALE, with_verdict
+
+VALVE = vf.Valve(diaphragm_area=0.0445, travel=28.575e-3)
+PRESSURE = 6.5e4 + 5e4 * np.sin(2 * np.pi * np.arange(4000) / 1000)
+TRUTH = vf.KarnoppParameters(1.6, 4865.0, 150.0, 150.0, 2.05e5)
+"""Its preload is zero."""
+
+
+def record_of(seed):
+    stem = vf.simulate(VALVE, TRUTH, PRESSURE, 0.01)
+    clean = vf.Recording(0.01, PRESSURE, stem.position)
+    return vf.SensorNoise(position=5e-6, pressure=50.0, seed=seed).applied_to(clean)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return vf.identify(record_of(1), VALVE, "bench")
+
+
+def test_a_preload_of_zero_can_be_identified(result):
+    for one in (result, vf.identify(record_of(2), VALVE, "plant")):
+        preload = one.parameters["spring_preload"]
+        assert preload.verdict is Verdict.IDENTIFIED
+        assert abs(preload.value) < preload.half_width
+    assert vf.validate(record_of(3), VALVE, result).fit > 0.99
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "verdict", "reason"),
+    [
+        (0.0, 5.9, Verdict.IDENTIFIED, ""),
+        (0.0, 6.1, Verdict.WEAK, "±0.61 % of the range of the actuator force"),
+        (0.0, 121.0, Verdict.NOT_IDENTIFIABLE, "wider than its value"),
+        (-500.0, 24.9, Verdict.IDENTIFIED, ""),
+        (-500.0, 25.1, Verdict.WEAK, "±5 % of its value"),
+    ],
+)
+def test_the_criterion_of_a_preload(value, half_width, verdict, reason):
+    """Of an actuator force that ranges over 1000 N: 0.6 % of it, and 5 % of what is larger."""
+    scale = PRELOAD_SCALE * 1000.0
+    found = with_verdict("spring_preload", value, 1.0, half_width, scale=scale)
+    assert found.verdict is verdict
+    assert reason in found.reason
+
+
+class TestCovariance:
+    def test_its_diagonal_is_the_standard_error(self, result):
+        found = result.covariance()
+        assert set(found.index) >= {"viscous_friction", "coulomb_friction", "spring_constant"}
+        errors = [result.parameters[name].standard_error for name in found.index]
+        assert np.sqrt(np.diag(found)) == pytest.approx(errors)
+
+    def test_it_is_positive_and_symmetric(self, result):
+        found = result.correlation().to_numpy()
+        assert found == pytest.approx(found.T)
+        assert np.min(np.linalg.eigvalsh(found)) > -1e-9
+        assert np.max(np.abs(found)) == 1.0
+
+    def test_it_is_that_of_repeated_records(self, result):
+        """The friction at one speed is better known than how it divides into F_c and F_v."""
+        values = [vf.identify(record_of(seed), VALVE, "bench").values for seed in range(10, 34)]
+        pairs = [(one["coulomb_friction"], one["viscous_friction"]) for one in values]
+        seen = np.corrcoef(np.transpose(pairs))[0, 1]
+        told = result.correlation().loc["coulomb_friction", "viscous_friction"]
+        # Fisher's z of 24 pairs has the deviation 1/sqrt(21).
+        assert math.atanh(told) == pytest.approx(math.atanh(seen), abs=3 / math.sqrt(21))
+
+    def test_a_method_without_one_says_so(self):
+        published = vf.identify(record_of(1), VALVE, "published")
+        with pytest.raises(vf.RefusalError, match="use the method plant or bench"):
+            published.covariance()
+
+
+class TestBand:
+    def test_it_holds_the_true_stem_and_is_narrow(self, result):
+        """It is of the model: 95 % of where the true stem may be, without noise."""
+        low, high = result.stem_band(PRESSURE, 0.01)
+        truth = vf.simulate(VALVE, TRUTH, PRESSURE, 0.01).position
+        inside = (low - 1e-6 <= truth) & (truth <= high + 1e-6)
+        assert np.mean(inside) > 0.9
+        assert 0 < np.max(high - low) < 1e-4
+
+    def test_it_is_the_same_each_time(self, result):
+        one, other = (result.stem_band(PRESSURE[:500], 0.01, draws=5) for _ in range(2))
+        assert np.array_equal(one, other)
+
+
+class TestModels:
+    def test_a_model_that_lacks_what_there_is(self, result):
+        dry = vf.IdentificationSettings(fixed={"viscous_friction": 0.0})
+        without = vf.identify(result.recording, VALVE, dry, "bench")
+        compared = result.against(without)
+        assert compared.support is Support.VERY_STRONG
+        assert compared.log_ratio > 0
+        assert compared.free == (6, 5)
+        assert compared.independent < compared.samples
+        words = str(without.against(result))
+        assert words.startswith("the record speaks very strongly for the second model: it is 1e")
+        assert "as what a model leaves at one of them is much as at the next" in words
+
+    def test_a_parameter_that_changes_nothing_counts_against(self, result):
+        """ln(n)/2 for each one; given its own value the fit is as good."""
+        given = {"spring_constant": result.values["spring_constant"]}
+        fewer = vf.identify(
+            result.recording, VALVE, vf.IdentificationSettings(fixed=given), "bench"
+        )
+        compared = fewer.against(result)
+        assert compared.free == (5, 6)
+        expected = 0.5 * math.log(compared.independent)
+        assert compared.log_ratio == pytest.approx(expected, abs=1.0)
+
+    def test_of_two_records_they_are_refused(self, result):
+        with pytest.raises(ValueError, match="different records"):
+            result.against(vf.identify(record_of(2), VALVE, "bench"))
+
+    def test_white_noise_counts_and_repeated_samples_do_not(self):
+        """Each value ten times is a tenth of the samples: the sum of the autocorrelation is 10."""
+        noise = np.random.default_rng(1).normal(size=20_000)
+        assert independent_samples(noise) == pytest.approx(20_000, rel=0.1)
+        assert independent_samples(np.repeat(noise, 10)) == pytest.approx(20_000, rel=0.1)
+
+    def test_an_autoregressive_residual(self):
+        """x' = a·x + e has the autocorrelation a^k, whose sum over all lags is (1 + a)/(1 - a)."""
+        random, share = np.random.default_rng(2), 0.8
+        residual = np.zeros(100_000)
+        for k, step in enumerate(random.normal(size=residual.size - 1)):
+            residual[k + 1] = share * residual[k] + step
+        assert independent_samples(residual) == pytest.approx(1e5 / 9, rel=0.15)
+
+    def test_two_wrong_models_are_said_to_be(self):
+        noise = np.random.default_rng(3).normal(size=1000)
+        words = str(models_compared((noise, 2 * noise), (5, 5), (False, False)))
+        assert "neither describes the valve to within noise" in words
+        same = models_compared((noise, noise), (5, 5))
+        assert str(same).startswith("the record hardly tells the two models apart; ")
+        assert same.log_ratio == 0
+
+
+def test_it_is_pickled_and_copied(result):
+    for one in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+        assert one.to_dict() == result.to_dict()
+        assert one.parameters[SLIDING].interval == result.parameters[SLIDING].interval
+        assert one.to_frame().equals(result.to_frame())

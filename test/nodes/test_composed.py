@@ -1,0 +1,192 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Nodes in a user's own process: in each executor of rclpy, and managed by their life cycle."""
+
+import contextlib
+import importlib.metadata
+import threading
+
+import pytest
+import rclpy
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from live_nodes import NAMESPACE, values_of
+from rcl_interfaces.srv import GetParameters
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.parameter import Parameter
+from records import quick_record
+from type_description_interfaces.srv import GetTypeDescription
+
+from valve_friction_ros.model import BENCH_VALVE
+from valve_friction_ros.nodes.identifier.node import Identifier
+from valve_friction_ros.nodes.plumbing import polled_node, polled_subscription, rclpy_private
+from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
+
+IDENTIFIER = f"{NAMESPACE}/identifier"
+EXECUTORS = {
+    "single": SingleThreadedExecutor,
+    "multi": MultiThreadedExecutor,
+    "events": EventsExecutor,
+}
+STATED = {
+    "clock_tolerance": 0.0,
+    "input_timeout": 600.0,
+    "history_file": "",
+    **vars(BENCH_VALVE),
+}
+
+
+def overrides(**changes):
+    return [Parameter(name, value=value) for name, value in (STATED | changes).items()]
+
+
+@contextlib.contextmanager
+def spun(node, executor):
+    """Turn a node's executor in a thread, as a user's process does."""
+    executor.add_node(node)
+    ended = threading.Event()
+
+    def turn():
+        while not ended.is_set():
+            if isinstance(executor, TurnExecutor):
+                executor.turn()
+                node.poll_guarded()
+                ended.wait(0.01)
+            else:
+                executor.spin_once(timeout_sec=0.1)
+
+    thread = threading.Thread(target=turn)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        executor.shutdown()
+
+
+@pytest.fixture
+def compose(live):
+    """Return what makes an identifier in this process, in the domain of the client."""
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, domain_id=live.domain.number)
+    made = []
+
+    def make(**changes):
+        made.append(
+            Identifier(
+                namespace=NAMESPACE, context=context, parameter_overrides=overrides(**changes)
+            )
+        )
+        return made[-1]
+
+    make.context = context
+    yield make
+    for node in made:
+        node.destroy_node()
+    context.try_shutdown()
+
+
+def converse(client):
+    """Ask a composed identifier for all that a user may ask for."""
+    client.connect()
+    parameters = client.call(
+        GetParameters, f"{IDENTIFIER}/get_parameters", GetParameters.Request(names=["window"])
+    )
+    assert parameters.values[0].double_value == 60.0
+    client.set_parameters(IDENTIFIER, {"window": 50.0})
+    described = client.call(
+        GetTypeDescription,
+        f"{IDENTIFIER}/get_type_description",
+        GetTypeDescription.Request(type_name="none"),
+    )
+    assert not described.successful  # it knows no such type, and says so
+    assert "the stem ignores reversals smaller than" in client.identified(quick_record())
+    values = values_of(client.next_status())
+    assert values["coulomb_friction verdict"] == "identified"
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_identifier_works_in_each_executor_of_rclpy(live, compose, kind):
+    with spun(compose(), EXECUTORS[kind](context=compose.context)):
+        converse(live.client)
+
+
+@pytest.mark.parametrize("kind", ["single", "turns"])
+def test_identifier_works_where_rclpy_offers_no_way_behind_it(live, compose, kind, monkeypatch):
+    """As on a version of rclpy whose private calls have gone: messages come by callbacks."""
+    for module in (polled_node, polled_subscription):
+        monkeypatch.setattr(module, "takes_directly", lambda _: False)
+    for name in ("take_messages", "take_request"):
+        monkeypatch.delattr(rclpy_private, name)
+    made = TurnExecutor if kind == "turns" else SingleThreadedExecutor
+    with spun(compose(), made(context=compose.context)):
+        converse(live.client)
+
+
+def test_the_version_of_rclpy_has_been_tried():
+    names = ("ros-jazzy-rclpy", "ros-kilted-rclpy", "rclpy")
+    for name in names:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            version = importlib.metadata.version(name)
+            break
+    assert version in rclpy_private.CHECKED, (
+        f"run test/nodes with rclpy {version}, and add it to CHECKED of rclpy_private.py"
+    )
+
+
+def change(client, transition):
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return client.call(ChangeState, f"{IDENTIFIER}/change_state", request).success
+
+
+def state(client):
+    return client.call(GetState, f"{IDENTIFIER}/get_state", GetState.Request()).current_state.id
+
+
+def test_life_cycle(live, compose):
+    """Unconfigured: nothing; inactive: it refuses; active: it works; all of it twice."""
+    client = live.client
+    with spun(compose(lifecycle=True), TurnExecutor(context=compose.context)):
+        for _ in range(2):
+            assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
+            assert not client.node.get_subscriptions_info_by_topic(f"{NAMESPACE}/stem_state")
+            assert change(client, Transition.TRANSITION_CONFIGURE)
+            assert state(client) == State.PRIMARY_STATE_INACTIVE
+            refused = client.trigger("identify")
+            assert not refused.success
+            assert "is inactive: activate it" in refused.message
+
+            assert change(client, Transition.TRANSITION_ACTIVATE)
+            client.connect()
+            client.identified(quick_record())
+            assert change(client, Transition.TRANSITION_DEACTIVATE)
+            client.drain()
+            heard = len(client.statuses)
+            client.drain(1.5)
+            assert len(client.statuses) == heard  # an inactive node publishes nothing
+            assert change(client, Transition.TRANSITION_ACTIVATE)
+            values = values_of(client.next_status())
+            assert values["coulomb_friction verdict"] == "identified"  # what is known is kept
+            assert change(client, Transition.TRANSITION_DEACTIVATE)
+            assert change(client, Transition.TRANSITION_CLEANUP)
+            client.disconnect()
+        assert change(client, Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
+        assert state(client) == State.PRIMARY_STATE_FINALIZED
+
+
+def test_a_wrong_parameter_leaves_the_node_unconfigured(live, compose):
+    client = live.client
+    with spun(compose(lifecycle=True, warn_ratio=3.0), TurnExecutor(context=compose.context)):
+        assert not change(client, Transition.TRANSITION_CONFIGURE)
+        assert state(client) == State.PRIMARY_STATE_UNCONFIGURED
+        client.set_parameters(IDENTIFIER, {"warn_ratio": 1.5})
+        assert change(client, Transition.TRANSITION_CONFIGURE)

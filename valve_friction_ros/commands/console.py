@@ -1,0 +1,33 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Consoles that results are printed on."""
+
+import errno
+import os
+import sys
+
+from rich.console import Console
+
+_PRINTED_WIDTH = 120
+"""Columns of what goes into a file or a pipe, which has no width of its own."""
+
+
+class OutputConsole(Console):
+    """A console for which a closed output is an error; rich would end the process in silence."""
+
+    def on_broken_pipe(self) -> None:
+        """Raise the error again."""
+        raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+
+def plain_console() -> Console:
+    """Return a console that prints text as it is, as wide as the terminal if there is one."""
+    width = None if sys.stdout.isatty() else _PRINTED_WIDTH
+    return OutputConsole(width=width, highlight=False, markup=False)

@@ -1,0 +1,253 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The bench of the demo: its nodes as processes of their own, and a client that talks to them."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import FluidPressure, JointState
+
+from valve_friction_ros.model import Recording
+from valve_friction_ros.nodes.plumbing.messages import position_of, stamp_of
+from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
+from valve_friction_ros.nodes.plumbing.qos import stream
+from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES
+from valve_friction_ros.nodes.service_request import (
+    TriggerCall,
+    UnansweredError,
+    set_parameters_request,
+)
+from valve_friction_ros.streams import RecordBuffer
+from valve_friction_ros.streams.record_buffer import Snapshot
+from valve_friction_ros.wording import Code, said
+
+_POLL = 0.05
+
+
+class BenchError(Exception):
+    """The bench did not do what it should; the message says what."""
+
+
+class BenchClient(Node):
+    """Gathers in `buffer` what the bench in `namespace` publishes, as any third node would."""
+
+    def __init__(self, namespace: str, buffer: RecordBuffer) -> None:
+        super().__init__("demo", namespace=namespace)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
+        self._buffer = buffer
+        self._identifier = f"/{namespace}/identifier"
+        self._status: DiagnosticStatus | None = None
+        self._first_stamp: int | None = None
+        self._last_stamp = 0
+        # Taken in blocks, as the nodes do: a callback a sample would take most of a processor.
+        self._pressures = PolledSubscription(self, FluidPressure, "actuator_pressure", stream())
+        self._stems = PolledSubscription(self, JointState, "stem_state", stream())
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+
+    def _take(self) -> None:
+        for taken in self._pressures.take():
+            self._on_pressure(taken.message)
+        for taken in self._stems.take():
+            self._on_stem(taken.message)
+
+    def _on_pressure(self, message: FluidPressure) -> None:
+        self._buffer.add_pressure(stamp_of(message.header.stamp), message.fluid_pressure)
+
+    def _on_stem(self, message: JointState) -> None:
+        stamp = stamp_of(message.header.stamp)
+        self._buffer.add_position(stamp, position_of(message, ""))
+        self._first_stamp = stamp if self._first_stamp is None else self._first_stamp
+        self._last_stamp = stamp
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == f"{self._identifier}: friction":
+                self._status = status
+
+    @property
+    def recorded(self) -> float:
+        """Length of the stem signal since `begin_record`, s."""
+        return 0.0 if self._first_stamp is None else (self._last_stamp - self._first_stamp) / 1e9
+
+    @property
+    def level(self) -> int | None:
+        """Level of the latest diagnostic."""
+        return None if self._status is None else self._status.level[0]
+
+    @property
+    def diagnostic_message(self) -> str:
+        """Text of the latest diagnostic."""
+        return "" if self._status is None else self._status.message
+
+    @property
+    def diagnostic_values(self) -> dict[str, str]:
+        """Key-value pairs of the latest diagnostic."""
+        return {} if self._status is None else {v.key: v.value for v in self._status.values}
+
+    @property
+    def identifier_hears(self) -> bool:
+        """Whether the latest diagnostic counts samples of both signals."""
+        shown = self.diagnostic_values
+        return all(
+            int(shown.get(f"buffered_{signal}", "0")) > 0 for signal in ("pressures", "positions")
+        )
+
+    def begin_record(self) -> None:
+        """Forget what was gathered and start anew."""
+        self._buffer.clear(said(Code.CLEARED_AS_RECORD_BEGINS))
+        self._first_stamp = None
+
+    def snapshot(self) -> Snapshot:
+        """Copy what was gathered."""
+        return self._buffer.snapshot()
+
+    def recording(self) -> Recording:
+        """Return what was gathered, on a uniform grid."""
+        return self.snapshot().recording()
+
+    def wait(self, done: Callable[[], bool], timeout: float, what: str) -> None:
+        """Spin until `done` is true; raises BenchError naming `what` after `timeout` seconds."""
+        deadline = time.monotonic() + timeout
+        while not done():
+            if time.monotonic() > deadline:
+                raise BenchError(f"no {what} within {timeout:g} s")
+            self._executor.spin_once(timeout_sec=_POLL)
+            self._take()
+
+    def trigger(self, service: str, timeout: float = 120.0) -> str:
+        """Call a Trigger service of the identifier and return its message."""
+        call = TriggerCall(self, self._identifier, service, timeout, timeout)
+        try:
+            self.wait(call.step, 2 * timeout, f"answer of {service}")
+        except UnansweredError as error:
+            raise BenchError(str(error)) from None
+        finally:
+            call.close()
+        if not call.answer.success:
+            raise BenchError(f"{service}: {call.answer.message}")
+        return str(call.answer.message)
+
+    def set_parameters(self, node: str, values: Mapping[str, float], timeout: float = 10.0) -> None:
+        """Set parameters of a node of the bench, all at once."""
+        target = f"{self.get_namespace()}/{node}"
+        asked = set_parameters_request(self, target, values)
+        try:
+            self.wait(asked.step, timeout, f"answer of {target}/set_parameters_atomically")
+        finally:
+            asked.close()
+        if not asked.answer.result.successful:
+            raise BenchError(f"{node} refused: {asked.answer.result.reason}")
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.shutdown()
+        self.destroy_node()
+
+
+_STOP_TIMEOUT = 5.0
+_DOMAINS = 100
+"""Domains 1 to 100: a larger number may collide with ports that the system gives away."""
+_PROFILE = Path(__file__).with_name("fast_discovery.xml")
+
+
+class NodeProcess(NamedTuple):
+    """One node to run: its executable and its parameters."""
+
+    executable: str
+    parameters: Mapping[str, object]
+
+
+def quick_discovery() -> dict[str, str]:
+    """Return the environment in which processes of this machine find each other quickly.
+
+    Nothing leaves the machine. What the user has set already stays.
+    """
+    wanted = {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        PROFILES: str(_PROFILE),
+    }
+    return {name: value for name, value in wanted.items() if name not in os.environ}
+
+
+@contextlib.contextmanager
+def free_domain() -> Iterator[int]:
+    """Provide a ROS domain that the user has not set and no other demo of this machine uses.
+
+    A domain of a running bench would show its topics here, under the same names. An abstract
+    socket of the domain's number is held as long as the domain is in use.
+    """
+    set_already = os.environ.get("ROS_DOMAIN_ID", "0")
+    first = os.getpid() % _DOMAINS
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
+        for step in range(_DOMAINS):
+            number = 1 + (first + step) % _DOMAINS
+            if str(number) != set_already and _is_bound(claim, number):
+                yield number
+                return
+    raise BenchError("no ROS domain is free: end another demo")
+
+
+def _is_bound(claim: socket.socket, number: int) -> bool:
+    try:
+        claim.bind(f"\0valve_friction_ros/domain/{number}")
+    except OSError:  # in use
+        return False
+    return True
+
+
+def _command(node: NodeProcess, namespace: str) -> list[str]:
+    command = [sys.executable, "-m", f"valve_friction_ros.nodes.{node.executable}"]
+    command += ["--ros-args", "--log-level", "warn", "-r", f"__ns:=/{namespace}"]
+    for name, value in node.parameters.items():
+        command += ["-p", f"{name}:={value}"]
+    return command
+
+
+def _wait_or_kill(process: subprocess.Popen[bytes]) -> None:
+    try:
+        process.wait(_STOP_TIMEOUT)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        if process.poll() is None:
+            process.terminate()
+    for process in processes:
+        _wait_or_kill(process)
+
+
+@contextlib.contextmanager
+def running_nodes(
+    nodes: Sequence[NodeProcess], namespace: str
+) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Run `nodes` in `namespace` as long as the context lasts; then stop them."""
+    processes: list[subprocess.Popen[bytes]] = []
+    try:
+        # A session of their own keeps the terminal's Ctrl-C from them: they are stopped here.
+        processes += [
+            subprocess.Popen(_command(node, namespace), start_new_session=True) for node in nodes
+        ]
+        yield processes
+    finally:
+        _stop(processes)

@@ -1,0 +1,351 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Where a dashboard listens and whom it lets in: accounts, from a file or the environment.
+
+Of passwords only a hash is kept. scrypt (RFC 7914) is in Python's standard library and needs memory
+as well as time, so that a stolen file cannot be tried quickly on graphics cards. Its cost is one of
+those that OWASP's *Password Storage Cheat Sheet* gives as equal: N = 2¹⁴, r = 8, p = 5; 16 MiB and
+some 0.2 s a try.
+"""
+
+import base64
+import binascii
+import hashlib
+import hmac
+import os
+import re
+import secrets
+import ssl
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+
+from valve_friction_ros.loopback import is_loopback
+
+
+def require_private(file: Path) -> None:
+    """Raise ValueError if anybody but its owner can read or write a file."""
+    if file.stat().st_mode & 0o077:
+        raise ValueError(f"{file} is open to others: run `chmod 600 {file}`")
+
+
+SHORTEST, LONGEST = 10, 200
+"""Characters of a new password, and of one that is tried."""
+
+_KIND = "scrypt"
+_COST, _BLOCK, _PARALLEL = 14, 8, 5
+_SALT, _DIGEST = 16, 32
+_MOST_COST, _MOST_BLOCK, _MOST_PARALLEL = 20, 16, 16
+
+
+def _encoded(data: bytes) -> str:
+    return base64.urlsafe_b64encode(data).decode().rstrip("=")
+
+
+def _decoded(text: str) -> bytes:
+    return base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True)
+
+
+@dataclass(frozen=True)
+class HashedPassword:
+    """A salted hash of a password.
+
+    As text it is ``scrypt:14:8:5:SALT:DIGEST``, with the logarithm of N, r, p and two numbers in
+    base64; no character of it means anything to a shell.
+
+    Attributes
+    ----------
+    cost, block, parallel : int
+        log₂ N, r and p of scrypt.
+    salt, digest : bytes
+        What was hashed with the password, and what came out.
+
+    Raises
+    ------
+    ValueError
+        If the cost is not one that a log-in can bear, or salt or digest are too short.
+    """
+
+    cost: int
+    block: int
+    parallel: int
+    salt: bytes = field(repr=False)
+    digest: bytes = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no hash, or would take a machine's memory."""
+        if not (
+            10 <= self.cost <= _MOST_COST
+            and 1 <= self.block <= _MOST_BLOCK
+            and 1 <= self.parallel <= _MOST_PARALLEL
+            and len(self.salt) >= _SALT
+            and len(self.digest) >= _DIGEST
+        ):
+            raise ValueError("no usable hash of a password")
+
+    @classmethod
+    def of(cls, password: str) -> "HashedPassword":
+        """Hash a new password with a salt of its own.
+
+        Raises ValueError if it is shorter than `SHORTEST` or longer than `LONGEST` characters.
+        """
+        if not SHORTEST <= len(password) <= LONGEST:
+            raise ValueError(
+                f"a password has {SHORTEST} to {LONGEST} characters, this one {len(password)}"
+            )
+        salt = secrets.token_bytes(_SALT)
+        empty = cls(_COST, _BLOCK, _PARALLEL, salt, bytes(_DIGEST))
+        return cls(_COST, _BLOCK, _PARALLEL, salt, empty._hashed(password))
+
+    @classmethod
+    def unknown(cls, like: "HashedPassword | None" = None) -> "HashedPassword":
+        """Return a hash that no password has; it takes as long as another, or as a new one."""
+        salt, digest = secrets.token_bytes(_SALT), secrets.token_bytes(_DIGEST)
+        if like is not None:
+            return replace(like, salt=salt, digest=digest)
+        return cls(_COST, _BLOCK, _PARALLEL, salt, digest)
+
+    @classmethod
+    def read(cls, text: str) -> "HashedPassword":
+        """Read the text of a hash; raises ValueError, without the text, if it is none."""
+        kind, *rest = text.split(":")
+        try:
+            if kind != _KIND:
+                raise ValueError
+            cost, block, parallel, salt, digest = rest
+            return cls(int(cost), int(block), int(parallel), _decoded(salt), _decoded(digest))
+        except (ValueError, binascii.Error):
+            raise ValueError(
+                "no usable hash of a password: make one by `valve_friction dashboard-account`"
+            ) from None
+
+    def __str__(self) -> str:
+        """Return the text that `read` reads."""
+        numbers = f"{self.cost}:{self.block}:{self.parallel}"
+        return f"{_KIND}:{numbers}:{_encoded(self.salt)}:{_encoded(self.digest)}"
+
+    def matches(self, password: str) -> bool:
+        """Tell whether a password has this hash, in a time that says nothing of the digest."""
+        return hmac.compare_digest(self._hashed(password[:LONGEST]), self.digest)
+
+    def _hashed(self, password: str) -> bytes:
+        # Keyboards differ in how they write an accented letter: NFKC is the one form of it.
+        return hashlib.scrypt(
+            unicodedata.normalize("NFKC", password).encode(errors="surrogatepass"),
+            salt=self.salt,
+            n=1 << self.cost,
+            r=self.block,
+            p=self.parallel,
+            maxmem=256 * self.block * (self.parallel + (1 << self.cost)),
+            dklen=len(self.digest),
+        )
+
+
+VARIABLE = "VALVE_FRICTION_DASHBOARD_ACCOUNTS"
+"""Variable of the environment with accounts, where there is no file."""
+
+_NAME = re.compile(r"[\w.@+-]{1,64}")
+
+
+class Role(Enum):
+    """What an account may do: look only, or call the services of identifiers too."""
+
+    VIEW = "view"
+    OPERATE = "operate"
+
+
+@dataclass(frozen=True)
+class Account:
+    """One who may log in.
+
+    As text it is ``NAME ROLE HASH``, a line of the file of accounts.
+
+    Attributes
+    ----------
+    name : str
+        Letters, digits and ``_.@+-``, 64 at most.
+    role : Role
+        What they may do.
+    password : HashedPassword
+        The hash of their password.
+
+    Raises
+    ------
+    ValueError
+        If the name is none.
+    """
+
+    name: str
+    role: Role
+    password: HashedPassword
+
+    def __post_init__(self) -> None:
+        """Refuse a name that is none."""
+        if not _NAME.fullmatch(self.name):
+            raise ValueError("the name of an account has 1 to 64 letters, digits or _.@+-")
+
+    @classmethod
+    def read(cls, line: str) -> "Account":
+        """Read a line; raises ValueError, without what the line holds, if it is no account."""
+        words = line.split()
+        if len(words) != 3 or words[1] not in {role.value for role in Role}:
+            raise ValueError("not NAME, role (view or operate) and hash")
+        return cls(words[0], Role(words[1]), HashedPassword.read(words[2]))
+
+    def __str__(self) -> str:
+        """Return the line that `read` reads."""
+        return f"{self.name} {self.role.value} {self.password}"
+
+
+def _read(text: str, source: str) -> tuple[Account, ...]:
+    found: dict[str, Account] = {}
+    for number, line in enumerate(re.split(r"[\n;]", text), 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            account = Account.read(line)
+        except ValueError as error:
+            raise ValueError(f"{source}, line {number}: {error}") from None
+        if account.name in found:
+            raise ValueError(f"{source}, line {number}: {account.name!r} is there twice")
+        found[account.name] = account
+    if not found:
+        raise ValueError(
+            f"{source} holds no account: add one by `valve_friction dashboard-account`"
+        )
+    return tuple(found.values())
+
+
+def accounts_from(
+    file: Path | None, environment: Mapping[str, str] = os.environ
+) -> tuple[Account, ...]:
+    """Return the accounts of a file or else of the environment; none where neither is given.
+
+    The environment's are in `VARIABLE`, separated by semicolons or new lines.
+
+    Raises
+    ------
+    ValueError
+        If a line is no account, a name is there twice, others can read the file, or both the file
+        and the variable are given.
+    OSError
+        If the file cannot be read.
+    """
+    words = environment.get(VARIABLE, "")
+    if file is None:
+        return _read(words, VARIABLE) if words.strip() else ()
+    if words.strip():
+        raise ValueError(f"accounts are in {file} and in {VARIABLE}: give one of them")
+    require_private(file)
+    return _read(file.read_text(encoding="utf-8"), str(file))
+
+
+@dataclass(frozen=True)
+class Access:
+    """Address, names, accounts and certificate of a dashboard.
+
+    Attributes
+    ----------
+    host : str
+        Address that it listens at; ``0.0.0.0`` is all of IPv4's.
+    host_names : tuple of str
+        Names by which browsers call it, beside its addresses and ``localhost``. Other names are
+        refused, since a foreign page can have a name that leads here.
+    accounts : tuple of Account
+        Who may log in. Without any, whoever reaches the address may operate.
+    certificate, key : Path or None
+        Files for TLS, in PEM.
+    session_hours : float
+        Time after which a log-in ends, h.
+    session_file : Path or None
+        Where sessions survive a restart; without it they do not.
+
+    Raises
+    ------
+    ValueError
+        If others can reach the dashboard and it has no accounts; if one of certificate and key is
+        missing, or they do not belong together, or others can read the key; if the time is not
+        positive.
+    OSError
+        If certificate or key cannot be read.
+    """
+
+    host: str = "127.0.0.1"
+    host_names: tuple[str, ...] = ()
+    accounts: tuple[Account, ...] = ()
+    certificate: Path | None = None
+    key: Path | None = None
+    session_hours: float = 12.0
+    session_file: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what would let anybody in."""
+        if not self.accounts and (not is_loopback(self.host) or self.host_names):
+            raise ValueError(
+                f"host {self.host!r} lets others in, and there are no accounts: make one by "
+                "`valve_friction dashboard-account NAME >> FILE; chmod 600 FILE` and give the "
+                f"parameter accounts_file (or its lines in {VARIABLE}), or use 127.0.0.1"
+            )
+        if not 0 < self.session_hours <= 10_000:
+            raise ValueError(f"session_hours is {self.session_hours:g}: give 0 to 10000")
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate_file and key_file belong together: give both or none")
+        if self.certificate is not None and self.key is not None:
+            require_private(self.key)
+            _require_pair(self.certificate, self.key)
+
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether it speaks TLS."""
+        return self.certificate is not None
+
+    @property
+    def warning(self) -> str:
+        """What its operator should know; empty if nothing."""
+        if self.accounts and not self.is_encrypted and not is_loopback(self.host):
+            return (
+                "no certificate: passwords and sessions can be read on the way; give "
+                "certificate_file and key_file"
+            )
+        return ""
+
+    def answers_to(self, called: str, address: str) -> bool:
+        """Tell whether it is called by a name of its own.
+
+        Parameters
+        ----------
+        called : str
+            What the browser calls it, the header ``Host`` without the port.
+        address : str
+            The address that the connection came in at.
+
+        A page whose name leads here has its own name in that header (DNS rebinding). An address
+        is no name, so the one that was connected to is always right.
+        """
+        name = called.lower().rstrip(".")
+        known = {"localhost", self.host.lower(), *(each.lower() for each in self.host_names)}
+        return name in known or name == address
+
+
+def _require_pair(certificate: Path, key: Path) -> None:
+    for file in (certificate, key):
+        with file.open("rb"):
+            pass
+    try:
+        # A password is given so that an encrypted key is refused, not asked for on the terminal.
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
+    except (ssl.SSLError, ValueError) as error:
+        reason = getattr(error, "reason", None) or error
+        raise ValueError(
+            f"certificate {certificate} and key {key} cannot be used ({reason}): give a PEM "
+            "certificate and its key without a password"
+        ) from None

@@ -1,0 +1,348 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Charts of the pages, as options of ECharts: numbers and fixed words, never text from outside.
+
+The times of the trend are those of a wall clock in the chosen zone, which the browser is told to
+take for UTC: it knows no other zones.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import numpy as np
+
+from valve_friction_ros.dashboard.live_strip import Strip
+from valve_friction_ros.health import AlarmAction, AlarmEvent
+from valve_friction_ros.history import (
+    LIMIT_NAMES,
+    Trend,
+    ValveHistory,
+    end_of_trend,
+    friction_of,
+    trended,
+)
+from valve_friction_ros.identification import Verdict
+from valve_friction_ros.model import Recording
+from valve_friction_ros.streams import utc
+
+_BLUE, _ORANGE, _GREY, _GREEN = "#0072B2", "#D55E00", "#8a949f", "#009E73"
+_MOST_POINTS = 1500
+"""Most points of a line."""
+_SPLIT = "rgba(128,140,152,0.22)"
+
+Options = dict[str, Any]
+
+
+def _base() -> Options:
+    """Return what all charts share."""
+    return {
+        "animation": False,
+        "useUTC": True,
+        "textStyle": {"fontFamily": "inherit"},
+        "grid": {"left": 64, "right": 18, "top": 34, "bottom": 30},
+        "legend": {"top": 0, "left": 0, "itemWidth": 16, "itemHeight": 8, "icon": "roundRect",
+                   "textStyle": {"color": _GREY, "fontSize": 12}},
+    }  # fmt: skip
+
+
+def _axis(kind: str, name: str, **more: Any) -> Options:
+    """Return an axis of a kind of ECharts."""
+    return {
+        "type": kind,
+        "name": name,
+        "nameLocation": "middle",
+        "nameGap": 46,
+        "nameTextStyle": {"color": _GREY},
+        "scale": True,
+        "axisLabel": {"color": _GREY, "hideOverlap": True},
+        "axisLine": {"show": True, "lineStyle": {"color": _GREY}},
+        "splitLine": {"lineStyle": {"color": _SPLIT}, "show": kind == "value"},
+        **more,
+    }
+
+
+def _line(name: str, data: Sequence[Any], colour: str, **style: Any) -> Options:
+    """Return a line through points; `width` and `dashes` are its own, the rest the series'."""
+    width = style.pop("width", 1.5)
+    dashes = style.pop("dashes", "solid")
+    return {
+        "name": name,
+        "type": "line",
+        "data": list(data),
+        "showSymbol": False,
+        "silent": True,
+        "itemStyle": {"color": colour},
+        "lineStyle": {"color": colour, "width": width, "type": dashes},
+        **style,
+    }
+
+
+def _plain(value: float | None) -> float | None:
+    """Return a number as JSON can hold it, rounded."""
+    return None if value is None or not math.isfinite(value) else _rounded(value)
+
+
+def _rounded(value: float) -> float:
+    """Return a number with six digits, more than a screen shows."""
+    return float(f"{value:.6g}")
+
+
+def _points(strip: Strip, scale: float) -> list[list[float]]:
+    return [
+        [round(t, 3), _rounded(v * scale)]
+        for t, v in zip(strip.times.tolist(), strip.values.tolist(), strict=True)
+    ]
+
+
+def live_data(pressure: Strip, stem: Strip) -> list[Options]:
+    """Return the series of the live chart: pressure in kPa and stem in mm."""
+    return [{"data": _points(pressure, 1e-3)}, {"data": _points(stem, 1e3)}]
+
+
+def live_chart(span: float) -> Options:
+    """Return the empty chart of the last `span` seconds: the pressure over the stem."""
+    names = ("pressure [kPa]", "stem [mm]")
+    grids = [
+        {"left": 64, "right": 18, "top": 10, "height": "39%"},
+        {"left": 64, "right": 18, "top": "53%", "bottom": 28},
+    ]
+    x = {"min": -span, "max": 0, "scale": False}
+    upper = _axis("value", "", gridIndex=0, **x)
+    upper["axisLabel"] = {"show": False}
+    return {
+        **_base(),
+        "legend": {"show": False},
+        "grid": grids,
+        "xAxis": [upper, _axis("value", "", gridIndex=1, **x)],
+        "yAxis": [_axis("value", name, gridIndex=i) for i, name in enumerate(names)],
+        "series": [
+            {**_line(name, [], colour, width=1.2), "xAxisIndex": i, "yAxisIndex": i}
+            for i, (name, colour) in enumerate(zip(names, (_BLUE, _ORANGE), strict=True))
+        ],
+    }
+
+
+def loop_data(loop: Strip) -> list[list[float]]:
+    """Return the points of a signature, pressures (Pa) and positions (m), as kPa and mm."""
+    return [
+        [_rounded(p * 1e-3), _rounded(x * 1e3)]
+        for p, x in zip(loop.times.tolist(), loop.values.tolist(), strict=True)
+    ]
+
+
+def _recorded(record: Recording | None) -> list[list[float]]:
+    if record is None:
+        return []
+    step = max(1, len(record) // _MOST_POINTS)
+    return loop_data(Strip(record.drive[::step], record.position[::step]))
+
+
+def loop_chart(record: Recording | None) -> Options:
+    """Draw the signature of the baseline's record; that of now is filled in by `loop_data`."""
+    return {
+        **_base(),
+        "grid": {"left": 58, "right": 18, "top": 34, "bottom": 44},
+        "xAxis": _axis("value", "pressure [kPa]", nameGap=26),
+        "yAxis": _axis("value", "stem [mm]", nameGap=38),
+        "series": [
+            _line("baseline", _recorded(record), _GREY, width=1.4),
+            _line("last minute", [], _ORANGE, width=1.4),
+        ],
+    }
+
+
+_LIMITS = {"warn_ratio": "#E69F00", "error_ratio": "#D55E00", "low_ratio": "#CC79A7"}
+
+
+def _wall(stamp: int, zone: ZoneInfo) -> int:
+    """Return the wall clock of a zone, ms since 1970 as if it were UTC."""
+    offset = utc(stamp).astimezone(zone).utcoffset()
+    return stamp // 1_000_000 + (0 if offset is None else round(offset.total_seconds() * 1000))
+
+
+def trend_chart(
+    history: ValveHistory, zone: ZoneInfo, now: int, events: Sequence[AlarmEvent] = ()
+) -> Options:
+    """Draw friction over time with intervals, baseline, limits, trend and the crossing of a limit.
+
+    Of many estimates the latest are drawn. `now` is today, ns since 1970. Events of its alarms, and
+    comments, are marks at the bottom.
+    """
+    baseline = history.entries[-1].baseline
+    of = trended(baseline)
+    entries = history.entries[-_MOST_POINTS:]
+    series = _level_lines(history, of, zone)
+    if history.trend is not None and history.trend.is_significant:
+        series += _trend_lines(history.trend, zone)
+    estimates: dict[Verdict, list[list[Any]]] = {Verdict.IDENTIFIED: [], Verdict.WEAK: []}
+    bars: list[list[Any]] = []
+    for entry in entries:
+        point = entry.point(baseline)
+        if point is None or entry.parameters[of].verdict not in estimates:
+            continue
+        time = _wall(point.time, zone)
+        estimates[entry.parameters[of].verdict].append([time, _plain(point.value)])
+        ends = (point.value - point.half_width, point.value + point.half_width)
+        bars += [[time, _plain(ends[0])], [time, _plain(ends[1])], [time, None]]
+    series.append(_line("95 % interval", bars, _BLUE, width=1.2))
+    for verdict, points in estimates.items():
+        if points:
+            series.append(_dots(verdict.value, points, verdict is Verdict.WEAK))
+    refused = [[_wall(one.time, zone), 0] for one in entries if one.refusal]
+    if refused:
+        series.append(_refusals(refused))
+    series += _event_marks(events, zone)
+    series[0]["markLine"] = _marks(history, zone, now)
+    name = "sliding friction [N]" if of == "sliding_friction" else "Coulomb friction F_c [N]"
+    return {
+        **_base(),
+        "grid": {"left": 64, "right": 18, "top": 78, "bottom": 30},
+        "tooltip": {"trigger": "item", "renderMode": "richText"},
+        "dataZoom": [{"type": "inside", "filterMode": "none", "zoomOnMouseWheel": "ctrl"}],
+        "toolbox": {
+            "right": 8,
+            "top": 28,
+            "feature": {
+                "dataZoom": {"yAxisIndex": False, "filterMode": "none"},
+                "restore": {},
+            },
+        },
+        "xAxis": _axis("time", ""),
+        "yAxis": [
+            _axis("value", name),
+            {"type": "value", "min": 0, "max": 1, "show": False},
+        ],
+        "series": series,
+    }
+
+
+DRAG_TO_ZOOM: Options = {
+    "type": "takeGlobalCursor",
+    "key": "dataZoomSelect",
+    "dataZoomSelectActive": True,
+}
+"""The action after which a drag over a chart chooses what is shown."""
+
+
+def zoom(now: int, span: int | None, zone: ZoneInfo) -> Options:
+    """Return the action that shows a time before now, ns; None: all."""
+    if span is None:
+        return {"type": "dataZoom", "start": 0, "end": 100}
+    begin, end = _wall(now - span, zone), _wall(now, zone)
+    return {"type": "dataZoom", "startValue": begin, "endValue": end}
+
+
+_EVENTS = {
+    "alarm raised": ((AlarmAction.RAISE, AlarmAction.WORSEN), "triangle", _ORANGE),
+    "alarm cleared": ((AlarmAction.CLEAR,), "circle", _GREEN),
+    "acknowledged": ((AlarmAction.ACKNOWLEDGE,), "diamond", _BLUE),
+    "shelved, out of service": ((AlarmAction.SHELVE, AlarmAction.TAKE_OUT), "rect", _GREY),
+    "comment": ((AlarmAction.COMMENT,), "pin", _GREY),
+}
+
+
+def _event_marks(events: Sequence[AlarmEvent], zone: ZoneInfo) -> list[Options]:
+    drawn = []
+    for name, (actions, symbol, colour) in _EVENTS.items():
+        points = [[_wall(one.time, zone), 0.03] for one in events if one.action in actions]
+        if points:
+            drawn.append(
+                {"name": name, "type": "scatter", "yAxisIndex": 1, "symbol": symbol,
+                 "symbolSize": 10, "data": points, "itemStyle": {"color": colour}, "z": 6}
+            )  # fmt: skip
+    return drawn
+
+
+def _dots(name: str, points: list[list[Any]], is_hollow: bool) -> Options:
+    style = {
+        "color": "transparent" if is_hollow else _BLUE,
+        "borderColor": _BLUE,
+        "borderWidth": 1.5,
+    }
+    return {
+        "name": name,
+        "type": "scatter",
+        "data": points,
+        "symbolSize": 6,
+        "itemStyle": style,
+        "z": 4,
+    }
+
+
+def _refusals(points: list[list[Any]]) -> Options:
+    return {
+        "name": "refused",
+        "type": "scatter",
+        "yAxisIndex": 1,
+        "symbol": "rect",
+        "symbolSize": [2, 12],
+        "data": points,
+        "itemStyle": {"color": _GREY},
+    }
+
+
+def _level_lines(history: ValveHistory, of: str, zone: ZoneInfo) -> list[Options]:
+    """Draw baseline and limits as they were in force, without repetitions."""
+    steps: list[tuple[int, float | None, Any]] = []
+    for entry in history.entries:
+        step = (_wall(entry.time, zone), friction_of(entry.baseline, of), entry.limits)
+        if not steps or step[1:] != steps[-1][1:]:
+            steps.append(step)
+    last = history.entries[-1].time if history.trend is None else end_of_trend(history.trend)
+    steps.append((_wall(max(last, history.entries[-1].time), zone), *steps[-1][1:]))
+    drawn = [_line("baseline", [[t, _plain(v)] for t, v, _ in steps], _GREY, step="end", width=1.2)]
+    for name, colour in _LIMITS.items():
+        data = [
+            [t, None if v is None else _plain(v * getattr(limits, name))] for t, v, limits in steps
+        ]
+        drawn.append(_line(LIMIT_NAMES[name], data, colour, step="end", dashes="dashed", width=1.2))
+    return drawn
+
+
+def _trend_lines(trend: Trend, zone: ZoneInfo) -> list[Options]:
+    time = np.linspace(0.0, float(end_of_trend(trend) - trend.begin), 60)
+    middle_line, width = trend.line.at(time), trend.line.half_width(time)
+    at = [_wall(trend.begin + round(one), zone) for one in time]
+    low = [[t, _plain(y)] for t, y in zip(at, middle_line - width, strict=True)]
+    band = [[t, _plain(y)] for t, y in zip(at, 2 * width, strict=True)]
+    middle = [[t, _plain(y)] for t, y in zip(at, middle_line, strict=True)]
+    unseen = {"stack": "band", "stackStrategy": "all", "width": 0}
+    drawn = [
+        _line("", low, _GREEN, **unseen),
+        _line("95 % band", band, _GREEN, areaStyle={"color": _GREEN, "opacity": 0.18}, **unseen),
+        _line("trend", middle, _GREEN, width=2),
+    ]
+    if trend.crossing is not None:
+        point = [_wall(trend.crossing.time, zone), _plain(trend.crossing.level)]
+        drawn.append(
+            {"name": "limit expected", "type": "scatter", "symbol": "diamond", "symbolSize": 13,
+             "data": [point], "itemStyle": {"color": _GREEN}, "z": 5}
+        )  # fmt: skip
+    return drawn
+
+
+def _marks(history: ValveHistory, zone: ZoneInfo, now: int) -> Options:
+    label = {"show": True, "color": _GREY, "fontSize": 12, "position": "insideEndTop"}
+    marks = [("today", now, "solid")]
+    marks += [("baseline set", one.time, "dotted") for one in history.baselines[-3:]]
+    if renewed := history.usage.renewal:
+        marks.append(("packing renewed", renewed, "dashed"))
+    return {
+        "symbol": "none",
+        "silent": True,
+        "data": [
+            {"xAxis": _wall(time, zone), "name": name,
+             "label": {**label, "formatter": name},
+             "lineStyle": {"color": _GREY, "type": style}}
+            for name, time, style in marks
+        ],
+    }  # fmt: skip

@@ -1,0 +1,498 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The gate before all pages, files and WebSockets: own names, own origin, a session; bounded.
+
+uvicorn bounds no connections: its time limits begin after a response, and its limit of concurrency
+counts all clients together. So its protocol is given to it with both: a request must arrive in
+time, and one client may not take all connections.
+"""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+from nicegui import App, context, core, ui
+from starlette.datastructures import MutableHeaders
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from valve_friction_ros.dashboard.accounts import Access, Account, Role
+from valve_friction_ros.dashboard.log_in import AttemptLimit, LogIn, Refusal, Sessions, network_of
+from valve_friction_ros.outside_text import printable
+from valve_friction_ros.page_template import page_environment
+
+_BASE = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    # Not no-referrer, with which a form's own origin would be "null".
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=(), payment=(), usb=()",
+    "Cache-Control": "no-store",
+}
+_NO_FRAMES = "frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+
+OF_PAGES = {
+    **_BASE,
+    # NiceGUI's page has scripts and styles in its text and evaluates what the server sends, so
+    # both must be allowed; nothing is loaded from, or sent to, another host.
+    "Content-Security-Policy": "default-src 'self'; "
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; font-src 'self' data:; "
+    f"connect-src 'self'; object-src 'none'; {_NO_FRAMES}",
+}
+"""Of the pages and their files, where they have none of their own."""
+
+ENCRYPTED_ONLY = {"Strict-Transport-Security": "max-age=86400"}
+"""With a certificate: a browser that has been here comes by https alone for a day."""
+
+OF_LOG_IN = {
+    **_BASE,
+    "Content-Security-Policy": f"default-src 'none'; style-src 'unsafe-inline'; {_NO_FRAMES}",
+}
+"""Of the page of the log-in, which holds no script."""
+
+
+def host_of(header: str) -> str:
+    """Return the name or address in a header ``Host``; empty if there is none."""
+    try:
+        return urlsplit(f"//{header}").hostname or ""
+    except ValueError:
+        return ""
+
+
+def is_own_origin(origin: str | None, host: str, is_encrypted: bool = False) -> bool:
+    """Tell whether a request comes from a page of the host that is asked.
+
+    A browser says the origin of each WebSocket and each form; what says none is no browser. With a
+    certificate the page came by https; without one it may have too, from a proxy.
+    """
+    if origin is None:
+        return True
+    try:
+        asking = urlsplit(origin)
+        schemes = ("https",) if is_encrypted else ("http", "https")
+        is_here = bool(host) and asking.netloc.lower() == host.lower()
+        return is_here and asking.scheme in schemes
+    except ValueError:
+        return False
+
+
+def own_path(text: str) -> str:
+    """Return a path of this host, or ``/`` where the text may lead to another one."""
+    is_own = text.startswith("/") and not text.startswith("//")
+    return text if is_own and text.isprintable() and "\\" not in text else "/"
+
+
+ARRIVAL_TIME = 10.0
+"""Time for a request to arrive whole, s, from the connection or from its first byte."""
+
+MOST_OF_A_CLIENT = 256
+"""Open connections of one address. Chosen: a browser takes seven for a page and one to keep it, so
+30 may open pages at once behind one proxy; a process may open 1024 files, as a rule."""
+
+_SUMMARY = 60.0
+"""Time between two lines of the log on one client, s."""
+
+
+class ConnectionLog:
+    """Logs that connections were ended: the first at once, then a sum each minute.
+
+    Parameters
+    ----------
+    log : callable
+        Takes a line.
+    """
+
+    def __init__(self, log: Callable[[str], None]) -> None:
+        self._log = log
+        self._more: Counter[tuple[str, str]] | None = None
+
+    def note(self, client: str, why: str) -> None:
+        """Count that a connection of a client was ended."""
+        if self._more is not None:
+            self._more[client, why] += 1
+            return
+        self._log(f"a connection of {printable(client)} was ended: {why}")
+        self._begin()
+
+    def _begin(self) -> None:
+        self._more = Counter()
+        asyncio.get_running_loop().call_later(_SUMMARY, self._sum_up)
+
+    def _sum_up(self) -> None:
+        more, self._more = self._more, None
+        if not more:
+            return
+        (client, why), _ = max(more.items(), key=lambda one: one[1])
+        self._log(
+            f"{sum(more.values())} more connections were ended in {_SUMMARY:g} s, most of "
+            f"{printable(client)}: {why}"
+        )
+        self._begin()
+
+
+class _Bounded(HttpToolsProtocol):
+    """uvicorn's protocol of a connection, with a time for requests and a bound for each client."""
+
+    def __init__(self, *arguments: Any, ended: ConnectionLog, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        self._ended = ended
+        self._network = ""
+        self._due: asyncio.TimerHandle | None = None
+        self._has_begun = False
+
+    @property
+    def since(self) -> float:
+        """Time at which its request is overdue, s of the loop's clock; infinite without one."""
+        return float("inf") if self._due is None else self._due.when()
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a connection; beyond the bound one of its client's that waits longest is ended."""
+        super().connection_made(transport)
+        self._network = network_of(_host(self))
+        self._await_request()
+        own = [one for one in self.connections if network_of(_host(one)) == self._network]
+        if len(own) > MOST_OF_A_CLIENT:
+            waiting = [one for one in own if isinstance(one, _Bounded)]
+            oldest = min(waiting, key=lambda one: one.since)
+            oldest.end(f"more than {MOST_OF_A_CLIENT} were open")
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Give a connection up."""
+        self._has_arrived()
+        super().connection_lost(exc)
+
+    def end(self, why: str) -> None:
+        """End the connection at once, and note why."""
+        self._has_arrived()
+        self._ended.note(self._network, why)
+        self.connections.discard(self)
+        self.transport.abort()
+
+    def _await_request(self) -> None:
+        if self._due is None:
+            self._due = self.loop.call_later(ARRIVAL_TIME, self._overdue)
+
+    def _overdue(self) -> None:
+        if self._has_begun:
+            self.end(f"its request did not arrive within {ARRIVAL_TIME:g} s")
+        else:  # browsers open connections in advance
+            self.transport.abort()
+
+    def _has_arrived(self) -> None:
+        if self._due is not None:
+            self._due.cancel()
+            self._due = None
+
+    def on_message_begin(self) -> None:
+        """Begin a request."""
+        self._has_begun = True
+        self._await_request()
+        super().on_message_begin()
+
+    def on_message_complete(self) -> None:
+        """End a request."""
+        self._has_arrived()
+        super().on_message_complete()
+
+
+def _host(connection: object) -> str:
+    """Return the address of the other side, of a WebSocket's protocol as well."""
+    client = getattr(connection, "client", None)
+    return client[0] if client else ""
+
+
+def bounded_protocol(log: Callable[[str], None]) -> Callable[..., asyncio.Protocol]:
+    """Return what uvicorn takes as ``http``; `log` takes the lines on ended connections."""
+    return partial(_Bounded, ended=ConnectionLog(log))
+
+
+LOG_IN = "/login"
+"""Path of the log-in."""
+STATE = "/login/state"
+"""Path that answers 204 in a session and 401 out of it."""
+
+_LONGEST_FORM = 4096
+_LONGEST_NAME = 64
+_MOST_LINES = 60
+"""Refused log-ins that are logged in a minute."""
+_PATIENCE = 10.0
+"""Time for a form to arrive, s."""
+
+
+def _cookie(asked: HTTPConnection, access: Access) -> str:
+    """Return the cookie's name: by the port, since the cookies of a host know none."""
+    prefix = "__Host-" if access.is_encrypted else ""
+    return f"{prefix}valve_friction_{asked.scope['server'][1]}"
+
+
+def token_of(asked: HTTPConnection, access: Access) -> str | None:
+    """Return the token of a session that a request holds."""
+    return asked.cookies.get(_cookie(asked, access))
+
+
+class Gate:
+    """An ASGI application around another, which only who may see it reaches.
+
+    Parameters
+    ----------
+    app : ASGI application
+        The pages.
+    access : Access
+        Who may see them.
+    sessions : Sessions
+        Who has logged in.
+    log : callable
+        Takes a line for each log-in and each refused one, of these 60 a minute at most.
+    """
+
+    def __init__(
+        self, app: ASGIApp, access: Access, sessions: Sessions, log: Callable[[str], None]
+    ) -> None:
+        self._app, self._access, self._sessions, self._log = app, access, sessions, log
+        self._log_in = LogIn(access, sessions)
+        self._lines = AttemptLimit(_MOST_LINES, 60.0, time.monotonic)
+        self._page = page_environment("valve_friction_ros.dashboard").get_template("log_in.html")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, refuse it, or let it through."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        asked = HTTPConnection(scope)
+        if scope["type"] == "http":
+            send = _with_headers(send, ENCRYPTED_ONLY if self._access.is_encrypted else {})
+        response = self._refusal(asked)
+        if response is None and self._access.accounts:
+            response = await self._without_session(asked, receive)
+        if response is None:
+            await self._let_through(asked, receive, _with_headers(send, OF_PAGES))
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await response(scope, receive, send)
+
+    def _account(self, asked: HTTPConnection) -> Account | None:
+        return self._sessions.account_of(token_of(asked, self._access))
+
+    def _refusal(self, asked: HTTPConnection) -> Response | None:
+        """Refuse foreign names and foreign pages."""
+        host = asked.headers.get("host", "")
+        if not self._access.answers_to(host_of(host), asked.scope["server"][0]):
+            words = f"no such host here: {printable(host, 100)!r}; see host_names of the dashboard"
+            return PlainTextResponse(words, 400, OF_LOG_IN)
+        origin = asked.headers.get("origin")
+        if not is_own_origin(origin, host, self._access.is_encrypted):
+            return PlainTextResponse("refused: asked by another site", 403, OF_LOG_IN)
+        return None
+
+    async def _without_session(self, asked: HTTPConnection, receive: Receive) -> Response | None:
+        """Answer the log-in, and who has no session; None where there is one."""
+        path = asked.scope["path"]
+        if asked.scope["type"] == "http" and path == LOG_IN:
+            if asked.scope["method"] == "POST":
+                return await self._logged_in(Request(asked.scope, receive))
+            return self._form(own_path(asked.query_params.get("next", "/")))
+        if self._account(asked) is not None:
+            return Response(status_code=204, headers=OF_LOG_IN) if path == STATE else None
+        if path == STATE or "text/html" not in asked.headers.get("accept", ""):
+            return PlainTextResponse("log in first", 401, OF_LOG_IN)
+        query = asked.scope["query_string"].decode("latin-1")
+        there = own_path(path + (f"?{query}" if query else ""))
+        return RedirectResponse(f"{LOG_IN}?{urlencode({'next': there})}", 303, OF_LOG_IN)
+
+    def _form(self, there: str, trouble: str = "", status: int = 200) -> Response:
+        page = self._page.render(path=LOG_IN, next=there, trouble=trouble)
+        return HTMLResponse(page, status, OF_LOG_IN)
+
+    async def _logged_in(self, request: Request) -> Response:
+        """Compare a form with the accounts."""
+        try:
+            fields = await asyncio.wait_for(_fields(request), _PATIENCE)
+        except (asyncio.TimeoutError, ValueError):  # the builtin one only since Python 3.11
+            return PlainTextResponse("no form of a log-in", 400, OF_LOG_IN)
+        there = own_path(fields.get("next", "/"))
+        address = request.client.host if request.client else ""
+        name = fields.get("name", "")
+        found = await self._log_in.attempt(name, fields.get("password", ""), address)
+        if isinstance(found, Refusal):
+            self._tell_refused(name, address, found)
+            if found.wait > 0:
+                minutes = -(-found.wait // 60)
+                page = self._form(there, f"Too many attempts: try again in {minutes} min.", 429)
+                page.headers["Retry-After"] = str(found.wait)
+                return page
+            return self._form(there, "Wrong name or password.", 401)
+        self._log(f"{printable(name)} has logged in from {printable(address)}")
+        self._sessions.end(token_of(request, self._access))  # of whoever sat there before
+        response = RedirectResponse(there, 303, OF_LOG_IN)
+        response.set_cookie(
+            _cookie(request, self._access),
+            found,
+            max_age=round(self._access.session_hours * 3600),
+            secure=self._access.is_encrypted,
+            httponly=True,
+            samesite="lax",
+        )
+        return response
+
+    def _tell_refused(self, name: str, address: str, refusal: Refusal) -> None:
+        """Log a refused log-in, within a bound: whoever tries may try without end."""
+        if self._lines.wait("") > 0:
+            return
+        self._lines.count("")
+        why = "too many attempts" if refusal.wait > 0 else "wrong name or password"
+        shown = printable(name, _LONGEST_NAME)
+        self._log(f"refused log-in of {shown!r} from {printable(address)}: {why}")
+
+    async def _let_through(self, asked: HTTPConnection, receive: Receive, send: Send) -> None:
+        if asked.scope["type"] == "http":
+            await self._app(asked.scope, receive, send)
+            return
+
+        async def receive_in_session() -> Message:
+            """Close a WebSocket whose session has ended, at its next message (or pong)."""
+            message = await receive()
+            if self._access.accounts and self._account(asked) is None:
+                return {"type": "websocket.disconnect", "code": 1008}
+            return message
+
+        await self._app(asked.scope, receive_in_session, send)
+
+
+def _with_headers(send: Send, more: Mapping[str, str]) -> Send:
+    async def send_with_headers(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in more.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return send_with_headers
+
+
+async def _fields(request: Request) -> dict[str, str]:
+    """Return the fields of a form; raises ValueError if it is too long or none."""
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > _LONGEST_FORM:
+            raise ValueError
+    found = parse_qs(body.decode(), max_num_fields=10)
+    return {name: values[0] for name, values in found.items()}
+
+
+_WATCH = f"""<script>
+setInterval(async () => {{
+  const answer = await fetch("{STATE}", {{cache: "no-store"}}).catch(() => null);
+  if (answer && answer.status === 401) location.reload();
+}}, 15000);
+</script>"""
+"""Leads to the log-in when the session has ended: NiceGUI's page would reconnect for ever."""
+
+
+class Guard:
+    """Says who asks, in a page and in its handlers.
+
+    Parameters
+    ----------
+    access : Access
+        Who may see and operate.
+    sessions : Sessions
+        Who has logged in.
+    """
+
+    def __init__(self, access: Access, sessions: Sessions) -> None:
+        self._access, self._sessions = access, sessions
+
+    def _token(self) -> str | None:
+        return token_of(context.client.request, self._access)
+
+    def visitor(self) -> Account | None:
+        """Return the account whose page this is; None where its session has ended.
+
+        To be asked in a page's own code: while it is drawn, or in a handler of one of its events.
+        """
+        try:
+            return self._sessions.account_of(self._token())
+        except RuntimeError:  # NiceGUI's, where there is no page
+            return None
+
+    def name(self) -> str:
+        """Return the name of the account whose page this is; empty where there is none."""
+        visitor = self.visitor()
+        return "" if visitor is None else visitor.name
+
+    def may_operate(self) -> bool:
+        """Tell whether services of identifiers may be called for this page now."""
+        if not self._access.accounts:
+            return True
+        visitor = self.visitor()
+        return visitor is not None and visitor.role is Role.OPERATE
+
+    def log_out(self) -> None:
+        """End the session of this page, and of all others that have the same."""
+        self._sessions.end(self._token())
+        ui.navigate.to(LOG_IN)
+
+
+def guard(app: App, access: Access, log: Callable[[str], None]) -> Guard:
+    """Put the gate before an application; to be called once, before it runs.
+
+    `log` takes a line for each log-in and each wrong one.
+
+    Raises
+    ------
+    ValueError, OSError
+        If the file of sessions cannot be used.
+    """
+    sessions = Sessions(
+        access.accounts, access.session_hours * 3600.0, time.time, access.session_file, log
+    )
+    build = app.build_middleware_stack
+
+    def build_behind_gate() -> Any:
+        """Build the stack with the gate outside all of it, also of what is added later."""
+        return Gate(build(), access, sessions, log)
+
+    app.build_middleware_stack = build_behind_gate  # type: ignore[method-assign]
+    core.sio.eio.cors_allowed_origins = partial(_is_own, is_encrypted=access.is_encrypted)
+    if access.accounts:
+        ui.add_head_html(_WATCH, shared=True)
+    return Guard(access, sessions)
+
+
+def _is_own(origin: str | None, request: dict[str, Any], is_encrypted: bool) -> bool:
+    return is_own_origin(origin, request.get("HTTP_HOST", ""), is_encrypted)
+
+
+def server_options(access: Access, log: Callable[[str], None]) -> dict[str, Any]:
+    """Return what `ui.run` needs to know of the access.
+
+    `log` takes the lines on connections that were ended.
+    """
+    options: dict[str, Any] = {
+        "host": access.host,
+        # Else a header of the request would say its address, by which attempts are counted.
+        "proxy_headers": False,
+        "server_header": False,
+        "http": bounded_protocol(log),
+    }
+    if access.certificate is not None and access.key is not None:
+        options |= {"ssl_certfile": str(access.certificate), "ssl_keyfile": str(access.key)}
+    return options

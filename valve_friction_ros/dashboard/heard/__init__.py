@@ -1,1 +1,0 @@
-"""The valves and their signals as they were heard."""

@@ -1,0 +1,253 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The history as the pages read it: in a thread, and again only when the file has changed."""
+
+import math
+import threading
+import time
+from collections import OrderedDict, defaultdict, deque
+from collections.abc import Sequence
+from statistics import fmean, median
+from typing import TYPE_CHECKING, NamedTuple
+
+from valve_friction_ros import history as database
+from valve_friction_ros.health import AlarmKind, AlarmRequest
+from valve_friction_ros.history import (
+    AlarmFilter,
+    HistoryError,
+    HistoryServer,
+    KeptAlarmEvent,
+    KeptValve,
+    Place,
+    ValveHistory,
+)
+from valve_friction_ros.history.place import file_state
+from valve_friction_ros.streams import DAY
+
+if TYPE_CHECKING:
+    from valve_friction_ros.history import HistoryMark, KeptRatio
+
+
+_SPARK_POINTS = 40
+_TOP, _BOTTOM = 2.0, 22.0
+
+
+class Sparkline(NamedTuple):
+    """Paths of an SVG: the ratios over time, and a line at 1; and the days that they span."""
+
+    path: str
+    base: str
+    days: int
+
+
+def sparkline(times: Sequence[int], ratios: Sequence[float]) -> Sparkline | None:
+    """Draw ratios over their times, ns; None for fewer than two of them.
+
+    The height is logarithmic and spans a factor of 1.6 at least, so that noise looks small. Many
+    points are combined to `_SPARK_POINTS` by the median.
+    """
+    found = sorted((t, math.log(r)) for t, r in zip(times, ratios, strict=True) if 0 < r < math.inf)
+    if len(found) < 2:
+        return None
+    begin = found[0][0]
+    span = found[-1][0] - begin or 1
+    places: defaultdict[int, list[tuple[int, float]]] = defaultdict(list)
+    for stamp, height in found:
+        place = min((stamp - begin) * _SPARK_POINTS // span, _SPARK_POINTS - 1)
+        places[place].append((stamp, height))
+    points = [
+        (fmean(t for t, _ in some) - begin, median(y for _, y in some)) for some in places.values()
+    ]
+    low = min(0.0, *(y for _, y in points))
+    high = max(0.0, *(y for _, y in points))
+    spare = max(0.0, math.log(1.6) - (high - low)) / 2
+    low, high = low - spare, high + spare
+
+    def at(y: float) -> float:
+        return round(_BOTTOM - (y - low) / (high - low) * (_BOTTOM - _TOP), 1)
+
+    steps = [f"{100 * t / span:.1f} {at(y)}" for t, y in points]
+    return Sparkline(f"M{'L'.join(steps)}", f"M0 {at(0.0)}L100 {at(0.0)}", round(span / DAY))
+
+
+_SPARK_DAYS = 400
+_MOST_RATIOS = 800
+"""Ratios of a valve that its sparkline is drawn from."""
+_READ_DEPTH = 1100 * DAY
+"""Time, ns, of a valve's history that is read at most."""
+_MOST_CACHED = 8
+"""Valves whose histories are kept in memory."""
+_SERVER_PAUSE = 2.0
+"""Time, s, between two questions to a server."""
+
+
+class HistoryCache:
+    """What the history file says of all valves and of each.
+
+    `refresh` and `valve` read the file, so they are called in a thread of their own; all else
+    returns at once. What cannot be read is a `problem`, and what was read before stays. A server
+    may keep one waiting: `refresh` asks it in another thread, and does not wait.
+
+    Parameters
+    ----------
+    place : Path or HistoryServer or None
+        The history; None: there is none.
+    """
+
+    def __init__(self, place: Place | None) -> None:
+        self._file = None if place is None else database.History(place)
+        self._asking: threading.Thread | None = None
+        self._asked = -_SERVER_PAUSE
+        self._rows: set[int] = set()
+        self._lock = threading.Lock()
+        self._seen: tuple[object, ...] = ()
+        self._mark: HistoryMark | None = None
+        self._row = 0
+        self._number = 0
+        self._ratios: defaultdict[str, deque[KeptRatio]] = defaultdict(
+            lambda: deque(maxlen=_MOST_RATIOS)
+        )
+        self._sparks: dict[str, Sparkline | None] = {}
+        self._histories: OrderedDict[str, ValveHistory | None] = OrderedDict()
+        self.valves: tuple[KeptValve, ...] = ()
+        self.problem: str | None = None if place else "no history_file is named: nothing is kept"
+        self.revision = 0
+        self.alarm_revision = 0
+
+    def _state(self) -> tuple[object, ...]:
+        """Return what changes when the file does, its journal included."""
+        if self._file is None:
+            return ()
+        path = self._file.place
+        if isinstance(path, HistoryServer):
+            return (time.monotonic(),)
+        return file_state(path)
+
+    def refresh(self) -> bool:
+        """Read what is new, if the file has changed; return whether it has.
+
+        A server is asked, and what it answers is there later.
+        """
+        if self._file is None or not isinstance(self._file.place, HistoryServer):
+            return self._refresh()
+        is_asking = self._asking is not None and self._asking.is_alive()
+        if not is_asking and time.monotonic() - self._asked >= _SERVER_PAUSE:
+            self._asked = time.monotonic()
+            self._asking = threading.Thread(target=self._refresh, name="history", daemon=True)
+            self._asking.start()
+        return False
+
+    def _refresh(self) -> bool:
+        with self._lock:
+            state = self._state()
+            if self._file is None or state == self._seen:
+                return False
+            since = time.time_ns() - _SPARK_DAYS * DAY
+            self._seen = state
+            self._begin_anew_for_another_file()
+            try:
+                mark = database.history_mark(self._file)
+                if self._mark is None or mark.alarm_event != self._mark.alarm_event:
+                    self.alarm_revision += 1
+                if self._mark is not None and mark.database != self._mark.database:
+                    self._begin_anew()
+                if mark == self._mark and mark.settled and self.problem is None:
+                    return False
+                valves = self._file.valves()
+                found = database.ratios_after(self._file, self._row, since)
+            except HistoryError as error:
+                is_new, self.problem = str(error) != self.problem, str(error)
+                self.revision += is_new
+                return is_new
+            self.problem, self._mark = None, mark
+            found = tuple(one for one in found if one.row not in self._rows)
+            for one in found:
+                self._ratios[one.valve].append(one)
+            self._rows.update(one.row for one in found)
+            if mark.settled:  # no row comes any more before the last one
+                self._row = max(self._row, mark.identification)
+                self._rows = {row for row in self._rows if row > self._row}
+            for valve in {one.valve for one in found}:
+                ratios = list(self._ratios[valve])
+                self._sparks[valve] = sparkline([r.time for r in ratios], [r.ratio for r in ratios])
+            self._histories.clear()
+            self.valves = valves  # last, as others look meanwhile: all else is there with them
+            self.revision += 1
+            return True
+
+    def _begin_anew_for_another_file(self) -> None:
+        """Forget what was read where another file stands at the path: its rows count from 1."""
+        if self._file is None or isinstance(self._file.place, HistoryServer):
+            return
+        number = file_state(self._file.place)[0].number
+        if number and self._number and number != self._number:
+            self._begin_anew()
+        self._number = number or self._number
+
+    def _begin_anew(self) -> None:
+        self._mark, self._row = None, 0
+        self._rows.clear()
+        self._ratios.clear()
+        self._sparks.clear()
+
+    def alarms(
+        self, chosen: AlarmFilter, is_journal: bool, most: int = 100_000
+    ) -> tuple[KeptAlarmEvent, ...]:
+        """Read events of alarms, or the last one of each alarm that stands, the newest first.
+
+        Raises HistoryError if the history cannot be read.
+        """
+        if self._file is None:
+            return ()
+        if is_journal:
+            return database.alarm_events(self._file, chosen, most)
+        return database.standing_alarms(self._file, chosen, most)
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it is a file, which identifiers of this machine follow."""
+        return self._file is not None and not isinstance(self._file.place, HistoryServer)
+
+    def answer(self, alarms: Sequence[tuple[KeptValve, AlarmKind]], request: AlarmRequest) -> int:
+        """Make a request on many alarms in the file; return of how many it was kept.
+
+        Raises HistoryError if there is none, or it cannot be written.
+        """
+        if self._file is None or isinstance(self._file.place, HistoryServer):
+            raise HistoryError("the history is no file of this machine: ask each identifier")
+        file = database.HistoryFile(self._file.place)
+        return database.request_many(file, alarms, request, time.time_ns())
+
+    def spark(self, node: str) -> Sparkline | None:
+        """Return the picture of a valve's ratios, if there are some."""
+        return self._sparks.get(node)
+
+    def valve(self, node: str) -> ValveHistory | None:
+        """Read the history of a valve; None if nothing is kept of it.
+
+        Raises HistoryError if the file cannot be read.
+        """
+        if self._file is None:
+            return None
+        with self._lock:
+            if node not in self._histories:
+                kept = next((one for one in self.valves if one.name == node), None)
+                now = time.time_ns()
+                found = (
+                    ()
+                    if kept is None
+                    else database.valve_histories(
+                        self._file, (kept,), now - _READ_DEPTH, now + _READ_DEPTH
+                    )
+                )
+                self._histories[node] = found[0] if found else None
+                while len(self._histories) > _MOST_CACHED:
+                    self._histories.popitem(last=False)
+            return self._histories[node]

@@ -1,0 +1,711 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The live state of a plant's valves: what their statuses say, as the pages show it."""
+
+import itertools
+import math
+import re
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import NamedTuple
+
+from valve_friction_ros.health import (
+    AlarmState,
+    BaselineLack,
+    Lack,
+    Level,
+    Ratio,
+    StatusSignal,
+)
+from valve_friction_ros.outside_text import printable
+from valve_friction_ros.settings import ALARM_KINDS
+from valve_friction_ros.wording import alarm_advice
+
+_KEY = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\]]*)\])?")
+_LONGEST_TEXT = 400
+
+
+class Entry(NamedTuple):
+    """One value as text: its name in words, the value, and its unit where it has one."""
+
+    name: str
+    text: str
+    unit: str
+
+
+class Quantity(NamedTuple):
+    """A number with its interval.
+
+    Attributes
+    ----------
+    name : str
+        What it is, as in the keys.
+    value, half_width : float
+        The number, and half the width of its 95 % interval, in `unit`; nan where unknown.
+    unit : str
+        Its unit; empty for a pure number.
+    verdict, reason : str
+        Whether the record determines it, and why not; empty where nothing is said.
+    """
+
+    name: str
+    value: float
+    half_width: float = math.nan
+    unit: str = ""
+    verdict: str = ""
+    reason: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a value."""
+        return math.isfinite(self.value)
+
+    @property
+    def if_determined(self) -> "Quantity":
+        """The same, without value and width where the record does not determine it."""
+        if self.verdict != "not identifiable":
+            return self
+        return self._replace(value=math.nan, half_width=math.nan)
+
+
+def number(text: str | None) -> float:
+    """Read a number; nan for a text that is none."""
+    try:
+        return math.nan if text is None else float(text)
+    except ValueError:
+        return math.nan
+
+
+def quantity(values: Mapping[str, str], name: str, unit: str) -> Quantity:
+    """Return the number of this name and unit with what else is said of it."""
+    bracket = f" [{unit}]" if unit else ""
+    return Quantity(
+        name,
+        number(values.get(name + bracket)),
+        number(values.get(f"{name} half width{bracket}")),
+        unit,
+        printable(values.get(f"{name} verdict", ""), _LONGEST_TEXT),
+        printable(values.get(f"{name} reason", ""), _LONGEST_TEXT),
+    )
+
+
+def entries_of(values: Mapping[str, str], keys: Iterable[str]) -> tuple[Entry, ...]:
+    """Return some values as entries, with numbers of four digits."""
+    return tuple(_entry(key, values[key]) for key in keys if values[key])
+
+
+def _entry(key: str, text: str) -> Entry:
+    match = _KEY.fullmatch(key)
+    name, unit = (match["name"], match["unit"] or "") if match else (key, "")
+    value = number(text)
+    shown = (
+        printable(text, _LONGEST_TEXT) if math.isnan(value) and text != "nan" else _rounded(value)
+    )
+    unit = "" if unit in ("date", "time", "1") else unit
+    return Entry(printable(name.replace("_", " "), _LONGEST_TEXT), shown, printable(unit, 40))
+
+
+def _rounded(value: float) -> str:
+    if math.isnan(value):
+        return "–"
+    if abs(value) < 1e9 and value == round(value):
+        return f"{value:.0f}"
+    return f"{value:.4g}"
+
+
+_CHANGE = " change"
+_USAGE = (
+    "packing_renewed",
+    "travelled_distance",
+    "reversals",
+    "breakaways",
+    "time_watched",
+    "time_near_seat",
+    "counting_dead_band",
+    "usage",
+)
+_COMMAND = (
+    "command ",
+    "moves",
+    "changes left",
+    "largest ",
+    "smallest ",
+    "moved by ",
+    "stem_command",
+)
+_NORMAL = AlarmState.NORMAL.value
+_ALARMS = tuple(f"alarm {kind}" for kind in ALARM_KINDS)
+_SHOWN = (*_ALARMS, "NE 107", "survey", "estimate_", "reason", "friction_ratio", "friction_drift",
+          "limit_expected", "baseline", "dead_band", "travel_histogram", "preparing")  # fmt: skip
+_FIT = ("fit", "rms", "systematic", "method", "derivative", "threshold", "samples", "sigma",
+        "r_squared", "fixed", "warnings", "sliding_speed")  # fmt: skip
+
+
+def groups_of(values: Mapping[str, str], parameters: set[str]) -> dict[str, tuple[Entry, ...]]:
+    """Return the values that no other part of a page shows, by what they are about.
+
+    The groups are ``changes``, ``fit``, ``evidence``, ``usage``, ``command`` and ``counters``;
+    `parameters` are the names of the parameters.
+    """
+    keys: dict[str, list[str]] = {
+        name: [] for name in ("changes", "fit", "evidence", "usage", "command", "counters")
+    }
+    for key in values:
+        if place := _group(key, parameters):
+            keys[place].append(key)
+    found = {name: entries_of(values, some) for name, some in keys.items()}
+    bare = (one._replace(name=one.name.removeprefix("evidence ")) for one in found["evidence"])
+    return {**found, "evidence": tuple(bare), "changes": _with_intervals(found["changes"])}
+
+
+def _with_intervals(changes: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    """Write each change since the baseline with its interval, in one entry."""
+    texts = {one.name: one.text for one in changes}
+    return tuple(
+        Entry(
+            one.name.removesuffix(_CHANGE),
+            f"{one.text} ({texts[f'{one.name} low']} to {texts[f'{one.name} high']})"
+            if {f"{one.name} low", f"{one.name} high"} <= texts.keys()
+            else one.text,
+            one.unit,
+        )
+        for one in changes
+        if not one.name.endswith((" low", " high"))
+    )
+
+
+def _group(key: str, parameters: set[str]) -> str:
+    """Return the group of a key; empty for one that is shown by itself."""
+    if f"{_CHANGE} " in key and not key.startswith("evidence "):
+        return "changes"
+    if key.startswith(_SHOWN) or any(key.startswith(name) for name in parameters):
+        return ""
+    for group, starts in (
+        ("evidence", ("evidence ",)),
+        ("usage", _USAGE),
+        ("command", _COMMAND),
+        ("counters", ("samples_",)),
+        ("fit", _FIT),
+    ):
+        if key.startswith(starts):
+            return group
+    return "counters"
+
+
+_NO_DEAD_BAND = Quantity("dead_band", math.nan, unit="%")
+
+
+class Status(NamedTuple):
+    """A diagnostic status as it was heard: the fields of diagnostic_msgs/DiagnosticStatus."""
+
+    name: str
+    level: int
+    hardware_id: str
+    message: str
+    values: Mapping[str, str]
+
+
+class Unread(NamedTuple):
+    """A status that is read when somebody looks.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    read : callable
+        Returns the status; raises ValueError if it is none.
+    mark : callable or None
+        Returns what is the same as long as nothing but ages and counters changes; raises ValueError
+        if the bytes are no status. None: it has to be read.
+    """
+
+    name: str
+    read: Callable[[], Status]
+    mark: Callable[[], object] | None = None
+
+
+class Expected(NamedTuple):
+    """The limit that a drift is expected to cross, and the dates of that (ISO 8601)."""
+
+    limit: str
+    date: str
+    earliest: str
+    latest: str
+
+
+class Sources(NamedTuple):
+    """Where the samples of a valve come from; empty names where that is unknown."""
+
+    pressure_topic: str = ""
+    stem_topic: str = ""
+    joint: str = ""
+
+
+class Drift(NamedTuple):
+    """Drift of the friction, N a month, half its interval's width, and the limit ahead, if any."""
+
+    value: float
+    half_width: float
+    of: str
+    expected: Expected | None
+
+
+class ValveAlarm(NamedTuple):
+    """An alarm of a valve that is not normal, as its identifier says.
+
+    Attributes
+    ----------
+    kind, state : str
+        Name of the alarm, and its state in words.
+    level : str
+        ``OK``, ``WARN`` or ``ERROR``: what the valve shows of it.
+    message : str
+        The sentence of its condition.
+    until : str
+        End of shelving, or of the time out of service; empty: neither.
+    """
+
+    kind: str
+    state: str
+    level: str = "OK"
+    message: str = ""
+    until: str = ""
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the valve shows it, and nobody has shelved it."""
+        return self.level != "OK" and not self.until
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return alarm_advice(self.kind, self.level)
+
+
+_NO_SOURCES = Sources()
+
+
+@dataclass(frozen=True)
+class ValveView:
+    """What a dashboard shows of one valve.
+
+    Attributes
+    ----------
+    node : str
+        The fully qualified name of its identifier, which tells valves apart.
+    tag : str
+        Its tag in the plant.
+    level : Level or None
+        Severity; None where nothing is known.
+    signal : StatusSignal
+        The severity by NAMUR NE 107.
+    sentence : str
+        The diagnosis in words.
+    is_valid, reason : bool, str
+        Whether there is an estimate, and why not.
+    identified : int or None
+        When the estimate was made, ns since 1970 (UTC).
+    ratio : Ratio or None
+        Friction over that of the baseline.
+    dead_band : Quantity
+        Dead band of the stem, % of the travel.
+    parameters : tuple of Quantity
+        The identified parameters.
+    baseline : tuple of Quantity
+        Frictions of the baseline; empty without one.
+    drift : Drift or None
+        A significant drift.
+    sources : Sources
+        Topics of its samples.
+    alarms : tuple of ValveAlarm
+        Its alarms that are not normal.
+    lacks : tuple of BaselineLack
+        Conditions of a baseline that are not met now.
+    survey : str
+        What a first survey says of it: good, watch or bad; empty: nothing.
+    values : mapping of str to str
+        All values, as they were heard.
+    """
+
+    node: str
+    tag: str
+    level: Level | None = None
+    signal: StatusSignal = StatusSignal.GOOD
+    sentence: str = ""
+    is_valid: bool = False
+    reason: str = ""
+    identified: int | None = None
+    ratio: Ratio | None = None
+    dead_band: Quantity = _NO_DEAD_BAND
+    parameters: tuple[Quantity, ...] = ()
+    baseline: tuple[Quantity, ...] = ()
+    drift: Drift | None = None
+    sources: Sources = _NO_SOURCES
+    alarms: tuple[ValveAlarm, ...] = ()
+    lacks: tuple[BaselineLack, ...] = ()
+    survey: str = ""
+    values: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def namespace(self) -> str:
+        """The namespace of the valve."""
+        return self.node.rpartition("/")[0] or "/"
+
+    def groups(self) -> dict[str, tuple[Entry, ...]]:
+        """Return the values that have no place of their own, by what they are about.
+
+        The groups are ``changes``, ``fit``, ``evidence``, ``usage``, ``command`` and
+        ``counters``.
+        """
+        return groups_of(self.values, {one.name for one in self.parameters})
+
+    def parameter(self, name: str) -> Quantity:
+        """Return a parameter, without a value where it is not there."""
+        found = (one for one in self.parameters if one.name == name)
+        return next(found, Quantity(name, math.nan))
+
+    @property
+    def advice(self) -> str:
+        """What to do about the most severe alarm that is told; empty without any."""
+        told = [one for one in self.alarms if one.is_told]
+        return max(told, key=lambda one: one.level == "ERROR").advice if told else ""
+
+    @property
+    def friction(self) -> Quantity:
+        """The Coulomb friction; the sliding friction where the record determines that alone."""
+        coulomb = self.parameter("coulomb_friction").if_determined
+        sliding = self.parameter("sliding_friction").if_determined
+        return sliding if sliding.is_known and not coulomb.is_known else coulomb
+
+
+_LACKING = ("coulomb_friction", "sliding_friction", "moves", "result", "valve")
+_SOURCES = ("pressure_topic", "stem_topic", "stem_joint")
+_SUFFIX = ": friction"
+_LONGEST_SENTENCE = 2000
+
+
+def identifier_in(name: str) -> str | None:
+    """Return the identifier that a status of this name is of; None for another one's status."""
+    node = name.removesuffix(_SUFFIX)
+    return node if node != name and node.startswith("/") and len(node) < 256 else None
+
+
+ESSENTIAL_KEYS = (
+    "NE 107",
+    "estimate_valid",
+    "estimate_time",
+    "reason",
+    "friction_ratio",
+    "friction_ratio low",
+    "friction_ratio high",
+    "survey",
+    "dead_band [%]",
+    "dead_band half width [%]",
+    "friction_drift [N/month]",
+    "friction_drift half width [N/month]",
+    "limit_expected",
+    "limit_expected [date]",
+    "limit_expected earliest [date]",
+    "limit_expected latest [date]",
+    "baseline_coulomb_friction [N]",
+    "baseline half width [N]",
+    "baseline_sliding_friction [N]",
+    "baseline_possible",
+    *(f"baseline_lacks {one}" for one in _LACKING),
+    *_SOURCES,
+    *(f"alarm {kind}{end}" for kind in ALARM_KINDS for end in ("", " level", " until [time]")),
+)
+"""Keys of what tells two views of a valve apart, without their counters and ages."""
+
+Essence = tuple[object, ...]
+"""What tells two views of a valve apart, without their counters and ages."""
+
+
+def essence_of(status: Status) -> Essence:
+    """Return what a view is made from: the parameters are those of the estimate's time."""
+    return (
+        status.level,
+        status.hardware_id,
+        status.message,
+        *map(status.values.get, ESSENTIAL_KEYS),
+    )
+
+
+def view_of(node: str, status: Status) -> ValveView:
+    """Read the status of an identifier; what is wrong in it is left out."""
+    values = status.values
+    return ValveView(
+        node=node,
+        tag=printable(status.hardware_id or node.rpartition("/")[0].strip("/") or node, 80),
+        level=Level(status.level) if status.level in Level._value2member_map_ else None,
+        signal=_signal(values.get("NE 107", "")),
+        sentence=printable(status.message, _LONGEST_SENTENCE),
+        is_valid=values.get("estimate_valid") == "true",
+        reason=printable(values.get("reason", ""), _LONGEST_SENTENCE),
+        identified=_stamp(values.get("estimate_time", "")),
+        ratio=_ratio(values),
+        dead_band=quantity(values, "dead_band", "%"),
+        parameters=_parameters(values),
+        baseline=_baseline(values),
+        drift=_drift(values),
+        sources=Sources(*(values.get(key, "") for key in _SOURCES)),
+        alarms=_alarms(values),
+        lacks=_lacks(values),
+        survey=printable(values.get("survey", ""), 20),
+        values=values,
+    )
+
+
+def _alarms(values: Mapping[str, str]) -> tuple[ValveAlarm, ...]:
+    found = []
+    for kind in ALARM_KINDS:
+        state = values.get(f"alarm {kind}", _NORMAL)
+        if state != _NORMAL:
+            level, until = (
+                values.get(f"alarm {kind} {one}", "") for one in ("level", "until [time]")
+            )
+            message = printable(values.get(f"alarm {kind} message", ""), _LONGEST_SENTENCE)
+            found.append(
+                ValveAlarm(kind, printable(state, 40), printable(level, 10), message,
+                           printable(until, 40))
+            )  # fmt: skip
+    return tuple(found)
+
+
+def _lacks(values: Mapping[str, str]) -> tuple[BaselineLack, ...]:
+    """Read what is missing to a baseline; an identifier of before lacks a result at most."""
+    if "baseline_possible" not in values:
+        names = ("coulomb_friction [N]", "sliding_friction [N]")
+        is_known = any(math.isfinite(number(values.get(name))) for name in names)
+        return () if is_known else (BaselineLack("result", Lack.RESULT),)
+    return tuple(
+        BaselineLack(
+            of,
+            Lack[name],
+            number(values.get(f"baseline_lacks {of} share [%]")) / 100,
+            number(values.get(f"baseline_lacks {of} largest [%]")) / 100,
+        )
+        for of in _LACKING
+        if (name := values.get(f"baseline_lacks {of}", "")) in Lack.__members__
+    )
+
+
+def _signal(letter: str) -> StatusSignal:
+    try:
+        return StatusSignal(letter)
+    except ValueError:
+        return StatusSignal.CHECK_FUNCTION
+
+
+def _stamp(text: str) -> int | None:
+    try:
+        moment = datetime.strptime(text, "%Y-%m-%dT%H:%M:%S.%f%z")
+    except ValueError:
+        return None
+    return round(moment.timestamp() * 1e3) * 1_000_000
+
+
+def _ratio(values: Mapping[str, str]) -> Ratio | None:
+    value, low, high = (number(values.get(f"friction_ratio{end}")) for end in ("", " low", " high"))
+    if not math.isfinite(value):
+        return None
+    of = printable(values.get("friction_ratio of", ""), 80)
+    return Ratio.between(value, low, high, of=of)
+
+
+def _parameters(values: Mapping[str, str]) -> tuple[Quantity, ...]:
+    units = {}
+    for key in values:
+        name, bracket, unit = key.partition(" half width [")
+        if bracket and f"{name} verdict" in values and not name.startswith("evidence "):
+            units[name] = unit.rstrip("]")
+    return tuple(quantity(values, name, unit) for name, unit in units.items())
+
+
+def _baseline(values: Mapping[str, str]) -> tuple[Quantity, ...]:
+    coulomb = Quantity(
+        "coulomb_friction",
+        number(values.get("baseline_coulomb_friction [N]")),
+        number(values.get("baseline half width [N]")),
+        "N",
+    )
+    sliding = quantity(values, "baseline_sliding_friction", "N")._replace(name="sliding_friction")
+    return tuple(one for one in (coulomb, sliding) if one.is_known)
+
+
+def _drift(values: Mapping[str, str]) -> Drift | None:
+    value = number(values.get("friction_drift [N/month]"))
+    if not math.isfinite(value):
+        return None
+    expected = None
+    if limit := values.get("limit_expected"):
+        dates = (f"limit_expected{end} [date]" for end in ("", " earliest", " latest"))
+        texts = (printable(values.get(one, ""), 40) for one in dates)
+        expected = Expected(printable(limit, 40), *texts)
+    width = number(values.get("friction_drift half width [N/month]"))
+    return Drift(value, width, printable(values.get("friction_drift of", ""), 80), expected)
+
+
+MOST_VALVES = 5000
+"""Most valves that are kept: the names come from outside, and might never end."""
+
+_FORGETTING = 3600.0
+"""Silence, s, after which a valve is forgotten that the history does not keep."""
+_TIDYING = 60.0
+"""Time between two looks for valves to forget, s."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A valve, and how long ago it was heard.
+
+    Attributes
+    ----------
+    number : int
+        Number of the valve in this run of the dashboard.
+    view : ValveView
+        What is known of it.
+    silent_for : float or None
+        Time since its last message, s; None where it has never been heard.
+    is_silent : bool
+        Whether that is too long.
+    revision : int
+        Grows with each change of what a table shows of the valve.
+    """
+
+    number: int
+    view: ValveView
+    silent_for: float | None
+    is_silent: bool
+    revision: int = 0
+
+
+class _Valve:
+    """The newest status of a valve; its view is made when somebody looks."""
+
+    def __init__(self, number: int, view: ValveView) -> None:
+        self.number = number
+        self.at: float | None = None
+        self.latest: Unread | None = None
+        self.revision = 0
+        self.is_kept = False
+        self.view = view
+        self._mark: object = None
+        self._essence: Essence = ()
+        self._read: Unread | None = None
+
+    def look(self, node: str, with_values: bool) -> None:
+        """Read what came last; without its values where nothing else can have changed.
+
+        What is no status changes nothing.
+        """
+        latest = self.latest
+        if latest is None or latest is self._read:
+            return
+        try:
+            mark = None if latest.mark is None else latest.mark()
+            if mark is not None and mark == self._mark and not with_values:
+                return
+            status = latest.read()
+        except ValueError:
+            self.latest = None
+            return
+        self._mark = mark
+        essence = essence_of(status)
+        if essence != self._essence:
+            self.view, self._essence = view_of(node, status), essence
+            self.revision += 1
+        self._read = latest if with_values else None
+        self.view = replace(self.view, values=status.values if with_values else {})
+
+
+class Plant:
+    """What is known of each valve, behind a lock: any thread may write and read.
+
+    A page never draws in a callback of ROS: it takes `valves` in a timer of its own.
+
+    Parameters
+    ----------
+    silence : float
+        Time without a message, s, after which a valve counts as silent.
+    """
+
+    def __init__(self, silence: float) -> None:
+        self._silence = silence
+        self._lock = threading.Lock()
+        self._valves: dict[str, _Valve] = {}
+        self._numbers = itertools.count()
+        self._tidied = -math.inf
+
+    def hear(self, status: Unread, at: float) -> None:
+        """Take a status that came at a time, s of the monotonic clock.
+
+        It is read when somebody looks. That of another node than an identifier is ignored.
+        """
+        node = identifier_in(status.name)
+        if node is None:
+            return
+        with self._lock:
+            self._tidy(at)
+            if (valve := self._entry(node, "")) is not None:
+                valve.at, valve.latest = at, status
+
+    def expect(self, valves: Iterable[tuple[str, str]]) -> None:
+        """Show valves, (identifier, tag) each, that the history keeps, also before they are heard.
+
+        They are never forgotten.
+        """
+        with self._lock:
+            for node, tag in valves:
+                if (valve := self._entry(node, tag)) is not None:
+                    valve.is_kept = True
+
+    def _tidy(self, now: float) -> None:
+        """Forget the valves that nothing keeps and that have been silent for long."""
+        if now < self._tidied + _TIDYING:
+            return
+        self._tidied = now
+        gone = [
+            node
+            for node, valve in self._valves.items()
+            if not valve.is_kept and valve.at is not None and now > valve.at + _FORGETTING
+        ]
+        for node in gone:
+            del self._valves[node]
+
+    def _entry(self, node: str, tag: str) -> _Valve | None:
+        valve = self._valves.get(node)
+        if valve is None and len(self._valves) < MOST_VALVES:
+            view = view_of(node, Status("", 3, tag, "", {}))
+            valve = self._valves[node] = _Valve(next(self._numbers), view)
+        return valve
+
+    def valves(self, now: float) -> list[Heard]:
+        """Return all valves as they are at a time, s of the monotonic clock, in a fixed order.
+
+        Their views are without `values`.
+        """
+        with self._lock:
+            self._tidy(now)
+            return [self._heard(node, valve, now, False) for node, valve in self._valves.items()]
+
+    def valve(self, node: str, now: float) -> Heard | None:
+        """Return the valve of an identifier, if it is known."""
+        with self._lock:
+            valve = self._valves.get(node)
+            return None if valve is None else self._heard(node, valve, now, True)
+
+    def _heard(self, node: str, valve: _Valve, now: float, with_values: bool) -> Heard:
+        valve.look(node, with_values)
+        age = None if valve.at is None else max(0.0, now - valve.at)
+        silent = age is None or age > self._silence
+        return Heard(valve.number, valve.view, age, silent, valve.revision)

@@ -1,0 +1,195 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The last seconds of two signals, thinned to what a screen can show."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+_STILL = 2.0
+"""Time without a sample, s, from which the axis goes on without any."""
+
+_Floats = NDArray[np.float64]
+
+
+class Strip(NamedTuple):
+    """A signal as it is drawn: times (s before now) and values."""
+
+    times: _Floats
+    values: _Floats
+
+
+def envelope(times: _Floats, values: _Floats, columns: int, span: float) -> Strip:
+    """Return the lowest and the highest sample of each column of pixels, in the order of time.
+
+    The columns share the last `span` seconds before time 0. A signal with fewer than two samples
+    a column is returned whole. Nothing that a screen of this width would show is lost.
+    """
+    inside = times >= -span
+    times, values = times[inside], values[inside]
+    if times.size <= 2 * columns:
+        return Strip(times, values)
+    column = np.clip(((times + span) * (columns / span)).astype(np.int64), 0, columns - 1)
+    order = np.lexsort((values, column))
+    edges = np.flatnonzero(np.diff(column[order])) + 1
+    lowest, highest = order[np.r_[0, edges]], order[np.r_[edges - 1, order.size - 1]]
+    kept = np.unique(np.concatenate([lowest, highest]))
+    return Strip(times[kept], values[kept])
+
+
+class _Samples:
+    """The newest samples of a signal, in arrays with room at their end."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._begin = self._end = 0
+        self._stamps = np.empty(0, dtype=np.int64)
+        self._values = np.empty(0)
+
+    @property
+    def stamps(self) -> NDArray[np.int64]:
+        """The stamps, ns, until the next change."""
+        return self._stamps[self._begin : self._end]
+
+    @property
+    def values(self) -> _Floats:
+        """The values, until the next change."""
+        return self._values[self._begin : self._end]
+
+    def clear(self) -> None:
+        self._begin = self._end = 0
+
+    def add(self, stamps: NDArray[np.int64], values: _Floats, span: int) -> None:
+        """Add samples, and leave out what is `span` ns older than the newest."""
+        stamps, values = stamps[-self._most :], values[-self._most :]
+        if self._end + stamps.size > self._stamps.size:
+            self._make_room(stamps.size)
+        end = self._end + stamps.size
+        self._stamps[self._end : end], self._values[self._end : end] = stamps, values
+        self._begin, self._end = max(self._begin, end - self._most), end
+        if self.stamps.size:
+            self._begin += int(np.argmax(self.stamps >= self.stamps[-1] - span))
+
+    def _make_room(self, count: int) -> None:
+        old_stamps, old_values = self.stamps, self.values
+        kept = old_stamps.size
+        size = max(1024, 2 * (kept + count))
+        self._stamps, self._values = np.empty(size, dtype=np.int64), np.empty(size)
+        self._stamps[:kept], self._values[:kept] = old_stamps, old_values
+        self._begin, self._end = 0, kept
+
+
+class LiveStrip:
+    """Samples of pressure and stem of one valve, from its subscriptions, behind a lock.
+
+    Parameters
+    ----------
+    span : float
+        Seconds that are kept.
+    most : int, optional
+        Most samples of a signal that are kept.
+    clock : callable, optional
+        Returns the time of arrival, s.
+
+    Attributes
+    ----------
+    trouble : str
+        Why nothing can come; empty if nothing is known to be wrong.
+    """
+
+    def __init__(
+        self, span: float, most: int = 120_000, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.span = span
+        self.trouble = ""
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._signals = (_Samples(most), _Samples(most))
+        self._arrivals: list[float | None] = [None, None]
+        self._count = 0
+
+    def add(self, signal: int, stamps: NDArray[np.int64], values: _Floats) -> None:
+        """Add samples: of the pressure (0), Pa, or of the stem (1), m; the stamps are ns.
+
+        A stamp that goes back, as when a bag begins again, empties the signal.
+        """
+        if not stamps.size:
+            return
+        with self._lock:
+            kept = self._signals[signal]
+            if kept.stamps.size and stamps[-1] < kept.stamps[-1] - 1_000_000_000:
+                kept.clear()
+            kept.add(stamps, values, round(self.span * 1e9))
+            self._arrivals[signal] = self._clock()
+            self._count += 1
+
+    @property
+    def revision(self) -> tuple[int, int]:
+        """Grows with each arrival, and each second in which the axis goes on without any."""
+        still = self._still()
+        return self._count, int(min(still, self.span + 1.0)) if still > _STILL else 0
+
+    def _still(self) -> float:
+        """Return the time since the last sample of either signal, s; 0 where there was none."""
+        known = [one for one in self._arrivals if one is not None]
+        return max(0.0, self._clock() - max(known)) if known else 0.0
+
+    def note(self) -> str:
+        """Say what does not come; empty while both signals do."""
+        if self.trouble:
+            return self.trouble
+        pressure, stem = self._arrivals
+        if pressure is None and stem is None:
+            return "No sample has come yet."
+        if (still := self._still()) > _STILL:
+            return f"no sample for {still:.0f} s"
+        late = [
+            f"no {name}" + ("" if at is None else f" for {self._clock() - at:.0f} s")
+            for name, at in (("pressure", pressure), ("stem", stem))
+            if at is None or self._clock() - at > _STILL
+        ]
+        return "".join(late)
+
+    def _copies(self) -> tuple[tuple[NDArray[np.int64], _Floats], ...]:
+        with self._lock:
+            return tuple((one.stamps.copy(), one.values.copy()) for one in self._signals)
+
+    def strips(self, columns: int) -> tuple[Strip, Strip]:
+        """Return pressure and stem, each with two points a column of pixels at most.
+
+        The newest sample of both is at 0 s while samples come; then it goes to the left.
+        """
+        signals = self._copies()
+        newest = max((int(stamps[-1]) for stamps, _ in signals if stamps.size), default=0)
+        still = self._still()
+        shift = still if still > _STILL else 0.0
+        pressure, stem = (
+            envelope((stamps - newest) / 1e9 - shift, values, columns, self.span)
+            for stamps, values in signals
+        )
+        return pressure, stem
+
+    def loop(self, most: int) -> Strip:
+        """Return the stem over the pressure: at most `most` samples, as (pressure, position)."""
+        (stamps, pressures), (times, positions) = self._copies()
+        if stamps.size < 2 or times.size < 2:
+            return Strip(np.empty(0), np.empty(0))
+        step = -(-stamps.size // most)
+        at = stamps[::step]
+        at = at[(at >= times[0]) & (at <= times[-1])]
+        origin = int(stamps[0])
+        return Strip(
+            np.interp(at - origin, stamps - origin, pressures),
+            np.interp(at - origin, times - origin, positions),
+        )

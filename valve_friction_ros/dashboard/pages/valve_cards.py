@@ -1,0 +1,295 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Cards of the page *Valve*: its parameters, signals, trend, and what is kept of it."""
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from datetime import datetime, timezone
+from typing import Any
+from urllib.parse import quote
+from zoneinfo import ZoneInfo
+
+from nicegui import ui
+
+from valve_friction_ros.dashboard.alarm_list import RANGES
+from valve_friction_ros.dashboard.charts import (
+    DRAG_TO_ZOOM,
+    live_chart,
+    live_data,
+    loop_chart,
+    loop_data,
+    trend_chart,
+    zoom,
+)
+from valve_friction_ros.dashboard.context import OfferedFile
+from valve_friction_ros.dashboard.live_state import Quantity, ValveView
+from valve_friction_ros.dashboard.live_strip import LiveStrip
+from valve_friction_ros.dashboard.pages.theme import chip, element, retitle, table, text
+from valve_friction_ros.dashboard.plant_rows import moment, quantity_texts
+from valve_friction_ros.health import AlarmEvent, Baseline
+from valve_friction_ros.history import HistoryEntry, ValveHistory, drift_text
+from valve_friction_ros.outside_text import printable
+from valve_friction_ros.wording import number_and_width
+
+_VERDICTS = {"identified": "ok", "weak": "warn", "not identifiable": "unknown", "fixed": "unknown"}
+_TITLES = (("parameter", ""), ("value", "vf-n"), ("", "vf-width"), ("", ""), ("verdict", ""))
+
+
+def draw_parameters(view: ValveView) -> None:
+    """Draw a table of the parameters, or say why there are none."""
+    if not view.parameters:
+        text("p", view.reason or "There is no estimate yet.", "vf-none")
+        return
+    baseline = {one.name: one for one in view.baseline}
+    with element("table", "vf-list vf-parameters"):
+        with element("thead"), element("tr"):
+            for title, css in _TITLES:
+                text("th", title, css)
+        with element("tbody"):
+            for one in view.parameters:
+                _draw_parameter(one)
+                if one.name in baseline:
+                    _draw_baseline(baseline[one.name])
+
+
+def _draw_parameter(one: Quantity) -> None:
+    value, width = quantity_texts(one)
+    with element("tr"):
+        text("td", one.name.replace("_", " "))
+        text("td", value, "vf-n")
+        text("td", width, "vf-width")
+        text("td", one.unit, "vf-unit")
+        with element("td"):
+            chip(_VERDICTS.get(one.verdict, "unknown"), one.verdict or "–")
+            if one.reason:
+                text("small", one.reason, "vf-reason")
+
+
+def _draw_baseline(one: Quantity) -> None:
+    value, width = number_and_width(one.value, one.half_width)
+    with element("tr", "vf-sub"):
+        text("td", "baseline")
+        text("td", value, "vf-n")
+        text("td", width, "vf-width")
+        text("td", "N", "vf-unit")
+        text("td", "")
+
+
+_STRIP_COLUMNS = 500
+_LOOP_POINTS = 1200
+_SIGNATURE_EVERY = 5
+"""Times that the strip is drawn between two times that the signature is."""
+
+
+class ValveSignals:
+    """Both charts of the signals; only what has changed is sent.
+
+    Parameters
+    ----------
+    strip : LiveStrip
+        The signals.
+    """
+
+    def __init__(self, strip: LiveStrip) -> None:
+        self._strip = strip
+        self._drawn = (0, 0)
+        self._shown = self._looped = 0
+        self._loop: ui.echart | None = None
+
+    def draw(self) -> None:
+        """Draw the signals over time, still without any."""
+        words = "Pressure and stem of the last 60 seconds"
+        self._live = _chart(live_chart(self._strip.span), "vf-chart-live", words)
+        self._note = text("p", "No sample has come yet.", "vf-none")
+
+    def draw_signature(self, kept: ValveHistory | None) -> None:
+        """Draw the signature of the baseline; that of now follows."""
+        healthy = None if kept is None else kept.set_baseline
+        record = None if healthy is None else healthy.record
+        self._loop = _chart(loop_chart(record), "vf-chart-loop", "Signature: stem over pressure")
+        self._drawn, self._looped = (-1, 0), self._shown - _SIGNATURE_EVERY
+        if record is None:
+            text("p", "The record of the baseline is not kept.", "vf-none")
+
+    def show(self) -> None:
+        """Show what has come since the last time."""
+        self._shown += 1
+        note = self._strip.note()
+        retitle(self._note, note)
+        self._note.set_visibility(bool(note))
+        revision = self._strip.revision
+        if revision == self._drawn:
+            return
+        self._drawn = revision
+        pressure, stem = self._strip.strips(_STRIP_COLUMNS)
+        self._live.run_chart_method("setOption", {"series": live_data(pressure, stem)})
+        if self._loop is not None and self._looped + _SIGNATURE_EVERY <= self._shown:
+            self._looped = self._shown
+            loop = loop_data(self._strip.loop(_LOOP_POINTS))
+            self._loop.run_chart_method("setOption", {"series": [{}, {"data": loop}]})
+
+
+_UTC = ZoneInfo("UTC")
+
+
+def draw_trend(
+    kept: ValveHistory | None,
+    problem: str | None,
+    zone: ZoneInfo,
+    events: Sequence[AlarmEvent] = (),
+) -> None:
+    """Draw friction over time, with events of alarms, and say its trend; or why there is none."""
+    if problem:
+        text("p", problem, "vf-none")
+    if kept is None:
+        if not problem:
+            text("p", "No identification is kept of this valve.", "vf-none")
+        return
+    with element("div", "vf-filters", role="group", aria_label="Time that is shown"):
+        for name, span in {**RANGES, "all": None}.items():
+            with element("button", "vf-filter", type="button") as button:
+                ui.label(name)
+            button.on("click", lambda span=span: show(span))
+
+    def show(span: int | None) -> None:
+        chart.run_chart_method("dispatchAction", zoom(time.time_ns(), span, zone))
+
+    drawn = trend_chart(kept, zone, time.time_ns(), events)
+    chart = _chart(drawn, "vf-chart-trend", "Friction over time")
+    # Once it is drawn: a drag then chooses a time, as the icon of the toolbox has it.
+    chart.on(
+        "chart:finished",
+        js_handler=f"() => {{ const one = getElement({chart.id}); if (!one.drags) {{"
+        f"one.drags = true; one.chart.dispatchAction({json.dumps(DRAG_TO_ZOOM)}) }} }}",
+    )
+    text("p", _trend_words(kept), "vf-trend-words")
+
+
+def _chart(options: dict[str, Any], css: str, words: str) -> ui.echart:
+    """Draw a chart, which is a picture to those who do not see it."""
+    made = ui.echart(options).classes(css)
+    made.props["role"], made.props["aria-label"] = "img", words
+    return made
+
+
+def _trend_words(kept: ValveHistory) -> str:
+    trend = kept.trend
+    if trend is None:
+        return "No trend: it needs estimates of four days since the baseline."
+    if not trend.is_significant:
+        return f"No significant drift of the {trend.what} in {trend.days} days with estimates."
+    words = f"{trend.what[0].upper()}{trend.what[1:]}: {drift_text(trend)}"
+    if trend.crossing is None:
+        return f"{words}."
+    early, late = (
+        f"{moment(t, _UTC)[:10]}" for t in (trend.crossing.earliest, trend.crossing.latest)
+    )
+    return f"{words} (95 %: {early} to {late})."
+
+
+_MOST_ROWS = 60
+
+
+def baseline_words(baseline: Baseline | None) -> str:
+    """Return a baseline in words."""
+    return "none" if baseline is None else str(baseline)
+
+
+def _friction(entry: HistoryEntry) -> str:
+    for name in ("coulomb_friction", "sliding_friction"):
+        one = entry.parameters.get(name)
+        if one is not None and one.value == one.value:
+            return " ".join(number_and_width(one.value, one.half_width)).strip()
+    return "–"
+
+
+def draw_identifications(
+    history: ValveHistory | None, zone: ZoneInfo, compare: Callable[[int], str]
+) -> None:
+    """Draw the identifications, the newest first, each with a link to compare it."""
+    if history is None:
+        text("p", "No identification is kept of this valve.", "vf-none")
+        return
+    with element("table", "vf-list"):
+        with element("thead"), element("tr"):
+            for title, css in (("time", ""), ("level", ""), ("friction, N", "vf-n"),
+                               ("ratio", "vf-n"), ("diagnosis", ""), ("more", "")):  # fmt: skip
+                text("th", title, css).props["scope"] = "col"
+        with element("tbody"):
+            for entry in reversed(history.entries[-_MOST_ROWS:]):
+                ratio = entry.diagnosis.ratio
+                with element("tr"):
+                    text("td", moment(entry.time, zone), "vf-when")
+                    text("td", "refused" if entry.refusal else entry.diagnosis.level.name)
+                    text("td", _friction(entry), "vf-n")
+                    text("td", "–" if ratio is None else f"{ratio.value:.2f}", "vf-n")
+                    words = entry.refusal or entry.diagnosis.message
+                    text("td", printable(words, 300), "vf-words")
+                    with element("td"), element("a", "vf-link", href=compare(entry.time)) as link:
+                        ui.label("compare")
+                        link.props["aria-label"] = f"Compare the one of {moment(entry.time, zone)}"
+    if len(history.entries) > _MOST_ROWS:
+        text("p", f"The latest {_MOST_ROWS} of {len(history.entries)}.", "vf-none")
+
+
+def draw_baselines(history: ValveHistory | None, zone: ZoneInfo) -> None:
+    """Draw each change of the baseline, the newest first."""
+    if history is None or not history.baselines:
+        text("p", "No baseline was set.", "vf-none")
+        return
+    table(
+        ("time", "from then on", "before"),
+        [
+            (
+                moment(one.time, zone),
+                baseline_words(one.in_force),
+                baseline_words(one.replaced),
+            )
+            for one in reversed(history.baselines[-_MOST_ROWS:])
+        ],
+    )
+
+
+def draw_alarms(history: ValveHistory | None, zone: ZoneInfo) -> None:
+    """Draw the recorded alarms, the newest first."""
+    if history is None or not history.alarms:
+        text("p", "No alarm was recorded.", "vf-none")
+        return
+    table(
+        ("time", "level", "diagnosis", "recording"),
+        [
+            (
+                moment(one.time, zone),
+                one.level.name,
+                printable(one.message, 300),
+                printable(one.path.name, 120),
+            )
+            for one in reversed(history.alarms[-_MOST_ROWS:])
+        ],
+    )
+
+
+def draw_files(files: list[OfferedFile], zone: ZoneInfo) -> None:
+    """Draw links to reports and bags."""
+    if not files:
+        text(
+            "p", "No report and no recording is in the folders that the dashboard knows.", "vf-none"
+        )
+        return
+    with element("table", "vf-list"), element("tbody"):
+        for one in files:
+            when = datetime.fromtimestamp(one.time, timezone.utc).astimezone(zone)
+            with element("tr"), element("td", "vf-words"):
+                address = f"/files/{quote(one.kind)}/{quote(one.path)}"
+                with element("a", "vf-link", href=address, target="_blank", rel="noopener"):
+                    ui.label(one.label)
+                about = f"{one.kind}, {one.size / 1e6:.2f} MB"
+                text("small", f"{about}, {when:%Y-%m-%d %H:%M} {when.tzname()}", "vf-about")

@@ -1,0 +1,176 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The valves of a plant in one table, and which recording is of which valve."""
+
+import csv
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.spelling import nearest
+from valve_friction_ros.records.table import OpenTable
+from valve_friction_ros.records.units import AREA, LENGTH, MASS, PRESSURE, quantity, span
+from valve_friction_ros.records.valve_description import ActuatorData
+from valve_friction_ros.records.valve_file import ValveFile, valve_file_of
+from valve_friction_ros.records.whole_file import cause_of
+
+_QUANTITIES = {"area": AREA, "travel": LENGTH, "opposing_area": AREA, "mass": MASS}
+_SPANS = {"spring": "spring_range", "range": "sensor_range"}
+_WORDS = ("tag", "air_to", "sensor")
+_HEADER = re.compile(r"\s*([\w ]+?)\s*(?:[\[(](.+)[\])])?\s*")
+_MOST_FAULTS = 6
+
+
+def _known() -> list[str]:
+    return [*_WORDS, *_QUANTITIES, *_SPANS, *(each.name for each in fields(Columns))]
+
+
+def _row(cells: Mapping[str, tuple[str, str]]) -> tuple[str, ActuatorData]:
+    """Build a valve from its cells, each with the unit of its column."""
+    values: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
+    for name, (cell, unit) in cells.items():
+        text = f"{cell} {unit}" if unit else cell
+        try:
+            if name in _QUANTITIES:
+                values[name] = quantity(text, _QUANTITIES[name])
+            elif name in _SPANS:
+                values[_SPANS[name]] = span(text, PRESSURE)
+            elif name not in _WORDS:
+                columns[name] = yaml.safe_load(cell) if cell.lower() in ("true", "false") else cell
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    tag = cells["tag"][0]
+    if missing := [name for name in ("area", "travel") if name not in values]:
+        raise ValueError(f"{tag}: {' and '.join(missing)} missing")
+    return tag, ActuatorData(
+        **values,
+        tag=tag,
+        is_absolute=cells.get("sensor", ("", ""))[0].casefold().startswith("abs"),
+        is_air_to_close=cells.get("air_to", ("", ""))[0].casefold() == "close",
+        columns=columns,
+    )
+
+
+def _table(path: Path) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """Return the columns of a table with their units, and its rows; refuse unknown columns."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        dialect = csv.Sniffer().sniff(text[:10_000], ",;\t")
+        header, *rows = [row for row in csv.reader(text.splitlines(), dialect) if any(row)]
+    except (OSError, UnicodeError, csv.Error, ValueError) as error:
+        raise ValueError(f"{path}: cannot be read as a table: {cause_of(error)}") from None
+    heads = []
+    for cell in header:
+        found = _HEADER.fullmatch(cell)
+        name = found[1].casefold().replace(" ", "_") if found else cell
+        if name not in _known():
+            raise ValueError(f"{path}: unknown column {cell[:60]!r}: {nearest(name, _known())}")
+        heads.append((name, (found[2] or "") if found else ""))
+    if "tag" not in dict(heads):
+        raise ValueError(f"{path}: there is no column tag: give tag, area, travel, spring, range")
+    return heads, rows
+
+
+def read_plant(path: Path) -> dict[str, ValveFile]:
+    """Read the valves of a plant from a CSV file: tag, area, travel, spring, range.
+
+    A number has its unit in its cell or in its header, as ``travel [mm]``. Further columns are
+    ``air_to``, ``sensor`` (gauge or absolute), ``opposing_area``, ``mass``, and what a valve file
+    says in its section ``columns:``, as ``pressure_unit``.
+
+    Returns
+    -------
+    dict of str to ValveFile
+        The valves by their tags.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read: the file, and all rows at fault.
+    """
+    heads, rows = _table(path)
+    valves: dict[str, ValveFile] = {}
+    faults = []
+    for number, row in enumerate(rows, start=2):
+        cells = {
+            name: (cell.strip(), unit)
+            for (name, unit), cell in zip(heads, row, strict=False)
+            if cell.strip()
+        }
+        try:
+            if "tag" not in cells:
+                raise ValueError("it has no tag")
+            tag, data = _row(cells)
+            if tag in valves:
+                raise ValueError(f"a second {tag}")
+            valves[tag] = valve_file_of(yaml.safe_load(data.text()), path)
+        except ValueError as error:
+            faults.append(f"row {number}: {str(error).removeprefix(f'{path}: ')}")
+    if faults:
+        more = f"; and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
+        raise ValueError(f"{path}: {'; '.join(faults[:_MOST_FAULTS])}{more}")
+    if not valves:
+        raise ValueError(f"{path}: there are no valves in it")
+    return valves
+
+
+def _pattern(tag: str) -> re.Pattern[str]:
+    parts = re.findall(r"[^\W\d_]+|\d+", tag)
+    return re.compile(
+        r"(?<![^\W_])" + r"[\W_]*".join(map(re.escape, parts)) + r"(?!\d)", re.IGNORECASE
+    )
+
+
+def tags_in(texts: Iterable[str], tags: Iterable[str]) -> list[str]:
+    """Return the tags that texts name, whatever stands between their letters and digits.
+
+    A tag that is the beginning of another one that is there, as FV-10 of FV-10A, is not meant.
+    """
+    whole = "\n".join(texts)
+    found: list[str] = []
+    for tag in sorted(tags, key=len, reverse=True):
+        pattern = _pattern(tag)
+        if pattern.search(whole):
+            found.append(tag)
+            whole = pattern.sub("\n", whole)
+    return found
+
+
+def valves_of(
+    path: Path, name: str, plant: Mapping[str, ValveFile], is_table: bool
+) -> Sequence[tuple[str, str, ValveFile]]:
+    """Find the valves of a recording: by its name, else by what stands in it.
+
+    Returns the label of each in the file (empty for an only one), its tag, and the valve.
+
+    Raises ValueError if none of the tags is named, or several are and the file does not tell which
+    signal is whose.
+    """
+    for text in reversed(Path(name).parts):
+        if len(found := tags_in([text], plant)) == 1:
+            return [("", found[0], plant[found[0]])]
+    if is_table:
+        layout = OpenTable(path, Columns()).layout
+        labels = [label for label in layout.valves if label]
+        by_label = [(label, tags_in([label], plant)) for label in labels]
+        if by_label and all(len(tags) == 1 for _, tags in by_label):
+            return [(label, tag, plant[tag]) for label, (tag,) in by_label]
+        found = tags_in([*layout.headers, *layout.texts], plant)
+        if len(found) == 1:
+            return [("", found[0], plant[found[0]])]
+        if found:
+            raise ValueError(f"it names several valves ({', '.join(found)}): put one into its name")
+    raise ValueError("no tag of the plant is in its name or above its values: rename it")

@@ -1,0 +1,285 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The recordings below a folder, and the baselines of their valves."""
+
+import csv
+import hashlib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from valve_friction_ros.health import Baseline, Measured, SlidingFriction
+from valve_friction_ros.health.valve_numbers import COMPARED, IDENTIFIED_ONLY, fit_numbers
+from valve_friction_ros.identification import Verdict
+from valve_friction_ros.identification.units import column_suffix
+from valve_friction_ros.outside_text import as_read
+from valve_friction_ros.records.stores import explained, state_of, walk
+from valve_friction_ros.records.whole_file import cause_of
+
+_METADATA = "metadata.yaml"
+_BAG_KEY = b"rosbag2_bagfile_information"
+_VALVE_ENDING = "valve.yaml"
+_PACKED = (".gz", ".zstd")
+_STORAGE = (".mcap", ".db3")
+_TABLES = (".csv", ".tsv", ".xlsx", ".xlsm", ".parquet", ".txt", ".lvm", ".dat", ".mat")
+_PERHAPS = (".txt", ".dat")
+"""Endings of tables and of much else: it is a table if some of its first lines hold two numbers."""
+_TWO_NUMBERS = re.compile(rb"^[^\n]*\d[\t;,| ][^\n]*\d", re.MULTILINE)
+_LOOKED_AT, _FEWEST_ROWS = 16_384, 3
+"""Bytes of such a file that are looked at, and rows that make a table of it."""
+_ENDINGS = (*_TABLES, ".bag", *_STORAGE)
+"""Endings of recordings; a bag of ROS 1 is one, so that its refusal says how to convert it."""
+_HIDDEN = (".", "~$")
+"""Beginnings of names not meant for people; ``~$a.xlsx`` is there while Excel has a.xlsx open."""
+
+
+@dataclass(frozen=True)
+class FoundRecording:
+    """A recording, not yet read: a file or the folder of a bag.
+
+    Its name is its path from the searched folder, with slashes.
+    """
+
+    path: Path
+    name: str
+
+    @property
+    def stem(self) -> str:
+        """Its name without folders and endings: ``NAME`` of ``NAME.valve.yaml``."""
+        return self.path.name if self.path.is_dir() else _bare(self.path.name)
+
+    def content(self) -> str:
+        """Return a fingerprint of size and time of change of its file or files.
+
+        Raises OSError if they cannot be looked at.
+        """
+        folder = self.path.is_dir()
+        files = sorted(self.path.iterdir()) if folder else [self.path]
+        digest = hashlib.blake2b(digest_size=8)
+        for file in files:
+            if not is_valve_file(file.name):
+                name = file.name if folder else ""
+                digest.update(f"{name}\0{state_of(file)}\n".encode())
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The recordings of a folder, and the names of what is none, each in the order of names."""
+
+    recordings: tuple[FoundRecording, ...]
+    skipped: tuple[str, ...]
+
+
+def is_valve_file(name: str) -> bool:
+    """Return whether a file describes a valve: ``valve.yaml`` or ``NAME.valve.yaml``."""
+    return name == _VALVE_ENDING or name.endswith(f".{_VALVE_ENDING}")
+
+
+def _unpacked_name(name: str) -> str:
+    for ending in _PACKED:
+        if name.lower().endswith(ending):
+            return name[: -len(ending)]
+    return name
+
+
+def _bare(name: str) -> str:
+    return Path(_unpacked_name(name)).stem
+
+
+def _is_recording(name: str) -> bool:
+    return Path(_unpacked_name(name)).suffix.lower() in _ENDINGS
+
+
+def _may_be_table(path: Path) -> bool:
+    """Return whether a file of an ending that means little begins like a table."""
+    if Path(path.name).suffix.lower() not in _PERHAPS:
+        return True
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(_LOOKED_AT).replace(b"\0", b"")
+    except OSError:
+        return True  # whoever reads it says why that fails
+    return len(_TWO_NUMBERS.findall(start)) >= _FEWEST_ROWS
+
+
+def _is_storage(name: str) -> bool:
+    return Path(_unpacked_name(name)).suffix.lower() in _STORAGE
+
+
+def _is_bag_folder(folder: Path, files: list[str]) -> bool:
+    """Return whether a folder is a bag: metadata beside storage files, or metadata of rosbag2."""
+    if _METADATA not in files:
+        return False
+    if any(_is_storage(name) for name in files):
+        return True
+    try:
+        return _BAG_KEY in (folder / _METADATA).read_bytes()
+    except OSError:
+        return False
+
+
+def _can_be_written(name: str) -> bool:
+    """Return whether a name can be written on one line of UTF-8."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return name.isprintable()
+
+
+def find_recordings(folder: Path, *left_out: Path) -> Findings:
+    """Find the recordings in a folder and in those below it, on this machine or in a store.
+
+    A folder with a ``metadata.yaml`` of rosbag2 is one recording, whatever it holds. Elsewhere
+    each table, gzipped or not, and each storage file of a bag is one, found by its ending. Hidden
+    files and folders and links to folders are skipped; so is a name that cannot be written on a
+    line. Files and folders of `left_out`, such as the output, are neither recordings nor skipped.
+
+    Raises ValueError if the folder is none, or cannot be read.
+    """
+    with explained(folder):
+        return _findings(folder, {path.resolve() for path in left_out})
+
+
+def _findings(folder: Path, own: set[Path]) -> Findings:
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: no such folder")
+    recordings, skipped = [], []
+    for here, folders, files in walk(folder):
+        if _is_bag_folder(here, files):
+            recordings.append(here)
+            folders.clear()
+            continue
+        folders[:] = [name for name in folders if (here / name).resolve() not in own]
+        closed = {name for name in folders if name.startswith(".") or (here / name).is_symlink()}
+        skipped += [f"{(here / name).relative_to(folder).as_posix()}/" for name in closed]
+        folders[:] = sorted(set(folders) - closed)
+        for name in files:
+            path = here / name
+            if path.resolve() in own or is_valve_file(name):
+                continue
+            is_one = not name.startswith(_HIDDEN) and _is_recording(name) and path.is_file()
+            if not is_one or not _may_be_table(path):
+                skipped.append(path.relative_to(folder).as_posix())
+            else:
+                recordings.append(path)
+    found = [FoundRecording(path, path.relative_to(folder).as_posix()) for path in recordings]
+    strange = [one for one in found if not _can_be_written(one.name)]
+    skipped += [one.name for one in strange]
+    good = sorted((one for one in found if one not in strange), key=lambda one: one.name)
+    return Findings(tuple(good), tuple(sorted(skipped)))
+
+
+_COULOMB, _SLIDING, _SPEED = "coulomb_friction", "sliding_friction", "sliding_speed_m_per_s"
+
+
+@dataclass(frozen=True)
+class Baselines:
+    """Baselines by recording and by the name of the valve in it.
+
+    One without a recording is of its valve in every recording.
+    """
+
+    by_recording: Mapping[str, Mapping[str, Baseline]]
+
+    def of(self, recording: str) -> Mapping[str, Baseline]:
+        """Return the baselines of a recording, by the names of its valves."""
+        everywhere = self.by_recording.get("", {})
+        return {**everywhere, **self.by_recording.get(recording, {})}
+
+    def count(self, recordings: Iterable[str]) -> int:
+        """Count the recordings that have one."""
+        return sum(bool(self.of(recording)) for recording in recordings)
+
+
+def _number(row: Mapping[str, str | None], column: str) -> float:
+    """Return a number of a row; nan where the cell is empty or missing."""
+    text = (row.get(column) or "").strip()
+    try:
+        return float(text) if text else math.nan
+    except ValueError:
+        raise ValueError(f"column {column!r}: {text!r} is not a number") from None
+
+
+def _friction(row: Mapping[str, str | None], name: str) -> Measured | None:
+    """Return a friction; None where it is not above zero, or has no interval."""
+    value, width = _number(row, f"{name}_n"), _number(row, f"{name}_half_width_n")
+    if math.isnan(width):  # exact, unless it was identified by a method without intervals
+        width = math.inf if row.get(f"{name}_verdict") == Verdict.WEAK.value else 0.0
+    return Measured(value, width) if value > 0 and math.isfinite(width) else None
+
+
+def _numbers(row: Mapping[str, str | None]) -> dict[str, Measured]:
+    """Return what else a row says of its valve, where it has intervals."""
+    known = {}
+    for name in COMPARED:
+        suffix = column_suffix(name)
+        value = _number(row, f"{name}{suffix}")
+        width = _number(row, f"{name}_half_width{suffix}")
+        sure = row.get(f"{name}_verdict") == Verdict.IDENTIFIED.value
+        if math.isfinite(value) and width > 0 and (sure or name not in IDENTIFIED_ONLY):
+            known[name] = Measured(value, width)
+    return fit_numbers(known)
+
+
+def _baseline(row: Mapping[str, str | None]) -> Baseline | None:
+    """Return the baseline of a row; None where no friction is known well enough."""
+    numbers = _numbers(row)
+    coulomb, slid, speed = _friction(row, _COULOMB), _friction(row, _SLIDING), _number(row, _SPEED)
+    sliding = None
+    if slid is not None and speed > 0:
+        sliding = SlidingFriction(slid.value, slid.half_width, speed)
+    return Baseline.serving(coulomb, sliding, numbers)
+
+
+def read_baselines(path: Path) -> Baselines:
+    """Read the friction of healthy valves from a CSV file, as `identify-folder` writes it.
+
+    Of its columns these count: ``recording``, ``valve``, and the frictions with their half widths;
+    an empty half width stands for an exact value. The other
+    parameters count where they have half widths. A friction that is not known well enough to be a
+    baseline is left out, and so is a refused valve.
+
+    Raises ValueError, one line with the file and the row, if it cannot be read.
+    """
+    found: dict[str, dict[str, Baseline]] = {}
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            reader = csv.DictReader(stream)
+            columns = set(reader.fieldnames or ())
+            frictions = {f"{name}_n" for name in (_COULOMB, _SLIDING)}
+            if not {"recording", "valve"} & columns or not frictions & columns:
+                raise ValueError(
+                    f"{path}: give a CSV file of identify-folder, or one with the columns "
+                    f"recording, valve and {_COULOMB}_n"
+                )
+            for number, row in enumerate(reader, start=2):
+                recording, valve = (as_read(row.get(key) or "") for key in ("recording", "valve"))
+                try:
+                    baseline = _baseline(row)
+                except ValueError as error:
+                    raise ValueError(f"{path}: row {number}: {error}") from None
+                if baseline is None:
+                    continue
+                if valve in found.setdefault(recording, {}):
+                    raise ValueError(
+                        f"{path}: row {number}: a second baseline of {recording} {valve}"
+                    )
+                found[recording][valve] = baseline
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        cause = cause_of(error)
+        raise ValueError(f"{path}: cannot be read: {cause}") from None
+    if not found:
+        raise ValueError(f"{path}: no friction in it is known well enough to be a baseline")
+    return Baselines(MappingProxyType(found))

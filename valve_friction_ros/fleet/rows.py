@@ -1,0 +1,316 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""One row for each valve of a recording: its cells, its place in the ranking, its report."""
+
+import hashlib
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.health import (
+    Diagnosis,
+    Finding,
+    FrictionLimits,
+    Level,
+    StatusSignal,
+    by_severity,
+    dead_band,
+)
+from valve_friction_ros.identification import PARAMETER_UNITS, Result, parameter_columns, plain
+from valve_friction_ros.model import Recording
+from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.reports.identified_record import what_to_do
+
+Cell = str | float | int | None
+
+COLUMNS: tuple[str, ...] = (
+    "recording",
+    "valve",
+    "valves",
+    "content",
+    "settings",
+    "level",
+    "ne_107",
+    "ratio",
+    "ratio_low",
+    "ratio_high",
+    "ratio_of",
+    "dead_band_of_travel",
+    "message",
+    "survey",
+    "what_to_do",
+    "findings_level",
+    "findings",
+    "method",
+    *(column for name in PARAMETER_UNITS for column in parameter_columns(name, None)),
+    "sliding_speed_m_per_s",
+    "fit",
+    "rms_m",
+    "began",
+    "samples",
+    "duration_s",
+    "report",
+    "warnings",
+    "error",
+)
+"""All columns: what a row is about, what came of it, and last why nothing did."""
+
+PICTURE = "picture"
+"""What a row holds beside its columns: the points of its picture."""
+
+_DATED = 946_684_800.0
+"""Time, s since 1970, from which a stamp is a date: the year 2000."""
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _began(recording: Recording) -> str | None:
+    if recording.start_time < _DATED:
+        return None
+    began = datetime.fromtimestamp(recording.start_time, timezone.utc)
+    return f"{began:%Y-%m-%dT%H:%M:%SZ}"
+
+
+def diagnosis_cells(diagnosis: Diagnosis, findings: Sequence[Finding] = ()) -> dict[str, Cell]:
+    """Fill the cells of a diagnosis and of the findings beside the friction."""
+    told = diagnosis.to_dict()
+    low, high = told["ratio_interval"] or (None, None)
+    return {
+        **{name: told[name] for name in ("level", "ne_107", "ratio", "ratio_of")},
+        "ratio_low": low,
+        "ratio_high": high,
+        "message": _one_line(diagnosis.message),
+        "survey": told["survey"],
+        "what_to_do": _one_line(what_to_do(diagnosis, findings)),
+        "findings_level": max(one.level for one in findings).name if findings else None,
+        "findings": "; ".join(map(str, by_severity(findings))) or None,
+    }
+
+
+def result_cells(
+    valve: str,
+    result: Result,
+    diagnosis: Diagnosis,
+    notes: Sequence[str],
+    findings: Sequence[Finding] = (),
+) -> dict[str, Cell]:
+    """Fill the cells of an identified valve; the notes of the reading join the warnings.
+
+    `findings` are those beside the friction.
+
+    A parameter that the result does not hold leaves its cells empty.
+    """
+    shown, recording = result.to_dict(), result.recording
+    cells: dict[str, Cell] = {
+        "valve": _one_line(valve),
+        "method": shown["method"],
+        **diagnosis_cells(diagnosis, findings),
+        "dead_band_of_travel": plain(dead_band(result, result.valve)),
+        PICTURE: signature_points(recording),
+    }
+    for name in PARAMETER_UNITS:
+        cells |= parameter_columns(name, shown["parameters"].get(name))
+    return cells | {
+        "sliding_speed_m_per_s": plain(result.sliding_speed),
+        "fit": shown["fit"],
+        "rms_m": shown["rms"],
+        "began": _began(recording),
+        "samples": len(recording),
+        "duration_s": round((len(recording) - 1) * recording.sample_period, 9),
+        "warnings": "; ".join(map(_one_line, (*notes, *shown["warnings"]))) or None,
+    }
+
+
+def error_cells(valve: str, reason: str, path: Path) -> Mapping[str, Cell]:
+    """Fill the cells of a refused valve; `path`, which the row names, is removed from `reason`."""
+    for start in (f"{path}, {valve}: ", f"{path}: "):
+        while reason.startswith(start):
+            reason = reason.removeprefix(start)
+    return {"valve": _one_line(valve), "error": _one_line(reason)}
+
+
+def key_cells(recording: str, content: str, settings: str, valves: int) -> Mapping[str, Cell]:
+    """Fill the cells by which a later run knows what was done.
+
+    `content` and `settings` are fingerprints of the files and of the options, `valves` is the
+    number of rows of this recording.
+    """
+    return {
+        "recording": recording,
+        "content": content,
+        "settings": settings,
+        "valves": valves,
+    }
+
+
+class RowStatus(NamedTuple):
+    """The diagnosis of a row in one word, and the colour class that goes with it."""
+
+    word: str
+    colour: str
+
+
+_LIMITS = FrictionLimits()
+_MAYBE = "maybe"
+_SURVEYS = {
+    "bad": RowStatus("bad", "warn"),
+    "watch": RowStatus("watch", _MAYBE),
+    "good": RowStatus("good", "ok"),
+}
+"""The first survey of a valve without a baseline, the worst first."""
+_BY_SIGNAL = {
+    StatusSignal.FAILURE.value: "excessive",
+    StatusSignal.OUT_OF_SPECIFICATION.value: "collapsed",
+    StatusSignal.MAINTENANCE_REQUIRED.value: "grown",
+    StatusSignal.CHECK_FUNCTION.value: "check",
+}
+
+
+def _friction_level(row: Mapping[str, Cell]) -> Level | None:
+    return Level[str(row["level"])] if row.get("level") else None
+
+
+def _level(row: Mapping[str, Cell]) -> Level | None:
+    """Return the level of friction and findings together; None for a refused valve."""
+    own, others = _friction_level(row), row.get("findings_level")
+    return own if own is None or not others else max(own, Level[str(others)])
+
+
+def _number(row: Mapping[str, Cell], name: str) -> float:
+    value = row.get(name)
+    return float(value) if isinstance(value, (int, float)) else -math.inf
+
+
+def status_of(row: Mapping[str, Cell]) -> RowStatus:
+    """Say how a valve is: a word, and ``error``, ``warn``, ``maybe``, ``ok`` or ``none``."""
+    level, ratio = _level(row), _number(row, "ratio")
+    if level is None:
+        return RowStatus("refused", "none")
+    if level > (_friction_level(row) or Level.OK):
+        return RowStatus("changed", level.name.lower())
+    if level is Level.OK or row["ne_107"] == StatusSignal.CHECK_FUNCTION.value:
+        by_ratio = _status_of_ratio(ratio)
+        if ratio == -math.inf and str(row.get("survey")) in _SURVEYS:
+            return _SURVEYS[str(row["survey"])]
+        if level is Level.OK or by_ratio.colour == _MAYBE:
+            return by_ratio
+    if row["ne_107"] == StatusSignal.MAINTENANCE_REQUIRED.value and ratio < 1:
+        return RowStatus("fallen", level.name.lower())
+    return RowStatus(_BY_SIGNAL[str(row["ne_107"])], level.name.lower())
+
+
+def _status_of_ratio(ratio: float) -> RowStatus:
+    if ratio == -math.inf:
+        return RowStatus("no comparison", "none")
+    if ratio >= _LIMITS.warn_ratio:
+        return RowStatus("perhaps grown", _MAYBE)
+    if ratio <= _LIMITS.low_warn_ratio:
+        return RowStatus("perhaps fallen", _MAYBE)
+    return RowStatus("normal", "ok")
+
+
+def _need(row: Mapping[str, Cell]) -> tuple[float, float, float, float, str, str]:
+    """Return what sorts first the valve that needs attention most."""
+    level, ratio = _level(row), _number(row, "ratio")
+    change = abs(math.log(ratio)) if ratio > 0 else -math.inf
+    severity = -1.0 if level is None else float(level)
+    names = (str(row["recording"]), str(row["valve"]))
+    surveys = [*_SURVEYS, str(row.get("survey"))]
+    first = float(surveys.index(str(row.get("survey")))) if ratio == -math.inf else len(_SURVEYS)
+    return (-severity, first, -change, -_number(row, "dead_band_of_travel"), *names)
+
+
+def ranked(rows: Iterable[Mapping[str, Cell]]) -> list[Mapping[str, Cell]]:
+    """Sort rows by diagnosis, then by first survey, by the change of friction, by the dead band.
+
+    A friction that has halved has changed as much as one that has doubled. Refused valves, of which
+    nothing is known, come last.
+    """
+    return sorted(rows, key=_need)
+
+
+def reaches(row: Mapping[str, Cell], level: Level) -> bool:
+    """Return whether the diagnosis of a row is as severe as `level`, or more."""
+    found = _level(row)
+    return found is not None and found >= level
+
+
+PAGE = "page"
+"""What a row holds beside its columns until its report is written: the text of the page."""
+
+_STRANGE = re.compile(r"[^A-Za-z0-9.-]+")
+_LONGEST_NAME = 100
+"""Characters of a report's name before its digest."""
+
+
+def report_name(recording: str, valve: str) -> str:
+    """Return the name of a report: readable, and no other valve's."""
+    name = f"{recording} {valve}".strip()
+    digest = hashlib.blake2b(name.encode(), digest_size=4).hexdigest()
+    return f"{_STRANGE.sub('_', name).strip('_')[:_LONGEST_NAME]}_{digest}.html"
+
+
+def with_reports_written(
+    rows: Iterable[Mapping[str, Cell]], beside: Path
+) -> list[Mapping[str, Cell]]:
+    """Write the pages of rows under their names in the folder `beside`, and return the rows.
+
+    A page that cannot be written is a warning of its row, as the numbers are there.
+    """
+    written: list[Mapping[str, Cell]] = []
+    for row in rows:
+        cells = dict(row)
+        page = cells.pop(PAGE, None)
+        if page is not None:
+            try:
+                write_whole(beside / str(row["report"]), str(page).encode())
+            except OSError as error:
+                cells["report"] = None
+                told = f"no report: {error.filename}: {error.strerror}"
+                cells["warnings"] = "; ".join(filter(None, (str(row["warnings"] or ""), told)))
+        written.append(cells)
+    return written
+
+
+WIDTH, HEIGHT = 120, 64
+"""Size of the picture, in its own units."""
+
+_POINT_STEP = 1.0
+"""Distance between two points. Chosen: as fine as a screen shows at this size."""
+_MOST_POINTS = 500
+"""Points of a picture. Chosen: some strokes, in 5 kB."""
+
+
+def _scaled(values: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    span = float(np.ptp(values)) or 1.0
+    return np.asarray(1.0 + (values - values.min()) / span * (length - 2), dtype=np.float64)
+
+
+def signature_points(recording: Recording) -> str:
+    """Return stem position over drive as the points of an SVG polyline, rounded.
+
+    A long recording shows its first strokes.
+    """
+    across, up = _scaled(recording.drive, WIDTH), HEIGHT - _scaled(recording.position, HEIGHT)
+    points = [(float(across[0]), float(up[0]))]
+    for x, y in zip(across.tolist(), up.tolist(), strict=True):
+        if abs(x - points[-1][0]) + abs(y - points[-1][1]) >= _POINT_STEP:
+            points.append((x, y))
+            if len(points) == _MOST_POINTS:
+                break
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

@@ -1,0 +1,303 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The history of a plant's valves: a file that several processes write at once, or a server."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection
+
+from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.known_numbers import KnownNumbers
+from valve_friction_ros.health.measured import DatedNumber
+from valve_friction_ros.history import tables
+from valve_friction_ros.history.database import is_ready, marked, reading, writing
+from valve_friction_ros.history.entry import (
+    HistoryEntry,
+    KeptBaseline,
+    KeptValve,
+    friction_point,
+)
+from valve_friction_ros.history.place import HistoryServer, Place
+from valve_friction_ros.history.rows import (
+    entries_in,
+    frictions_in,
+    insert_baseline,
+    insert_entry,
+    kept_baseline_in,
+    known_numbers_in,
+    numbers_in,
+    oldest_kept,
+    record_in,
+    valve_id,
+)
+from valve_friction_ros.history.tables import joined
+from valve_friction_ros.identification import FORMER_METHODS, SLIDING
+from valve_friction_ros.model.valve import Valve
+
+_END_OF_TIME = 2**63 - 1
+"""Largest integer in both databases."""
+
+
+def _of_valve(table: sa.Table, valve: str, since: int, until: int = _END_OF_TIME) -> Any:
+    """Return what selects the rows of a valve from `since` on and before `until`, ns."""
+    time = table.c.time_ns
+    chosen = (tables.valve.c.name == valve, time >= since, time < until)
+    return sa.select(table).select_from(joined(table, tables.valve)).where(*chosen)
+
+
+@dataclass(frozen=True)
+class History:
+    """A history, in a file of SQLite or in PostgreSQL on a server.
+
+    Every method raises HistoryError if it cannot be read.
+
+    Attributes
+    ----------
+    place : Path or HistoryServer
+        Where it is.
+    """
+
+    place: Place
+
+    def baseline(self, valve: str, until: int = _END_OF_TIME) -> KeptBaseline | None:
+        """Return the newest baseline set before `until` (ns) for the valve of this name, if any.
+
+        There is none where the newest one was withdrawn.
+        """
+        query = _of_valve(tables.baseline, valve, -_END_OF_TIME, until)
+        newest = query.order_by(tables.baseline.c.id.desc()).limit(1)
+        with reading(self.place) as connection:
+            row = connection.execute(newest).mappings().first()
+            if row is None or (kept := kept_baseline_in(row)).withdrawn:
+                return None
+            number = row["id"]
+            numbers = numbers_in(connection, "baseline", valve, number, number).get(number, {})
+            whole = replace(kept.baseline, numbers=numbers)
+            return replace(kept, baseline=whole, record=record_in(connection, number))
+
+    def baselines(
+        self, valve: str, since: int = -_END_OF_TIME, until: int = _END_OF_TIME
+    ) -> tuple[KeptBaseline, ...]:
+        """Return each change of a valve's baseline, oldest first, without records."""
+        query = _of_valve(tables.baseline, valve, since, until).order_by(tables.baseline.c.id)
+        with reading(self.place) as connection:
+            return tuple(map(kept_baseline_in, connection.execute(query).mappings()))
+
+    def last_success(self, valve: str) -> HistoryEntry | None:
+        """Return the identification that a valve's diagnosis was last made by, if any."""
+        table = tables.identification
+        successes = _of_valve(table, valve, -_END_OF_TIME).where(table.c.refusal.is_(None))
+        with reading(self.place) as connection:
+            row = connection.execute(successes.order_by(table.c.id.desc()).limit(1)).first()
+            if row is None:
+                return None
+            found = entries_in(connection, [valve], row.time_ns, row.time_ns + 1)
+            last = next(one for one in reversed(found) if not one.refusal)
+            if last.friction is None:
+                raise ValueError("a success without coulomb_friction")
+        return last
+
+    def known_numbers(self, valve: str, built: Valve, since: int) -> KnownNumbers:
+        """Return the newest measurement of each number of a valve since a time, ns.
+
+        Only identifications with the parameters `built` of the valve count.
+        """
+        with reading(self.place) as connection:
+            return known_numbers_in(connection, valve, built, since)
+
+    def points(
+        self, valve: str, method: str, since: int = 0, baseline: Baseline | None = None
+    ) -> tuple[DatedNumber, ...]:
+        """Return a valve's frictions of one method, from `since` on (`friction_point`)."""
+        names = (method, *(old for old, new in FORMER_METHODS.items() if new == method))
+        table, parameter = tables.identification, tables.parameter
+        query = (
+            sa.select(table.c.time_ns, table.c.sliding_speed, parameter)
+            .select_from(joined(table, tables.valve, parameter))
+            .where(
+                tables.valve.c.name == valve,
+                table.c.method.in_(names),
+                table.c.time_ns >= since,
+                parameter.c.name.in_((SLIDING, "coulomb_friction", "viscous_friction")),
+            )
+            .order_by(table.c.time_ns, table.c.id)
+        )
+        with reading(self.place) as connection:
+            points = [
+                friction_point(time, parameters, speed, baseline)
+                for time, parameters, speed in frictions_in(
+                    connection.execute(query).mappings().all()
+                )
+            ]
+        return tuple(point for point in points if point is not None)
+
+    def valves(self) -> tuple[KeptValve, ...]:
+        """Return all valves, by name."""
+        with reading(self.place) as connection:
+            rows = connection.execute(sa.select(tables.valve.c.name, tables.valve.c.tag))
+            return tuple(sorted(KeptValve(*row) for row in rows))
+
+    def entries(
+        self,
+        valves: Sequence[str] | None = None,
+        since: int = -_END_OF_TIME,
+        until: int = _END_OF_TIME,
+    ) -> tuple[HistoryEntry, ...]:
+        """Return identifications, oldest first, of these valves or of all.
+
+        They lie from `since` on and before `until`, ns since 1970 (UTC).
+        """
+        with reading(self.place) as connection:
+            return entries_in(connection, valves, since, until)
+
+
+@dataclass(frozen=True)
+class HistoryFile(History):
+    """A history in SQLite.
+
+    Every method opens the file, so it may be moved, repaired or missing between two calls. Each
+    change is one transaction: a killed process leaves the change complete or absent, and
+    the file intact. All methods raise HistoryError if the file cannot be read or written.
+
+    Attributes
+    ----------
+    place : Path
+        The file. All processes that write to it must run on one machine.
+    """
+
+    place: Path
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.place
+
+    def prepare(self) -> None:
+        """Create the file if it is missing, and check that it can be written.
+
+        A file that another process is writing at the moment is not waited for, unless it is older.
+        """
+        if not is_ready(self.path):
+            with writing(self.path):
+                pass
+
+    def add(self, entry: HistoryEntry, days: float = 0.0) -> None:
+        """Add an identification; delete those of its valve that are `days` older, none for 0.
+
+        The newest baseline and the last success stay, at any age.
+        """
+        with writing(self.path) as connection:
+            valve = valve_id(connection, entry.valve)
+            insert_entry(connection, valve, entry)
+            if days > 0:
+                _forget(connection, valve, oldest_kept(entry.time, days))
+
+    def set_baseline(self, valve: KeptValve, kept: KeptBaseline) -> None:
+        """Make this the baseline of a valve."""
+        with writing(self.path) as connection:
+            insert_baseline(connection, valve_id(connection, valve), kept)
+
+
+def _forget(connection: Connection, valve: int, before: int) -> None:
+    """Delete the rows of a valve from before a time (ns), and settings without a reference."""
+    entry, baseline = tables.identification, tables.baseline
+    last_success = sa.select(sa.func.max(entry.c.id)).where(
+        entry.c.valve_id == valve, entry.c.refusal.is_(None)
+    )
+    kept = sa.func.coalesce(last_success.scalar_subquery(), 0)
+    old = (entry.c.valve_id == valve, entry.c.time_ns < before, entry.c.id != kept)
+    if connection.execute(sa.delete(entry).where(*old)).rowcount:
+        used = sa.select(entry.c.settings_id)
+        settings = tables.settings
+        connection.execute(sa.delete(settings).where(settings.c.id.not_in(used)))
+    newest = sa.select(sa.func.max(baseline.c.id)).where(baseline.c.valve_id == valve)
+    connection.execute(
+        sa.delete(baseline).where(
+            baseline.c.valve_id == valve,
+            baseline.c.time_ns < before,
+            baseline.c.id < newest.scalar_subquery(),
+        )
+    )
+
+
+# Ratios of a plant's valves, read from where one has stopped before
+
+
+class KeptRatio(NamedTuple):
+    """Friction of a valve over its baseline, and the row, valve's name and time (ns) of it."""
+
+    row: int
+    valve: str
+    time: int
+    ratio: float
+
+
+class HistoryMark(NamedTuple):
+    """Last identification, baseline and step of an alarm of a file; numbers of recordings, valves.
+
+    It changes when one of these is added; usage and moves, which are written often, leave it. Where
+    it is not `settled`, a row may still come before the last one: several write to a server, and
+    one that has begun earlier may end later. `database` tells a server's database from another one.
+    """
+
+    identification: int
+    baseline: int
+    alarms: int
+    valves: int
+    alarm_event: int = 0
+    settled: bool = True
+    database: str = ""
+
+
+def history_mark(file: History) -> HistoryMark:
+    """Return the mark of a file as it is now.
+
+    Raises HistoryError if the file cannot be read.
+    """
+    with reading(file.place) as connection:
+
+        def one(what: Any, table: sa.Table) -> int:
+            return int(connection.scalar(sa.select(what).select_from(table)) or 0)
+
+        found = HistoryMark(
+            one(sa.func.max(tables.identification.c.id), tables.identification),
+            one(sa.func.max(tables.baseline.c.id), tables.baseline),
+            one(sa.func.count(), tables.alarm_recording),
+            one(sa.func.count(), tables.valve),
+            one(sa.func.max(tables.alarm_event.c.id), tables.alarm_event),
+        )
+        if not isinstance(file.place, HistoryServer):
+            return found
+        now = sa.func.pg_current_snapshot()
+        under_way = sa.func.pg_snapshot_xmin(now) != sa.func.pg_snapshot_xmax(now)
+        return found._replace(
+            settled=not connection.scalar(sa.select(under_way)),
+            database=marked(connection, "identity") or "",
+        )
+
+
+def ratios_after(file: History, row: int, since: int) -> tuple[KeptRatio, ...]:
+    """Return the ratios of all valves in rows after one, made since a time, ns; oldest row first.
+
+    Raises HistoryError if the file cannot be read.
+    """
+    table = tables.identification
+    query = (
+        sa.select(table.c.id, tables.valve.c.name, table.c.time_ns, table.c.ratio)
+        .select_from(joined(table, tables.valve))
+        .where(table.c.id > row, table.c.time_ns >= since, table.c.ratio.is_not(None))
+        .order_by(table.c.id)
+    )
+    with reading(file.place) as connection:
+        return tuple(KeptRatio(*one) for one in connection.execute(query))

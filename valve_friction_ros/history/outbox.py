@@ -1,0 +1,498 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The way from a file to a server: rows wait in the file until the server has them.
+
+Triggers make each row wait that is added, changed or deleted, in the transaction that does so. One
+thread of a process, and one process of a machine, sends them; sent twice is sent once.
+"""
+
+import contextlib
+import json
+import queue
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection
+
+from valve_friction_ros.history import tables
+from valve_friction_ros.history.copying import PARTS, CopiedRow, Key, Part, rows_of, write_rows
+from valve_friction_ros.history.database import (
+    marked,
+    reading,
+    server_engine,
+    set_mark,
+    writing,
+)
+from valve_friction_ros.history.entry import KeptValve
+from valve_friction_ros.history.place import (
+    Claim,
+    HistoryError,
+    HistoryServer,
+    RowRefusedError,
+    file_state,
+)
+from valve_friction_ros.history.rows import valve_id
+from valve_friction_ros.history.tables import FILE_METADATA, has_table, put, unsent
+
+_VALVE = "valve"
+"""The part of a row of the valve itself, of which the tag may have changed."""
+
+_NOW = "CAST(strftime('%s', 'now') AS INTEGER)"
+
+_MANY = 500
+"""Rows of a transaction."""
+
+
+class Unsent(NamedTuple):
+    """A row that waits, by its number among those that wait, with its valve, part and key."""
+
+    number: int
+    valve: int
+    part: str
+    key: Key
+
+
+class UnsentCount(NamedTuple):
+    """How many rows wait, since when (s since 1970, UTC), and how many the server refuses."""
+
+    waiting: int
+    since: int | None
+    refused: int
+
+
+_NONE_WAIT = UnsentCount(0, None, 0)
+
+# The list of a file
+
+
+def _triggers() -> list[str]:
+    """Return the statements by which each change of a row makes it wait."""
+    found = [_trigger(_VALVE, (), event, "NEW", "id") for event in ("INSERT", "UPDATE")]
+    events = (("INSERT", "NEW"), ("UPDATE", "NEW"), ("DELETE", "OLD"))
+    for part in PARTS:
+        chosen = events[:1] if part.is_kept else events
+        found += [_trigger(part.name, part.key, *event) for event in chosen]
+    return found
+
+
+def _trigger(table: str, key: Sequence[str], event: str, row: str, valve: str = "valve_id") -> str:
+    keys = f"json_array({', '.join(f'{row}.{name}' for name in key)})"
+    same = f"valve_id = {row}.{valve} AND part = '{table}' AND key = {keys}"
+    return (
+        f"CREATE TRIGGER IF NOT EXISTS unsent_{table}_{event.lower()} "  # noqa: S608
+        f"AFTER {event} ON {table} BEGIN "
+        "INSERT INTO unsent (valve_id, part, key, since) "
+        f"SELECT {row}.{valve}, '{table}', {keys}, "
+        f"coalesce((SELECT min(since) FROM unsent WHERE {same}), {_NOW}); "
+        f"DELETE FROM unsent WHERE {same} AND number < (SELECT max(number) FROM unsent); END"
+    )
+
+
+def _fill(file: Connection) -> None:
+    """Have all rows wait."""
+    file.execute(sa.delete(unsent))
+    _have_wait(file, tables.valve.c.id, _VALVE, ())
+    for part in PARTS:
+        _fill_part(file, part)
+
+
+def _fill_part(file: Connection, part: Part) -> None:
+    key = [part.table.c[name] for name in part.key]
+    _have_wait(file, part.table.c.valve_id, part.name, key, part.order)
+
+
+def _have_wait(
+    file: Connection, owner: Any, part: str, key: Sequence[Any], order: Sequence[Any] = ()
+) -> None:
+    now: Any = sa.literal_column(_NOW)
+    rows = sa.select(owner, sa.literal(part), sa.func.json_array(*key), now).order_by(*order)
+    file.execute(unsent.insert().from_select(("valve_id", "part", "key", "since"), rows))
+
+
+def _not_followed(file: Connection) -> list[Part]:
+    """Return the parts whose changes do not wait: a newer version has added them."""
+    query = "SELECT name FROM sqlite_master WHERE type = 'trigger'"
+    there = {name for (name,) in file.exec_driver_sql(query)}
+    return [part for part in PARTS if f"unsent_{part.name}_insert" not in there]
+
+
+def follow(path: Path) -> None:
+    """Have all rows, and each change from now on, wait for a server, unless that is so already.
+
+    Raises HistoryError if the file cannot be written.
+    """
+    with contextlib.suppress(HistoryError), reading(path) as file:  # writing says what is wrong
+        if has_table(file, unsent) and not _not_followed(file):
+            return
+    with writing(path) as file:
+        is_new, added = not has_table(file, unsent), _not_followed(file)
+        FILE_METADATA.create_all(file)
+        for statement in _triggers():
+            file.exec_driver_sql(statement)
+        set_mark(file, "identity", uuid.uuid4().hex, is_kept=True)
+        if is_new:
+            _fill(file)
+        else:
+            for part in added:
+                _fill_part(file, part)
+
+
+def count_unsent(path: Path) -> UnsentCount:
+    """Count the rows that wait; there are none in a file that is not followed."""
+    counted = sa.select(
+        sa.func.count(), sa.func.min(unsent.c.since), sa.func.count(unsent.c.refusal)
+    )
+    with reading(path) as file:
+        if not has_table(file, unsent):
+            return _NONE_WAIT
+        waiting, since, refused = file.execute(counted.select_from(unsent)).one()
+    return UnsentCount(waiting - refused, since, refused)
+
+
+def _has_unsent(file: Connection, valve: int) -> bool:
+    waits = sa.and_(unsent.c.valve_id == valve, unsent.c.part != _VALVE)
+    return file.execute(sa.select(unsent.c.number).where(waits).limit(1)).first() is not None
+
+
+# Between file and server
+
+
+class _Batch(NamedTuple):
+    """Rows that wait, as they are now, by their numbers; None for one that is gone."""
+
+    waiting: Sequence[Unsent]
+    rows: Mapping[int, CopiedRow | None]
+    valves: Mapping[int, KeptValve]
+
+
+def _batch(path: Path, after: int) -> _Batch:
+    """Read the first rows that wait, and are not refused, of numbers after one."""
+    first = (
+        sa.select(unsent.c.number, unsent.c.valve_id, unsent.c.part, unsent.c.key)
+        .where(unsent.c.number > after, unsent.c.refusal.is_(None))
+        .order_by(unsent.c.number)
+        .limit(_MANY)
+    )
+    with reading(path) as file:
+        waiting = [
+            Unsent(number, valve, part, tuple(json.loads(key)))
+            for number, valve, part, key in file.execute(first)
+        ]
+        rows: dict[int, CopiedRow | None] = {}
+        for part in PARTS:
+            of_part = {one.number: (one.valve, one.key) for one in waiting if one.part == part.name}
+            chosen = rows_of(file, part, part.among(of_part.values())) if of_part else ()
+            found = {(valve, row.key): row for valve, row in chosen}
+            rows |= {number: found.get(key) for number, key in of_part.items()}
+        their = tables.valve.c.id.in_({one.valve for one in waiting})
+        valves = {
+            row.id: KeptValve(row.name, row.tag)
+            for row in file.execute(sa.select(tables.valve).where(their))
+        }
+    return _Batch(waiting, rows, valves)
+
+
+def send(path: Path, server: HistoryServer, is_over: Callable[[], bool]) -> None:
+    """Send the rows of a followed file that wait, some at least, until `is_over`.
+
+    Raises HistoryError if file or server cannot be read or written.
+    """
+    with writing(server) as new:
+        identity = marked(new, "identity") or ""
+    _send_to(path, identity)
+    after = 0
+    while (batch := _batch(path, after)).waiting:
+        try:
+            _deliver(path, server, batch)
+        except RowRefusedError:
+            _deliver_one_by_one(path, server, batch)
+        after = batch.waiting[-1].number
+        if is_over() or len(batch.waiting) < _MANY:  # what comes meanwhile is sent in a second
+            return
+
+
+def _send_to(path: Path, identity: str) -> None:
+    """Note which server gets the rows; all wait for it where another one has got them so far."""
+    with reading(path) as file:
+        noted = marked(file, "sent_to")
+    if noted != identity:
+        with writing(path) as file:
+            if noted is not None:
+                _fill(file)
+            set_mark(file, "sent_to", identity)
+
+
+def _deliver(path: Path, server: HistoryServer, batch: _Batch) -> None:
+    with writing(server) as new:
+        there = _rows_of_valves(new, batch.valves)
+        for part in PARTS:
+            _deliver_part(new, part, there, batch)
+    sent = [one.number for one in batch.waiting]
+    with writing(path) as file:  # a row that has changed since has another number, and stays
+        file.execute(sa.delete(unsent).where(unsent.c.number.in_(sent)))
+
+
+def _rows_of_valves(new: Connection, valves: Mapping[int, KeptValve]) -> dict[int, int]:
+    """Return the rows that valves have on the server, by their rows in the file."""
+    named = tables.valve.c.name.in_([one.name for one in valves.values()])
+    known = {
+        KeptValve(row.name, row.tag): row.id
+        for row in new.execute(sa.select(tables.valve).where(named))
+    }
+    ordered = sorted(valves.items(), key=lambda item: item[1])
+    return {here: known.get(one) or valve_id(new, one) for here, one in ordered}
+
+
+def _deliver_part(new: Connection, part: Part, there: Mapping[int, int], batch: _Batch) -> None:
+    of_part = [one for one in batch.waiting if one.part == part.name]
+    found = [(there[one.valve], batch.rows[one.number]) for one in of_part]
+    write_rows(new, part, [(valve, row) for valve, row in found if row is not None])
+    gone = [(there[one.valve], one.key) for one in of_part if batch.rows[one.number] is None]
+    if gone and not part.is_kept:
+        new.execute(sa.delete(part.table).where(part.among(gone)))
+
+
+def _deliver_one_by_one(path: Path, server: HistoryServer, batch: _Batch) -> None:
+    """Send what can be sent of rows among which the server refuses some, and note which."""
+    for one in batch.waiting:
+        try:
+            _deliver(path, server, batch._replace(waiting=[one]))
+        except RowRefusedError as error:  # noqa: PERF203 - each is tried
+            refused = sa.update(unsent).where(unsent.c.number == one.number)
+            with writing(path) as file:
+                file.execute(refused.values(refusal=str(error)))
+
+
+def take(path: Path, server: HistoryServer, valve: KeptValve, is_over: Callable[[], bool]) -> None:
+    """Take the rows of a valve from the server, where another file has kept it since.
+
+    Nothing is taken if rows of it wait here, or once `is_over`. Raises HistoryError if file or
+    server cannot be read or written.
+    """
+    with reading(path) as file:  # a copy on another machine is another file
+        name = f"{marked(file, 'identity') or ''}@{socket.gethostname()}"
+    keeper = tables.keeper
+    with writing(server) as there:
+        number = valve_id(there, valve)
+        kept_by = there.scalar(sa.select(keeper.c.file).where(keeper.c.valve_id == number))
+        if kept_by == name:
+            return
+        if kept_by is None or _put_into(path, valve, there, number, is_over):
+            put(there, keeper, [{"valve_id": number, "file": name}])
+
+
+def _put_into(
+    path: Path, valve: KeptValve, there: Connection, number: int, is_over: Callable[[], bool]
+) -> bool:
+    """Put the rows of a valve into the file in one transaction; tell whether that was done."""
+    taken = [(one, [*rows_of(there, one, one.table.c.valve_id == number)]) for one in PARTS]
+    with writing(path) as file:
+        here = valve_id(file, valve)
+        if is_over() or _has_unsent(file, here):
+            return False
+        for part, rows in taken:
+            if not part.is_kept:
+                file.execute(sa.delete(part.table).where(part.table.c.valve_id == here))
+            write_rows(file, part, [(here, row) for _, row in rows])
+        file.execute(sa.delete(unsent).where(unsent.c.valve_id == here))
+    return True
+
+
+# The thread
+
+_PAUSE = 1.0
+"""Time, s, between two looks at the file. Chosen: a person does not wait for a row."""
+
+_LONGEST_PAUSE = 30.0
+"""Longest time, s, between two tries. Chosen: a server that returns is not overrun."""
+
+_TAKING = 10.0
+"""Time, s, that nodes of a process wait for the server at their start, all together. Chosen."""
+
+_ENDING = 2.0
+"""Time, s, for which the end of a node waits for what is sent. Chosen: the rest is in the file."""
+
+_PLACE = "sender"
+"""By what processes of one machine agree which of them sends."""
+
+
+@dataclass(frozen=True)
+class SentState:
+    """What a sender knows.
+
+    Attributes
+    ----------
+    count : UnsentCount
+        Rows that wait.
+    problem : str or None
+        Why they are not sent; None: they are.
+    is_sending : bool
+        Whether this process sends the rows of the file; else another one does.
+    """
+
+    count: UnsentCount = _NONE_WAIT
+    problem: str | None = None
+    is_sending: bool = False
+
+
+class Sender:
+    """Sends what is new in a file to a server, and takes the rows of valves that come from there.
+
+    What is not sent waits in the file, so nothing is lost by whatever ends. One process of a
+    machine sends the rows of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    server : HistoryServer
+        The server.
+
+    Attributes
+    ----------
+    state : SentState
+        What is known now.
+    users : int
+        Nodes that have not ended it.
+    """
+
+    def __init__(self, path: Path, server: HistoryServer) -> None:
+        self._path, self.server = path, server
+        self._claim = Claim(path, _PLACE)
+        self._pulls: queue.SimpleQueue[tuple[KeptValve, Future[None]]] = queue.SimpleQueue()
+        self._wake, self._ends = threading.Event(), threading.Event()
+        self._begun = time.monotonic()
+        self._told: str | None = None
+        self.users = 0
+        self.state = SentState()
+        self._thread = threading.Thread(target=self._run, name="history sender", daemon=True)
+        self._thread.start()
+
+    def take(self, valve: KeptValve) -> str | None:
+        """Take the rows of a valve from the server, where another file has kept it since.
+
+        Returns why that could not be done, or None. It waits some seconds at most, for all valves
+        of a process together.
+        """
+        done: Future[None] = Future()
+        patience = max(_PAUSE, self._begun + _TAKING - time.monotonic())
+        if self.state.problem is not None:
+            return self.state.problem
+        self._pulls.put((valve, done))
+        self._wake.set()
+        try:
+            done.result(patience)
+        except TimeoutError:
+            done.cancel()
+            return f"{self.server}: no answer for {patience:.0f} s"
+        except HistoryError as error:
+            return str(error)
+        return None
+
+    def news(self) -> str | None:
+        """Return once what has changed between file and server, in words."""
+        problem = self.state.problem
+        if problem == self._told:
+            return None
+        before, self._told = self._told, problem
+        if problem is None:
+            return None if before is None else f"{self.server}: the history is sent again"
+        return f"the history waits in {self._path}: {problem}"
+
+    def end(self) -> None:
+        """Send what can be sent at once, and stop, where no other node of the process goes on."""
+        with _lock:
+            self.users -= 1
+            if self.users > 0:
+                return
+            _senders.pop((self._path, self.server), None)
+        self._ends.set()
+        self._wake.set()
+        self._thread.join(_ENDING)
+
+    def _run(self) -> None:
+        failures, looked, seen, ends = 0, -_LONGEST_PAUSE, None, False
+        while not ends:
+            ends = self._ends.is_set()
+            state, now = file_state(self._path), time.monotonic()
+            is_due = ends or self._has_work or state != seen or now - looked >= _LONGEST_PAUSE
+            if is_due:
+                seen, looked = state, now
+                failures = failures + 1 if self._problem_of_cycle() else 0
+            if not ends:
+                self._wake.wait(min(_PAUSE * 2 ** max(0, failures - 1), _LONGEST_PAUSE))
+                self._wake.clear()
+        with contextlib.suppress(HistoryError):
+            server_engine(self.server).dispose()
+        self._claim.release()
+
+    @property
+    def _has_work(self) -> bool:
+        state = self.state
+        waits = state.count.waiting > 0 or not self._pulls.empty()
+        return waits or state.problem is not None or not state.is_sending
+
+    def _problem_of_cycle(self) -> str | None:
+        """Send and take what there is, and note the state; return what has prevented it."""
+        problem, count = None, self.state.count
+        try:
+            self._cycle()
+        except HistoryError as error:
+            problem = str(error)
+        except Exception as bug:  # noqa: BLE001 - the thread lives on, and says what is wrong
+            problem = f"internal error: {type(bug).__name__}: {bug}"
+        try:
+            count = count_unsent(self._path)
+        except HistoryError as error:
+            problem = problem or str(error)
+        self.state = SentState(count, problem, self._claim.is_granted)
+        while problem is not None and not self._pulls.empty():
+            _, done = self._pulls.get()
+            if done.set_running_or_notify_cancel():
+                done.set_exception(HistoryError(problem))
+        return problem
+
+    def _cycle(self) -> None:
+        follow(self._path)
+        if self._claim.ask():
+            send(self._path, self.server, self._ends.is_set)
+        while not self._pulls.empty():
+            valve, done = self._pulls.get()
+            try:
+                take(self._path, self.server, valve, done.cancelled)
+            except HistoryError as error:
+                if done.set_running_or_notify_cancel():
+                    done.set_exception(error)
+                raise
+            if done.set_running_or_notify_cancel():
+                done.set_result(None)
+
+
+_senders: dict[tuple[Path, HistoryServer], Sender] = {}
+_lock = threading.Lock()
+
+
+def sender_of(path: Path, server: HistoryServer) -> Sender:
+    """Return the sender of a file, which all nodes of the process share; each calls `end`."""
+    with _lock:
+        key = (path.absolute(), server)
+        one = _senders.get(key)
+        if one is None:
+            one = _senders[key] = Sender(*key)
+        one.users += 1
+        return one

@@ -1,0 +1,631 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The force balance of the sliding stem: regressed, with all that the lag leaves open."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.engine.imperfections import (
+    IMPERFECTIONS,
+    MASS_PER_AREA,
+    zero_drift,
+)
+from valve_friction_ros.identification.engine.intervals import Budget, Estimated
+from valve_friction_ros.identification.engine.numbers import RECTANGLE
+from valve_friction_ros.identification.engine.sliding_averages import (
+    LAGS,
+    LARGEST_LAG,
+    WORK_LAGS,
+    Averages,
+    Work,
+    averaged_twice,
+)
+from valve_friction_ros.identification.engine.weights import inflation
+from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
+from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE, NORMAL_QUANTILE
+from valve_friction_ros.identification.units import SLIDING
+from valve_friction_ros.model.valve import Valve
+
+_Array = NDArray[np.float64]
+
+_USUAL_LAG = 10e-3
+"""Scale, s, of the lag's prior, Student's t of two degrees of freedom, without a stated one.
+
+Stamps of one controller agree to some milliseconds; transmitters with damping, tubing and clocks of
+their own add up to tens. Half of the plants lie within 0.8 of it, 95 % within 43 ms."""
+
+_USUAL_VISCOUS = 1.0
+"""Scale of the prior of viscous over dry friction at the sliding speed, Student's t of two degrees
+of freedom. The packings of the paper have 0.3 to 0.8."""
+
+SECOND_ORDER = 0.025
+"""Time, s, whose square halved, times k, bounds what a lag does beyond a shift."""
+
+_STRIBECK_SPEEDS = np.geomspace(0.04, 0.6, 8)
+_STRIBECK_WORTH = 1.05
+_STRIBECK_OPEN = 1.08
+"""Stribeck speeds over twice the mean speed; by how much one must lower the residual to be taken;
+and up to which residual others stay open."""
+
+_CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "drift", "mass")
+"""Terms of the force that are not friction."""
+
+_OUTLIER = 5.0
+_LEAST_MISFIT = 3e-4
+"""Deviations beyond which an average is left out, and the share of the friction to which no force
+balance is trusted further."""
+
+_CHANCE, _OVERLAP, _LEAST_SHARED = 3.0, 3.0, 1e-9
+"""Deviations of chance that the share of the information must exceed which both halves have in
+common; averages that tell as much as one that does not overlap with others; a share of nothing."""
+
+_BINS = 12
+"""Bins of the friction curve in each direction."""
+
+_BLOCKS = (6, 60)
+_LARGEST_SCATTER = 25.0
+"""Least and largest number of strokes whose scatter widens the covariance, and the factor by which
+it does so at most."""
+
+
+@dataclass(frozen=True)
+class LagPrior:
+    """What is known of the time by which the stem is seen late, before the record is.
+
+    Attributes
+    ----------
+    deviation : float or None
+        Standard deviation of a Gaussian, s; None for the heavy-tailed prior of a plant whose timing
+        nobody has stated.
+    """
+
+    deviation: float | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there certainly is no lag."""
+        return self.deviation == 0.0
+
+    def precision(self, lag: float) -> float:
+        """Return the precision, 1/s², of a Gaussian that stands for the prior at `lag`."""
+        if self.deviation is not None:
+            return 1.0 / max(self.deviation, 1e-9) ** 2
+        return 1.0 / (4.0 * _USUAL_LAG**2 + lag**2)
+
+    def log_density(self, lags: _Array) -> _Array:
+        """Return the logarithm of the density at each lag, s, but for a constant."""
+        if self.deviation is not None:
+            return np.asarray(-0.5 * (lags / max(self.deviation, 1e-9)) ** 2)
+        return _heavy_tailed(lags / _USUAL_LAG)
+
+
+def _heavy_tailed(deviations: _Array) -> _Array:
+    """Return the logarithm of Student's t density of two degrees of freedom, but for a constant."""
+    return np.asarray(-1.5 * np.log1p(deviations**2 / 2.0))
+
+
+_DEVIATIONS: _Array = np.linspace(-9.0, 9.0, 3601, dtype=np.float64)
+_PROBABILITIES: _Array = np.array([0.5 * math.erfc(-one / math.sqrt(2.0)) for one in _DEVIATIONS])
+
+
+def _normal(deviations: _Array) -> _Array:
+    """Return the normal distribution function, to 1e-6."""
+    return np.interp(deviations, _DEVIATIONS, _PROBABILITIES)
+
+
+class _Solved(NamedTuple):
+    """The regression at one lag and one Stribeck speed, in columns scaled to one size."""
+
+    lag: float
+    estimate: _Array
+    covariance: _Array
+    residual: list[_Array]
+    weight: _Array
+    columns: list[_Array]
+    precision: _Array
+    expected: _Array
+    scale: _Array
+
+    @property
+    def misfit(self) -> float:
+        """Deviation of the residual, N, by its median."""
+        return float(np.median(np.abs(self.residual[0] + self.residual[1]))) / 1.35
+
+
+class Regression:
+    """The force balance of one record at one averaging time."""
+
+    def __init__(
+        self,
+        averages: Averages,
+        work: Work,
+        valve: Valve,
+        lag: LagPrior,
+        fixed: Mapping[str, float],
+    ) -> None:
+        self.averages, self.lag, self.fixed = averages, lag, fixed
+        taken, velocity = averages.taken, averages.mean_velocity
+        position = 0.5 * (averages.position[0] + averages.position[1])
+        force = 0.5 * (averages.force[0] + averages.force[1])
+        side = np.sign(velocity)
+        low, range_ = float(position.min()), float(np.ptp(position))
+        self.range, self.middle = range_, low + 0.5 * range_
+        age: _Array = np.linspace(-1.0, 1.0, position.size, dtype=np.float64)
+        plain = np.column_stack([side, velocity, position, np.ones_like(velocity)])[taken]
+        size = np.abs(plain).max(axis=0)
+        first = np.linalg.lstsq(plain / size, force[taken], rcond=1e-9)[0] / size
+        span = float(np.ptp(force))
+        usual = float(np.mean(np.abs(velocity[taken])))
+        self.friction = max(abs(first[0] + first[1] * usual), 1e-4 * span)
+        self.spring = 0.0 if fixed.get("spring_constant") == 0.0 else abs(float(first[2]))
+        places = [(2.0 * half - 2.0 * low) / range_ - 1.0 for half in averages.position]
+        accelerations = [np.gradient(half, averages.time) for half in averages.velocity]
+        if self.spring > 0.0:
+            calm = 2 * averages.length + 1
+            accelerations = [averaged_twice(one, calm) for one in accelerations]
+        self.inertia = MASS_PER_AREA * (valve.diaphragm_area or 0.0)
+        if valve.diaphragm_area is None:
+            fastest = float(np.quantile(np.abs(accelerations[0][taken]), 0.98))
+            self.inertia = span / max(fastest, np.finfo(float).tiny)
+        stiff = self.spring * range_
+        minutes = float(averages.time[-1] - averages.time[0]) / 60.0
+        shares = {name: one.deviation for name, one in IMPERFECTIONS.items()}
+        both = [np.ones_like(velocity)] * 2
+        terms: dict[str, tuple[list[_Array], float]] = {
+            "coulomb_friction": ([side, side], math.inf),
+            "viscous_friction": (averages.velocity, math.inf),
+            "spring_preload": (both, math.inf),
+            "spring_constant": (averages.position, math.inf),
+            "curvature": ([one**2 - 1.0 / 3.0 for one in places], shares["curvature"] * stiff),
+            "cubic": ([one * (one * one - 0.6) for one in places], shares["cubic"] * stiff),
+            "drift": ([age, age], zero_drift(span, minutes)),
+            "along_travel": (
+                [side * one for one in places],
+                shares["along_travel"] * self.friction,
+            ),
+            "in_record": ([side * age] * 2, shares["in_record"] * self.friction),
+            "viscous_asymmetry": (
+                [np.abs(half) - usual for half in averages.velocity],
+                shares["viscous_asymmetry"] * self.friction / averages.speed,
+            ),
+            "mass": (accelerations, math.inf),
+        }
+        if self.spring == 0.0:
+            for name in ("spring_constant", "curvature", "cubic"):
+                del terms[name]
+        self.known = [
+            sum(value * terms[name][0][half] for name, value in fixed.items() if name in terms)
+            for half in (0, 1)
+        ]
+        for name in fixed.keys() & (terms.keys() - {"mass"}):
+            del terms[name]
+        self.names = tuple(terms)
+        self.columns = [
+            np.column_stack([column[half][taken] for column, _ in terms.values()])
+            for half in (0, 1)
+        ]
+        self.precision = np.array([deviation**-2.0 for _, deviation in terms.values()])
+        self.work, self.strokes, self.velocity = work, work.strokes, velocity
+        place = 2.0 * (work.position - low) / range_ - 1.0
+        self.kept = {
+            name: float(work.along @ term)
+            for name, term in {
+                "spring_preload": np.ones_like(place),
+                "spring_constant": work.position,
+                "curvature": place**2 - 1.0 / 3.0,
+                "cubic": place**3 - 0.6 * place,
+                "drift": np.interp(work.time, averages.time, age),
+            }.items()
+        }
+        self.sliding_speed = work.speed
+        self.independent = max(taken.size / _OVERLAP, 1.0)
+        self.slopes = [np.gradient(half, averages.time) for half in averages.force]
+
+        self.slips: dict[float, _Array] = {}
+
+    def falling(self, velocity: _Array, stribeck: float) -> _Array:
+        """Share of the slip force that is left at each velocity."""
+        return np.asarray(np.exp(-((velocity / stribeck) ** 2)))
+
+    def slip(self, stribeck: float) -> _Array:
+        """Regressor of the slip force at the averages that are taken."""
+        if stribeck not in self.slips:
+            velocity = self.velocity[self.averages.taken]
+            self.slips[stribeck] = np.sign(velocity) * self.falling(velocity, stribeck)
+        return self.slips[stribeck]
+
+    def solve(
+        self, lag: float, stribeck: float, variance: float, weight: _Array | None = None
+    ) -> _Solved:
+        """Solve the linear part, about a lag (s); `variance` (N²) is that of an average."""
+        averages, taken = self.averages, self.averages.taken
+        at = averages.time[taken] - lag
+        forces = [
+            np.interp(at, averages.time, averages.force[half]) - _at(self.known[half], taken)
+            for half in (0, 1)
+        ]
+        columns, precision = self.columns, self.precision.copy()
+        second = self.spring * (SECOND_ORDER**2 + lag**2) / 2.0
+        precision[self.names.index("mass")] = 1.0 / max(self.inertia + second, 1e-9) ** 2
+        if not self.lag.is_known:
+            slopes = [np.interp(at, averages.time, slope) for slope in self.slopes]
+            columns = [np.column_stack(pair) for pair in zip(columns, slopes, strict=True)]
+            precision = np.append(precision, self.lag.precision(lag))
+        if stribeck > 0:
+            columns = [np.column_stack([one, self.slip(stribeck)]) for one in columns]
+            precision = np.append(precision, (1.5 * self.friction) ** -2.0)
+        scale = np.abs(columns[0]).max(axis=0)
+        scale[scale <= 1e-12 * scale.max()] = 1.0
+        columns = [one / scale for one in columns]
+        precision = precision / scale**2
+        expected = np.zeros(scale.size)
+        if not self.lag.is_known:
+            expected[len(self.names)] = -lag * scale[len(self.names)]
+        weight = np.ones(taken.size) if weight is None else weight
+        even, odd = columns
+        cross = even.T @ (odd * weight[:, None])
+        own = 0.5 * (even.T @ (even * weight[:, None]) + odd.T @ (odd * weight[:, None]))
+        right = 0.5 * (even.T @ (weight * forces[1]) + odd.T @ (weight * forces[0]))
+        shared, right = _shared(own, 0.5 * (cross + cross.T), right, self.independent)
+        information = shared / variance + np.diag(precision)
+        unit = 1.0 / np.sqrt(np.diag(information))
+        covariance = np.linalg.pinv(
+            information * np.outer(unit, unit), rcond=1e-13, hermitian=True
+        ) * np.outer(unit, unit)
+        estimate = covariance @ (right / variance + precision * expected)
+        residual = [force - one @ estimate for force, one in zip(forces, columns, strict=True)]
+        return _Solved(
+            lag, estimate, covariance, residual, weight, columns, precision, expected, scale
+        )
+
+    def noise_variance(self, solved: _Solved) -> float:
+        """Variance of an average that the sensors explain, N²."""
+        noise, values = self.averages.noise, self.values(solved)
+        viscous = values.get("viscous_friction", self.fixed.get("viscous_friction", 0.0))
+        return float(
+            noise["force"] ** 2
+            + (viscous * noise["velocity"]) ** 2
+            + (self.spring * noise["position"]) ** 2
+        )
+
+    def values(self, solved: _Solved) -> dict[str, float]:
+        """Return the coefficients by name, SI units."""
+        return dict(zip(self.names, (solved.estimate / solved.scale).tolist(), strict=False))
+
+    def later(self, solved: _Solved) -> float:
+        """Return the lag that the solution asks for, s."""
+        if self.lag.is_known:
+            return 0.0
+        index = len(self.names)
+        change = float(solved.estimate[index] / solved.scale[index])
+        return float(np.clip(solved.lag + change, -LARGEST_LAG, LARGEST_LAG))
+
+    def descended(self, stribeck: float) -> tuple[_Solved, float]:
+        """Follow lag and variance to where they agree, outliers left out; the variance too."""
+        lag, variance = 0.0, (3e-2 * self.friction) ** 2
+        weight: _Array = np.ones(self.averages.taken.size)
+        for _ in range(4):
+            solved = self.solve(lag, stribeck, 3.0 * variance, weight)
+            total, misfit = np.abs(solved.residual[0] + solved.residual[1]), solved.misfit
+            usual = 1.35 * _OUTLIER * misfit + 1e-9 * self.friction
+            weight = (total <= usual).astype(np.float64)
+            floor = (_LEAST_MISFIT * self.friction) ** 2
+            variance = max(misfit**2, 0.5 * self.noise_variance(solved), floor)
+            lag = self.later(solved)
+        return solved._replace(weight=weight), variance
+
+    def posterior(self) -> "Posterior":
+        """Solve for the best Stribeck speed."""
+        found = {
+            speed: self.descended(speed)[0]
+            for speed in (0.0, *(self.averages.speed * _STRIBECK_SPEEDS).tolist())
+        }
+        dry = self.names.index("coulomb_friction") if "coulomb_friction" in self.names else -1
+        falling = {
+            speed: one
+            for speed, one in found.items()
+            if not speed or (one.estimate[-1] > 0 and one.estimate[dry] > 0)
+        }
+        misfits = {speed: one.misfit for speed, one in falling.items()}
+        best = min(misfits, key=misfits.__getitem__)
+        stribeck = 0.0 if misfits[0.0] < _STRIBECK_WORTH * misfits[best] else best
+        solved = found[stribeck]
+        near = [
+            {
+                name: float(gradient @ (one.estimate / one.scale))
+                for name, gradient in self.gradients(speed, one).items()
+            }
+            for speed, one in falling.items()
+            if misfits[speed] < _STRIBECK_OPEN * misfits[stribeck]
+            and abs(one.lag - solved.lag) < _USUAL_LAG
+        ]
+        inflated = 3.0
+        for _ in range(3):
+            mean = 0.5 * (solved.residual[0] + solved.residual[1]) * solved.weight
+            count = max(float(np.sum(solved.weight)), 1.0)
+            lasting = float(np.sum(solved.weight * solved.residual[0] * solved.residual[1])) / count
+            floor = (_LEAST_MISFIT * self.friction) ** 2
+            variance = self.noise_variance(solved) + max(lasting, floor)
+            power = float(mean @ mean) / count
+            inflated = max(power / variance, 1.0) * inflation(
+                mean / math.sqrt(max(power, np.finfo(float).tiny)),
+                max(mean.size // self.strokes, 1),
+            )
+            solved = self.solve(self.later(solved), stribeck, variance * inflated, solved.weight)
+        return Posterior(self, solved, variance * inflated, inflated, stribeck, near)
+
+    def definition(self, name: str, solved: _Solved) -> float:
+        """Deviation of a number by what it means where it is not one, as in `reported_numbers`.
+
+        A friction that changes by ±a along the travel or during the record lies anywhere within
+        ±a, and so does the slope of a curved spring, or a zero that drifts.
+        """
+        values = self.values(solved)
+        if name in ("coulomb_friction", "static_friction"):
+            return RECTANGLE * math.hypot(values["along_travel"], values["in_record"])
+        if name not in ("spring_constant", "spring_preload"):
+            return 0.0
+        bow = abs(values.get("curvature", 0.0)) + abs(values.get("cubic", 0.0))
+        stiffness = 4.0 * bow / self.range
+        if name == "spring_constant":
+            return RECTANGLE * stiffness
+        return RECTANGLE * math.hypot(bow, stiffness * abs(self.middle), values["drift"])
+
+    def beside(self, name: str, lags: _Array) -> _Array:
+        """Return what a number holds beside its coefficients at each lag: the work of the force."""
+        if name != SLIDING:
+            return np.zeros(lags.size)
+        known = sum(
+            value * self.kept[name] for name, value in self.fixed.items() if name in self.kept
+        )
+        return np.asarray(np.interp(lags, WORK_LAGS, self.work.by_lag) - known)
+
+    def gradients(self, stribeck: float, solved: _Solved) -> dict[str, _Array]:
+        """Return how each number depends on the coefficients.
+
+        The sliding friction is the work of the measured force less what spring, preload and mass
+        keep, over the distance: no law of friction and no speed takes part.
+        """
+        axes = np.eye(solved.scale.size)
+        at = {name: axes[index] for index, name in enumerate(self.names)}
+        wanted = ["coulomb_friction", "viscous_friction", "spring_constant", "spring_preload"]
+        if self.spring == 0.0:
+            wanted.append("mass")
+        result = {name: at[name] for name in wanted if name in at}
+        if stribeck > 0 and "coulomb_friction" in at:
+            result["static_friction"] = at["coulomb_friction"] + axes[-1]
+        sliding = -sum(
+            (self.kept[name] * at[name] for name in self.kept if name in at), 0.0 * axes[0]
+        )
+        result[SLIDING] = sliding
+        if {"coulomb_friction", "viscous_friction"} <= at.keys():
+            result[SPEED_EXPONENT] = self._exponent(stribeck, solved)
+        return result
+
+    def _exponent(self, stribeck: float, solved: _Solved) -> _Array:
+        """Return how d ln F / d ln v at the sliding speed depends on the coefficients.
+
+        The friction F itself is taken as known: it is so to a few per cent, the slope is not.
+        """
+        speed, values = self.sliding_speed, self.values(solved)
+        slope = np.zeros(solved.scale.size)
+        slope[self.names.index("viscous_friction")] = speed
+        friction = values["coulomb_friction"] + values["viscous_friction"] * speed
+        if stribeck > 0:
+            left = math.exp(-((speed / stribeck) ** 2))
+            slope[-1] = -2.0 * (speed / stribeck) ** 2 * left
+            friction += left * float(solved.estimate[-1] / solved.scale[-1])
+        return np.asarray(slope / max(friction, 0.1 * self.friction))
+
+    def bins(self, solved: _Solved) -> tuple[_Array, _Array, _Array]:
+        """Return friction over speed: what is left of the force without spring and preload."""
+        averages, taken = self.averages, self.averages.taken
+        keep = np.array([name in _CONSERVATIVE for name in self.names])
+        rest = [
+            residual
+            + columns @ solved.estimate
+            - columns[:, : keep.size][:, keep] @ solved.estimate[: keep.size][keep]
+            for residual, columns in zip(solved.residual, solved.columns, strict=True)
+        ]
+        velocity, friction = averages.mean_velocity[taken], 0.5 * (rest[0] + rest[1])
+        order = np.argsort(velocity)
+        order = order[solved.weight[order] > 0]
+        ways = (order[velocity[order] < 0], order[velocity[order] > 0])
+        parts = [part for way in ways for part in np.array_split(way, _BINS) if part.size >= 2]
+        return (
+            np.array([float(np.mean(velocity[part])) for part in parts]),
+            np.array([float(np.mean(friction[part])) for part in parts]),
+            np.array([float(np.std(friction[part])) / math.sqrt(part.size) for part in parts]),
+        )
+
+
+def _at(signal: "_Array | float", taken: NDArray[np.intp]) -> "_Array | float":
+    return signal[taken] if isinstance(signal, np.ndarray) else signal
+
+
+def _shared(own: _Array, cross: _Array, right: _Array, independent: float) -> tuple[_Array, _Array]:
+    """Return the information that both halves share, and the right-hand side that goes with it.
+
+    Along each direction the halves agree in a share s of what each of them holds, which n averages
+    know to (1 − s)/√n. What chance may have made of noise says nothing: the prior is left alone.
+    """
+    values, vectors = np.linalg.eigh(own)
+    root = np.sqrt(np.maximum(values, max(1e-13 * float(values[-1]), np.finfo(float).tiny)))
+    shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
+    back = (vectors * root) @ turned
+    shares = np.clip(shares, _LEAST_SHARED, 1.0)
+    chance = _CHANCE * (1.0 - shares) / math.sqrt(independent)
+    sure = np.maximum(1.0 - (chance / shares) ** 2, 0.0)
+    information = (back * np.maximum(sure * shares, _LEAST_SHARED)) @ back.T
+    said = sure * (turned.T @ ((vectors / root).T @ right))
+    return np.asarray(information), np.asarray(back @ said)
+
+
+class Posterior:
+    """What a solved regression leaves open: Gaussian but for the lag, which is integrated.
+
+    The likelihood of the lag times its prior, and times the probability that F_c and F_v are above
+    zero at that lag, is its posterior. At each lag all else is Gaussian.
+    """
+
+    def __init__(
+        self,
+        regression: Regression,
+        solved: _Solved,
+        variance: float,
+        inflation: float,
+        stribeck: float,
+        near: Sequence[Mapping[str, float]],
+    ) -> None:
+        self.regression, self.solved = regression, solved
+        self.inflation, self.stribeck, self.near = inflation, stribeck, near
+        covariance, count = solved.covariance, solved.weight.size
+        blocks = np.array_split(np.arange(count), int(np.clip(regression.strokes, *_BLOCKS)))
+        scores = np.stack(
+            [
+                0.5
+                / variance
+                * sum(
+                    (solved.weight[block] * solved.residual[1 - half][block])
+                    @ solved.columns[half][block]
+                    for half in (0, 1)
+                )
+                for block in blocks
+            ]
+        )
+        self.scatter = (
+            covariance @ (scores.T @ scores) @ covariance * len(blocks) / (len(blocks) - 1)
+        )
+        velocity = regression.averages.mean_velocity[regression.averages.taken]
+        left = velocity * (solved.residual[0] + solved.residual[1]) / 2.0
+        of_blocks = np.array([np.sum(left[block]) for block in blocks]) / np.sum(np.abs(velocity))
+        self.work_scatter = float(np.std(of_blocks, ddof=1)) * math.sqrt(len(blocks))
+        self.information = 0.0
+        self.lags: _Array = np.zeros(1)
+        self.probability: _Array = np.ones(1)
+        self.exchanged, self.less_viscous = 0.0, 0.0
+        self.log_likelihood = None if regression.lag.is_known else self._of_lags()
+        if self.log_likelihood is not None:
+            self.lags, self.probability = LAGS, self.weighed(self.log_likelihood)
+            self._exchange()
+        self.of_record = self.probability
+
+    def _of_lags(self) -> _Array:
+        """Return the logarithm of the likelihood of each lag, the most likely at 0."""
+        solved, index = self.solved, len(self.regression.names)
+        variance = float(solved.covariance[index, index])
+        prior = float(solved.precision[index])
+        precision = max(1.0 / variance - prior, 1e-6 * prior)
+        mean = (solved.estimate[index] / variance - prior * solved.expected[index]) / precision
+        if precision > 0.05 * prior:
+            precision /= max(float(self.scatter[index, index]) / variance, 1.0)
+        self.information = precision * float(solved.scale[index]) ** 2
+        self.changes = (LAGS - solved.lag) * solved.scale[index]
+        log = -0.5 * precision * (self.changes - mean) ** 2
+        for name in ("coulomb_friction", "viscous_friction"):
+            if name in self.regression.names:
+                gradient = np.eye(solved.scale.size)[self.regression.names.index(name)]
+                centre, slope, width = self._given_lag(gradient)
+                value = centre + slope * (self.changes - solved.estimate[index])
+                log = log + np.log(np.maximum(_normal(value / width), 1e-10))
+                if name == "viscous_friction":
+                    log = log + self._of_viscous(value)
+        return np.asarray(log - log.max())
+
+    def _of_viscous(self, viscous: _Array) -> _Array:
+        """Return the logarithm of the prior density of each viscous friction, N·s/m."""
+        dry = self.regression.values(self.solved).get("coulomb_friction", 0.0)
+        if not dry > 0:
+            return np.zeros_like(viscous)
+        share = np.maximum(viscous, 0.0) * self.regression.sliding_speed / dry
+        return _heavy_tailed(share / _USUAL_VISCOUS)
+
+    def weighed(self, log_likelihood: _Array) -> _Array:
+        """Return the probability of each lag, by its prior and a likelihood."""
+        log = self.regression.lag.log_density(LAGS) + log_likelihood
+        probability = np.exp(log - log.max())
+        return np.asarray(probability / np.sum(probability))
+
+    def _exchange(self) -> None:
+        """Weigh the other order of two lags.
+
+        A stem with the delay F_v/k behind a sensor or a volume with the lag τ looks, while it
+        slides, as one with the delay τ behind a lag F_v/k. Only their priors tell them apart.
+        """
+        values = self.regression.values(self.solved)
+        spring, viscous = values.get("spring_constant", 0.0), values.get("viscous_friction", 0.0)
+        lag = float(self.probability @ self.lags)
+        if not (spring > 0 and viscous > spring * max(lag, 0.0)):
+            return
+        delays = np.array([max(lag, 0.0), viscous / spring])
+        both = self.regression.lag.log_density(delays)
+        both = both + self._of_viscous(spring * delays[::-1])
+        self.exchanged = 1.0 / (1.0 + math.exp(min(float(both[0] - both[1]), 700.0)))
+        self.less_viscous = viscous - spring * max(lag, 0.0)
+
+    def _given_lag(self, gradient: _Array) -> tuple[float, float, float]:
+        """Return a number, its slope over the lag's coefficient, and its deviation at that lag."""
+        solved, index = self.solved, len(self.regression.names)
+        value = float(gradient @ solved.estimate)
+        variance = float(gradient @ solved.covariance @ gradient)
+        widened = float(gradient @ self.scatter @ gradient) / max(variance, np.finfo(float).tiny)
+        factor = float(np.clip(widened, 1.0, _LARGEST_SCATTER))
+        if self.regression.lag.is_known:
+            return value, 0.0, math.sqrt(max(factor * variance, np.finfo(float).tiny))
+        own = float(solved.covariance[index, index])
+        slope = float(gradient @ solved.covariance[:, index]) / own
+        rest = max(variance - slope**2 * own, 1e-9 * variance)
+        return value, slope, math.sqrt(max(factor * rest, np.finfo(float).tiny))
+
+    def number(self, name: str, gradient: _Array, spread: float) -> Estimated:
+        """Return a number with its interval; `spread` is that of other Stribeck speeds."""
+        centre, slope, width = self._given_lag(gradient)
+        beside = self.regression.beside(name, self.lags)
+        values, weights = centre + beside, self.of_record if name == SLIDING else self.probability
+        record, rival = math.hypot(width, spread), math.nan
+        if self.lags.size > 1:
+            index = len(self.regression.names)
+            values = values + slope * (self.changes - self.solved.estimate[index])
+        if self.exchanged > 0:
+            viscous = self.regression.names.index("viscous_friction")
+            less = gradient[viscous] * self.solved.scale[viscous] * self.less_viscous
+            later = self.less_viscous / self.regression.values(self.solved)["spring_constant"]
+            changed = np.interp(self.lags + later, self.lags, beside) - beside
+            if later < LARGEST_LAG:
+                rival = float(weights @ (values - less + changed))
+            values = np.concatenate([values, values - less + changed])
+            weights = np.concatenate([(1.0 - self.exchanged) * weights, self.exchanged * weights])
+        mean = float(weights @ values)
+        timing = math.sqrt(float(weights @ (values - mean) ** 2))
+        low, high = 0.0, 20.0 * math.hypot(record, timing)
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            inside = _normal((mean + middle - values) / record)
+            inside = inside - _normal((mean - middle - values) / record)
+            low, high = (middle, high) if weights @ inside < CONFIDENCE else (low, middle)
+        # The tails of the lag are heavier than normal ones: its share is that of the interval.
+        whole = high / NORMAL_QUANTILE
+        timing = min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
+        return Estimated(mean, high, Budget(record, timing, {}, timing * self._unsaid()), rival)
+
+    def _unsaid(self) -> float:
+        """Return the share of what the lag leaves open that comes from its prior, not from noise.
+
+        Of a Gaussian the variance that is left times the information of the record is the other
+        part of 1.
+        """
+        mean = float(self.probability @ self.lags)
+        variance = float(self.probability @ (self.lags - mean) ** 2)
+        return math.sqrt(max(1.0 - variance * self.information, 0.0))

@@ -1,0 +1,214 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The stem of a Karnopp valve with imperfections, simulated for a fitted record."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.engine.coordinates import (
+    Coordinates,
+    jacobian,
+    physical,
+    straight,
+)
+from valve_friction_ros.identification.engine.driven_stem import (
+    Course,
+    Place,
+    drive_stem,
+    read_slopes,
+    read_stem,
+)
+from valve_friction_ros.identification.engine.fitted_record import FittedRecord
+from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING
+from valve_friction_ros.identification.engine.weights import reading_weights
+
+ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
+"""Nothing imperfect; the mass has to be set."""
+
+_LARGEST_COARSENESS = 10.0
+"""Of the imperfections but the timing, whose changes are wide already."""
+
+_STEPPED, _STEPPED_BY_CHORDS = 30, 90
+"""Time of a step with an event over that of one that takes a short cut; where friction falls with
+speed, chords follow it through such a step."""
+
+SWINGING = 2e-3
+_OVER_SWING = 1e-3
+"""A delay F_v/k, s, below which a stem may swing, and the change by which to differentiate there:
+through the swings a small one means nothing."""
+
+_STEP = 1e-5
+"""Change of a main coordinate over its size by which to differentiate.
+
+The main coordinates nearly make up for one another, so their derivatives must be good to four
+digits and more; the simulation is exact, so the step may be small."""
+
+
+class Simulated(NamedTuple):
+    """The stem at each step: position (m) and velocity (m/s)."""
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BroadModel:
+    """Simulates the stem of a fitted record.
+
+    The slow terms are evaluated along the measured stem, which is known to within its noise. With
+    the place ξ and the age τ (both −1 to 1), the force that drives the simulated stem is
+
+        F(t) − c·k·R·(ξ² − 1/3) − c₃·k·R·(ξ³ − 3ξ/5) + d·ΔF·τ ,
+
+    and the friction, sliding or at rest, has in addition
+
+        (a·ξ + b·τ)·F_c + e·F_c·exp(−|ẋ|/3 mm/s) .
+
+    Attributes
+    ----------
+    record : FittedRecord
+        The record.
+    usual_spring : float
+        Spring constant, N/m, by which noise of the force counts as noise of the stem. It is the
+        same throughout a fit, so that no fit gains by a spring that makes the noise count less.
+    coarseness : float
+        Factor of the changes by which to differentiate. Far from the end of a fit, wide ones see
+        over the kinks at which a stem stops or breaks away; with 1 the derivatives are exact.
+    """
+
+    record: FittedRecord
+    usual_spring: float
+    coarseness: float = 1.0
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """One over the effective deviation of each reading, 1/m."""
+        return reading_weights(self.record, self.usual_spring)
+
+    @cached_property
+    def foreseen_difference(self) -> float:
+        """Sum of the squares of half the difference of both halves' weighted readings, by noise."""
+        shares = self.weights**2 * self.record.force_variance
+        return float(np.sum(shares)) / self.usual_spring**2
+
+    def course(self, force: NDArray[np.float64]) -> Course:
+        """Return what drives the stem, and the slow terms along it."""
+        record, slow = self.record, self.record.slow
+        return Course(
+            record.period,
+            record.travel,
+            slow.range,
+            float(np.ptp(record.force)),
+            force,
+            slow.place,
+            slow.age,
+            slow.slowness,
+            record.anew,
+            record.leaving,
+        )
+
+    @cached_property
+    def halves(self) -> tuple[Course, Course]:
+        """The same driven by each half of the samples of the pressure."""
+        even, odd = self.record.halves
+        return self.course(even), self.course(odd)
+
+    @cached_property
+    def _room(self) -> NDArray[np.float64]:
+        """Room for the derivatives of one simulation by all coordinates."""
+        return np.empty(2 * self.record.force.size * len(Place._fields))
+
+    def simulate(self, at: Coordinates) -> Simulated:
+        """Simulate the stem itself."""
+        force = np.empty_like(self.record.force)
+        position, velocity = np.empty_like(force), np.empty_like(force)
+        drive_stem(self.course(self.record.force), Place(**at), force, position, velocity)
+        return Simulated(position, velocity)
+
+    def effort(self, at: Coordinates) -> int:
+        """Return the work of one simulation, in steps that take a short cut."""
+        force = np.empty_like(self.record.force)
+        stepped = drive_stem(
+            self.course(self.record.force),
+            Place(**at),
+            force,
+            np.empty_like(force),
+            np.empty_like(force),
+        )
+        return force.size + (_STEPPED_BY_CHORDS if at["stribeck_velocity"] else _STEPPED) * stepped
+
+    def readings(self, at: Coordinates) -> NDArray[np.float64]:
+        """Return what the stem's sensor would read, m, a value a cell, by each half: (2, c)."""
+        place = Place(**at)
+        readings = np.empty((2, self.record.position.size))
+        for course, row in zip(self.halves, readings, strict=True):
+            read_stem(course, place, self.record.cells, row)
+        return readings
+
+    def sensitivity(
+        self, at: Coordinates, names: tuple[str, ...], readings: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Differentiate the `readings` by the straight coordinates `names`, shape (2, p, c).
+
+        One simulation carries the exact derivatives along (`read_slopes`). Differences take their
+        place where the coarseness asks for wide ones, and by a slip force or a dead zone that are
+        not there yet: what these do begins with their square.
+        """
+        centre, differed = straight(at, names), names
+        slopes: NDArray[np.float64] = np.empty((2, len(names), self.record.position.size))
+        if self.coarseness == 1.0:
+            slopes = self._exact_slopes(at, names)
+            differed = tuple(
+                name
+                for name in ("slip_force", "limit_velocity")
+                if name in names and centre[name] < self.step(at, name)
+            )
+        for name in differed:
+            step = self.step(at, name)
+            after = self.readings(physical({**centre, name: centre[name] + step}, names))
+            slopes[:, names.index(name)] = (after - readings) / step
+        return slopes
+
+    def _exact_slopes(self, at: Coordinates, names: tuple[str, ...]) -> NDArray[np.float64]:
+        """Differentiate the readings by straight coordinates, all in one simulation."""
+        coordinates = np.array([Place._fields.index(name) for name in names])
+        turned = jacobian(at, names)
+        shape = (2, self.record.force.size, len(names))
+        room = self._room[: math.prod(shape)].reshape(shape)
+        slopes = np.empty((2, self.record.position.size, len(names)))
+        for course, rows in zip(self.halves, slopes, strict=True):
+            read_slopes(course, Place(**at), coordinates, turned, self.record.cells, room, rows)
+        return slopes.transpose(0, 2, 1)
+
+    def step(self, at: Coordinates, name: str) -> float:
+        """Return the change of a straight coordinate by which to differentiate."""
+        spring = max(at["spring_constant"], 1e-6)
+        dry = max(abs(at["coulomb_friction"]), 1e-6) / spring
+        if name == "viscous_friction" and at[name] / spring < SWINGING:
+            return _OVER_SWING
+        if name == "slip_force":
+            return IMPERFECTIONS[name].step * dry
+        if name in TIMING:
+            return IMPERFECTIONS[name].step * self.coarseness
+        if name in IMPERFECTIONS:
+            return IMPERFECTIONS[name].step * min(self.coarseness, _LARGEST_COARSENESS)
+        sizes = {
+            "coulomb_friction": dry,
+            "spring_preload": dry,
+            "viscous_friction": max(at["viscous_friction"] / spring, 10.0 * dry),
+            "spring_constant": 1.0 / spring,
+            "start_position": dry,
+        }
+        return _STEP * self.coarseness * sizes[name]

@@ -1,0 +1,448 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The stem of a Karnopp valve with imperfections, and what its sensor reads, as machine code."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.model.compiled import compiled
+from valve_friction_ros.model.dynamics import Dynamics
+from valve_friction_ros.model.stem_run import run_stem
+from valve_friction_ros.model.stem_tangent import Tangent, no_tangent
+
+_LEAST_LAG = 1e-9
+_LARGEST_ASYMMETRY = 0.9
+
+_AT_STEP = 1e-6
+"""Distance from a step, in steps, within which a reading has the slopes of both sides."""
+
+
+class Course(NamedTuple):
+    """What drives the stem at each step of the simulation, and the slow terms there.
+
+    Attributes
+    ----------
+    period : float
+        Step, s.
+    travel : float
+        Of the valve, m.
+    stroke, span : float
+        Range of the measured positions, m, and of the force, N.
+    force : ndarray of float, shape (g,)
+        Actuator force, N.
+    place, age : ndarray of float, shape (g,)
+        Measured position and time, −1 to 1.
+    slowness : ndarray of float, shape (g,)
+        Share of the friction at rest that is left at the measured speed.
+    anew, leaving : ndarray of float, shape (g,)
+        Where the stem is set anew, m, nan elsewhere; its velocity there, m/s.
+    """
+
+    period: float
+    travel: float
+    stroke: float
+    span: float
+    force: NDArray[np.float64]
+    place: NDArray[np.float64]
+    age: NDArray[np.float64]
+    slowness: NDArray[np.float64]
+    anew: NDArray[np.float64]
+    leaving: NDArray[np.float64]
+
+
+class Place(NamedTuple):
+    """All coordinates of the model, by the names of `MAIN` and `IMPERFECTIONS`."""
+
+    coulomb_friction: float
+    viscous_friction: float
+    spring_constant: float
+    spring_preload: float
+    start_position: float
+    delay: float
+    stem_lag: float
+    force_lag: float
+    along_travel: float
+    in_record: float
+    at_low_speed: float
+    curvature: float
+    cubic: float
+    drift: float
+    presliding: float
+    limit_velocity: float
+    viscous_asymmetry: float
+    mass: float
+    slip_force: float
+    stribeck_velocity: float
+
+
+(
+    _COULOMB,
+    _VISCOUS,
+    _SPRING,
+    _PRELOAD,
+    _START,
+    _DELAY,
+    _STEM_LAG,
+    _FORCE_LAG,
+    _ALONG_TRAVEL,
+    _IN_RECORD,
+    _AT_LOW_SPEED,
+    _CURVATURE,
+    _CUBIC,
+    _DRIFT,
+    _PRESLIDING,
+    _LIMIT_VELOCITY,
+    _ASYMMETRY,
+    _MASS,
+    _SLIP,
+    _STRIBECK,
+) = range(len(Place._fields))
+"""Numbers of the coordinates, by which kernels know them."""
+
+_OF_FRICTION = (_COULOMB, _ALONG_TRAVEL, _IN_RECORD, _AT_LOW_SPEED)
+"""Those that grade the friction, and not the force."""
+
+
+@compiled
+def _lag(signal: NDArray[np.float64], lag: float, period: float) -> None:
+    """Pass a signal, linear between its samples, through a first-order lag.
+
+    Before its first sample the signal is taken to have gone on as it begins: a record may begin in
+    the midst of a move.
+    """
+    decay = math.exp(-period / lag)
+    newest = 1.0 - lag * (1.0 - decay) / period
+    before = signal[0]
+    lagged = signal[0] - lag * (signal[1] - signal[0]) / period
+    signal[0] = lagged
+    for step in range(1, signal.size):
+        after = signal[step]
+        lagged = decay * lagged + newest * after + (1.0 - decay - newest) * before
+        signal[step] = lagged
+        before = after
+
+
+@compiled
+def _lag_slope(
+    signal: NDArray[np.float64], lag: float, period: float, slope: NDArray[np.float64]
+) -> None:
+    """Differentiate what `_lag` makes of a signal by the lag; upwards where there is none."""
+    decay = math.exp(-period / lag) if lag > _LEAST_LAG else 0.0
+    newest = 1.0 - lag * (1.0 - decay) / period
+    slower = decay * period / (lag * lag) if lag > _LEAST_LAG else 0.0
+    newer = (lag * slower - 1.0 + decay) / period
+    first = (signal[1] - signal[0]) / period
+    lagged, before, slope[0] = signal[0] - lag * first, signal[0], -first
+    for step in range(1, signal.size):
+        after = signal[step]
+        slope[step] = (
+            decay * slope[step - 1] + newer * (after - before) + slower * (lagged - before)
+        )
+        lagged = decay * lagged + newest * after + (1.0 - decay - newest) * before
+        before = after
+
+
+@compiled
+def _lead_slope(signal: NDArray[np.float64], period: float, slope: NDArray[np.float64]) -> None:
+    """Differentiate a signal with a small lead by its lag: less its slope."""
+    last = signal.size - 1
+    for step in range(signal.size):
+        before, after = max(step - 1, 0), min(step + 1, last)
+        slope[step] = -(signal[after] - signal[before]) / ((after - before) * period)
+
+
+@compiled
+def _constants(at: Place, travel: float) -> NDArray[np.float64]:
+    """Differentiate the constants of the motion by each coordinate of `Place`.
+
+    They are mass, spring constant, Coulomb friction, slip force, limit velocity, viscous friction
+    upwards and downwards, the first position, and the Stribeck velocity.
+    """
+    table = np.zeros((_STRIBECK + 1, 9))
+    side = min(max(at.viscous_asymmetry, -_LARGEST_ASYMMETRY), _LARGEST_ASYMMETRY)
+    table[_MASS, 0] = table[_SPRING, 1] = table[_COULOMB, 2] = table[_SLIP, 3] = 1.0
+    table[_LIMIT_VELOCITY, 4] = table[_STRIBECK, 8] = 1.0
+    table[_SPRING, 2], table[_PRESLIDING, 2] = at.presliding, at.spring_constant
+    table[_VISCOUS, 5], table[_VISCOUS, 6] = 1.0 + side, 1.0 - side
+    if side == at.viscous_asymmetry:
+        table[_ASYMMETRY, 5], table[_ASYMMETRY, 6] = at.viscous_friction, -at.viscous_friction
+    if 0.0 <= at.start_position <= travel:
+        table[_START, 7] = 1.0
+    return table
+
+
+@compiled
+def _shares(course: Course, at: Place) -> NDArray[np.float64]:
+    """Differentiate, by each coordinate of `Place`, the shares of the signals in what drives.
+
+    Those of the force are one, the two polynomials of the place, the age and the slope by the lag;
+    those of the graded friction the place, the age and the slowness.
+    """
+    table = np.zeros((_STRIBECK + 1, 8))
+    stroke, dry = course.stroke, at.coulomb_friction
+    table[_PRELOAD, 0], table[_DRIFT, 3], table[_FORCE_LAG, 4] = -1.0, course.span, 1.0
+    table[_SPRING, 1], table[_SPRING, 2] = -at.curvature * stroke, -at.cubic * stroke
+    table[_CURVATURE, 1] = table[_CUBIC, 2] = -at.spring_constant * stroke
+    table[_COULOMB, 5], table[_COULOMB, 6] = at.along_travel, at.in_record
+    table[_COULOMB, 7] = at.at_low_speed
+    table[_ALONG_TRAVEL, 5] = table[_IN_RECORD, 6] = table[_AT_LOW_SPEED, 7] = dry
+    return table
+
+
+@compiled
+def _tangent(
+    course: Course, at: Place, coordinates: NDArray[np.int64], room: NDArray[np.float64]
+) -> Tangent:
+    """Differentiate what drives the stem by some coordinates, and where it begins."""
+    tangent = no_tangent(coordinates.size, room[0], room[1])
+    constants, shares = _constants(at, course.travel), _shares(course, at)
+    square, lagged = course.place * course.place, np.empty_like(course.force)
+    if at.force_lag >= 0.0:
+        _lag_slope(course.force, at.force_lag, course.period, lagged)
+    else:
+        _lead_slope(course.force, course.period, lagged)
+    signals = (
+        np.ones_like(square),
+        square - 1.0 / 3.0,
+        course.place * (square - 0.6),
+        course.age,
+        lagged,
+        course.place,
+        course.age,
+        course.slowness,
+    )
+    for one, coordinate in enumerate(coordinates):
+        row = constants[coordinate]
+        tangent.mass[one], tangent.spring_constant[one] = row[0], row[1]
+        tangent.coulomb_friction[one], tangent.slip_force[one] = row[2], row[3]
+        tangent.limit_velocity[one], tangent.state[0, one] = row[4], row[7]
+        tangent.upward[one], tangent.downward[one] = row[5], row[6]
+        tangent.stribeck_velocity[one] = row[8]
+        tangent.of_friction[one] = 1.0 if coordinate in _OF_FRICTION else 0.0
+        for index, signal in enumerate(signals):
+            share = shares[coordinate, index]
+            if share != 0.0:
+                for step in range(signal.size):
+                    tangent.signals[step, one] += share * signal[step]
+    return tangent
+
+
+@compiled
+def drive_stem(
+    course: Course,
+    at: Place,
+    force: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    tangent: Tangent | None = None,
+) -> int:
+    """Fill in the force less the preload (N), the positions (m) and the velocities (m/s).
+
+    Return what `run_stem` does, which carries a `tangent` along.
+    """
+    stiff = at.spring_constant * course.stroke
+    curved, cubic = at.curvature * stiff, at.cubic * stiff
+    drift = at.drift * course.span
+    viscous, dry = at.viscous_friction, at.coulomb_friction
+    bent = at.spring_constant * at.presliding
+    force[:] = course.force
+    if at.force_lag > _LEAST_LAG:
+        _lag(force, at.force_lag, course.period)
+    grip = np.empty_like(force)
+    for step in range(force.size):
+        place, age = course.place[step], course.age[step]
+        if at.force_lag < 0.0:
+            before, after = max(step - 1, 0), min(step + 1, force.size - 1)
+            rise = course.force[after] - course.force[before]
+            force[step] -= at.force_lag * rise / ((after - before) * course.period)
+        square = place * place
+        force[step] += (
+            drift * age
+            - at.spring_preload
+            - curved * (square - 1.0 / 3.0)
+            - cubic * place * (square - 0.6)
+        )
+        trend = at.along_travel * place + at.in_record * age
+        grip[step] = dry * (trend + at.at_low_speed * course.slowness[step])
+    side = min(max(at.viscous_asymmetry, -_LARGEST_ASYMMETRY), _LARGEST_ASYMMETRY)
+    falling = at.stribeck_velocity if at.slip_force > 0.0 else 0.0
+    dry += bent  # the reading of a sliding stem is off by the bristle's bend
+    static = dry + at.slip_force
+    spring, zone, travel = at.spring_constant, at.limit_velocity, course.travel
+    upward = Dynamics(at.mass, viscous * (1.0 + side), dry, static, spring, zone, travel, falling)
+    downward = Dynamics(at.mass, viscous * (1.0 - side), dry, static, spring, zone, travel, falling)
+    positions[0] = at.start_position
+    if travel < np.inf:
+        positions[0] = min(max(at.start_position, 0.0), travel)
+    velocities[0] = course.leaving[0]
+    return run_stem(
+        force,
+        course.period,
+        upward,
+        downward,
+        positions,
+        velocities,
+        grip,
+        course.anew,
+        course.leaving,
+        tangent,
+    )
+
+
+@compiled
+def _held(at: Place, force: float, position: float, velocity: float) -> tuple[float, float]:
+    """Return the bend of the bristle over the largest, and whether it follows the force."""
+    if velocity != 0.0:
+        return math.copysign(1.0, velocity), 0.0
+    full = at.coulomb_friction + at.spring_constant * at.presliding + at.slip_force + 1e-9
+    share = (force - at.spring_constant * position) / full
+    return min(max(share, -1.0), 1.0), 1.0 / full if abs(share) < 1.0 else 0.0
+
+
+@compiled
+def read_stem(
+    course: Course, at: Place, cells: NDArray[np.float64], readings: NDArray[np.float64]
+) -> None:
+    """Fill in what the stem's sensor reads, m, at places between the steps.
+
+    A bristle that is bent by δ at full friction adds δ·F/F_s while the stem rests, ±δ while it
+    slides. A slow sensor is a first-order lag, a late clock a shift.
+    """
+    force = np.empty_like(course.force)
+    positions, velocities = np.empty_like(force), np.empty_like(force)
+    drive_stem(course, at, force, positions, velocities)
+    if at.presliding != 0.0:
+        for step in range(force.size):
+            held, _ = _held(at, force[step], positions[step], velocities[step])
+            positions[step] += at.presliding * held
+    if at.stem_lag > _LEAST_LAG:
+        _lag(positions, at.stem_lag, course.period)
+    shift = at.delay / course.period
+    last = force.size - 2
+    for cell in range(cells.size):
+        place = cells[cell] - shift
+        step = min(max(math.floor(place), 0), last)
+        share = place - step
+        share = min(share, 1.0)
+        readings[cell] = positions[step] + share * (positions[step + 1] - positions[step])
+
+
+@compiled
+def _bend(
+    at: Place,
+    force: NDArray[np.float64],
+    bends: NDArray[np.bool_],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    tangent: Tangent,
+) -> None:
+    """Add the bend of the bristle to the positions and to their derivatives."""
+    found, bent = tangent.positions, np.flatnonzero(bends)
+    for step in range(force.size):
+        held, share = _held(at, force[step], positions[step], velocities[step])
+        if share > 0.0:
+            share *= at.presliding
+            for one in range(bends.size):
+                pull = (1.0 - tangent.of_friction[one]) * tangent.signals[step, one]
+                pull -= tangent.spring_constant[one] * positions[step]
+                pull -= at.spring_constant * found[step, one]
+                full = tangent.coulomb_friction[one] + tangent.slip_force[one]
+                found[step, one] += share * (pull - held * full)
+        for one in bent:
+            found[step, one] += held
+        positions[step] += at.presliding * held
+
+
+@compiled
+def _read_cells(
+    places: NDArray[np.float64],
+    found: NDArray[np.float64],
+    by_delay: NDArray[np.float64],
+    late: NDArray[np.float64],
+    turned: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+) -> None:
+    """Interpolate derivatives at places between the steps, and turn them to other coordinates."""
+    own, read = np.diag(turned), np.empty(by_delay.size)
+    mixed = np.flatnonzero((turned != 0.0).sum(axis=0) > 1)
+    for cell in range(places.size):
+        step = min(max(math.floor(places[cell]), 0), late.size - 1)
+        share = min(places[cell] - step, 1.0)
+        slope = late[step] if share < 1.0 else 0.0
+        if share < _AT_STEP and step > 0:
+            slope = 0.5 * (late[step - 1] + late[step])
+        elif 1.0 - _AT_STEP < share < 1.0 and step + 1 < late.size:
+            slope = 0.5 * (late[step] + late[step + 1])
+        for one in range(by_delay.size):
+            read[one] = found[step, one] + share * (found[step + 1, one] - found[step, one])
+            read[one] += by_delay[one] * slope
+            slopes[cell, one] = own[one] * read[one]
+        for one in mixed:
+            slopes[cell, one] = 0.0
+            for other in range(by_delay.size):
+                slopes[cell, one] += turned[other, one] * read[other]
+
+
+@compiled
+def read_slopes(
+    course: Course,
+    at: Place,
+    coordinates: NDArray[np.int64],
+    turned: NDArray[np.float64],
+    cells: NDArray[np.float64],
+    room: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+) -> None:
+    """Differentiate what `read_stem` fills in; one simulation carries all derivatives along.
+
+    Parameters
+    ----------
+    course : Course
+        What drives the stem.
+    at : Place
+        The coordinates.
+    coordinates : ndarray of int, shape (p,)
+        By which to differentiate, numbered as in `Place`.
+    turned : ndarray of float, shape (p, p)
+        Derivatives of those by others (column), which the result is by.
+    cells : ndarray of float, shape (c,)
+        Where the sensor is read, in steps.
+    room : ndarray of float, shape (2, g, p)
+        Room to work in. New one at each call would cost more than the work.
+    slopes : ndarray of float, shape (c, p)
+        The result, m over the unit of a coordinate.
+    """
+    force = np.empty_like(course.force)
+    positions, velocities = np.empty_like(force), np.empty_like(force)
+    tangent = _tangent(course, at, coordinates, room)
+    drive_stem(course, at, force, positions, velocities, tangent)
+    if at.presliding != 0.0 or (coordinates == _PRESLIDING).any():
+        _bend(at, force, coordinates == _PRESLIDING, positions, velocities, tangent)
+    slow = np.zeros_like(force)
+    _lag_slope(positions, at.stem_lag, course.period, slow)
+    if at.stem_lag > _LEAST_LAG:
+        for one in range(coordinates.size):
+            _lag(tangent.positions[:, one], at.stem_lag, course.period)
+        _lag(positions, at.stem_lag, course.period)
+    late = (positions[:-1] - positions[1:]) / course.period
+    for one, coordinate in enumerate(coordinates):
+        if coordinate == _STEM_LAG:
+            tangent.positions[:, one] = slow
+    _read_cells(
+        cells - at.delay / course.period,
+        tangent.positions,
+        np.where(coordinates == _DELAY, 1.0, 0.0),
+        late,
+        turned,
+        slopes,
+    )

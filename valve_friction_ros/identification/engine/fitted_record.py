@@ -1,0 +1,435 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A stamped record as the fit takes it: a force to simulate with, a stem to compare with."""
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals import (
+    runs_of,
+    smooth_between,
+    smoothing_leverage,
+    smoothing_of,
+    stamped_noise,
+    without_repeats,
+)
+
+_LONGEST_PERIOD = 5e-3
+"""Longest step of the simulation, s: within it a corner of the pressure may lie."""
+
+_MOST_STEPS = 12_500
+"""Steps of the simulation in a record; those of a longer record are longer, up to four times."""
+
+_MOST_FINE_STEPS = 5_000_000
+"""Steps finer than the samples. Chosen: 28 h, some GB; a wrong unit of time asks for far more."""
+
+_MOST_SAMPLES = 16_000
+"""Steps of a record whose pressure cannot be smoothed: there they are means of its samples."""
+
+_NOISELESS = 1e-6
+"""Least noise over the range of a signal that was measured.
+
+A drive with less was simulated, and is taken as it is; a stem is taken to have as much."""
+
+_SAMPLES_A_WINDOW = 32
+_SLOW = 0.1
+"""Time, s, over which the measured stem is averaged, twice, to evaluate slow terms along it."""
+
+LOW_SPEED = 3e-3
+"""Speed, m/s, below which packings are known to hold faster: the v_s published for graphite."""
+
+_CALM = 1e-3
+"""Noise of the speed, over `LOW_SPEED`, for which it is averaged longer: through a friction that
+falls with speed, the simulated stem would follow the noise of the measured one."""
+
+_CALM_PARTS = 20
+"""Of the record; it is averaged over one of them at most."""
+
+_GAP_PERIODS = 10
+_GAP_TIME = 0.05
+"""Longer pauses than so many periods, and than this, s, are gaps: what is between them is lost."""
+
+_LINE_TIME = 0.05
+_LINE_SAMPLES = 4
+_SURELY = 5.0
+"""Standard errors by which a stem must move at the start, to be set moving."""
+
+_MEMORY = 2.5
+"""Lengths of the smoothing window over those through which its error stays the same."""
+
+_FEWEST = 100
+_STILL = 0.01
+_STILL_NOISE = 4.0
+"""The averaged stem rests below this share of its top speed, or so many deviations of its noise."""
+
+_REST_MEAN = 0.1
+_REST_MARGIN = 0.15
+"""Time, s, over which the place of a rest is averaged, and before the averaged stem leaves it."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlowView:
+    """Slow terms along the measured stem and along time, at each step of the simulation.
+
+    Attributes
+    ----------
+    place : ndarray of float
+        Position, −1 at the lowest and 1 at the highest place that was measured.
+    age : ndarray of float
+        Time, −1 at the beginning and 1 at the end.
+    speed : ndarray of float
+        Speed, m/s.
+    slowness : ndarray of float
+        exp(−speed/`LOW_SPEED`), the speed averaged until its noise hardly counts.
+    force : ndarray of float
+        Actuator force, N, averaged like the stem.
+    lowest, highest : float
+        Ends of the measured positions, m.
+    """
+
+    place: NDArray[np.float64]
+    age: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    slowness: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    force: NDArray[np.float64]
+    lowest: float
+    highest: float
+
+    @property
+    def range(self) -> float:
+        """Distance between the ends, m."""
+        return self.highest - self.lowest
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRecord:
+    """What the fit needs of a record.
+
+    Attributes
+    ----------
+    period : float
+        Step of the simulation, s.
+    force : ndarray of float, shape (g,)
+        Smoothed actuator force at each step, N.
+    halves : ndarray of float, shape (2, g)
+        The same from the even samples alone and from the odd ones: their noise is independent.
+    anew, leaving : ndarray of float, shape (g,)
+        Where the stem is set anew after a gap, m, nan elsewhere; and its velocity there and at the
+        start, m/s.
+    cells : ndarray of float, shape (c,)
+        Mean stamp of the positions between two steps, in steps.
+    position : ndarray of float, shape (c,)
+        The means that were measured, m.
+    time : ndarray of float, shape (c,)
+        The mean time of each cell, s.
+    samples : ndarray of float, shape (c,)
+        Samples in each cell.
+    noise : float
+        Deviation of the noise of one sample of the stem, m.
+    force_variance : ndarray of float, shape (c,)
+        Variance of the smoothed force, N².
+    memory : float
+        Cells through which the error of the smoothed force stays the same.
+    slow : SlowView
+        Slow terms.
+    travel : float
+        Of the valve, m.
+    lost : float
+        Time in gaps, s.
+    start : float
+        Position at the first step, m.
+    """
+
+    period: float
+    force: NDArray[np.float64] = field(repr=False)
+    halves: NDArray[np.float64] = field(repr=False)
+    anew: NDArray[np.float64] = field(repr=False)
+    leaving: NDArray[np.float64] = field(repr=False)
+    cells: NDArray[np.float64] = field(repr=False)
+    position: NDArray[np.float64] = field(repr=False)
+    time: NDArray[np.float64] = field(repr=False)
+    samples: NDArray[np.float64] = field(repr=False)
+    noise: float
+    force_variance: NDArray[np.float64] = field(repr=False)
+    memory: float
+    slow: SlowView = field(repr=False)
+    travel: float
+    lost: float
+    start: float
+
+    @property
+    def duration(self) -> float:
+        """Time from the first step to the last, s."""
+        return (self.force.size - 1) * self.period
+
+    @cached_property
+    def still(self) -> NDArray[np.bool_]:
+        """Steps at which the measured stem rests, shape (g,).
+
+        The derivative of a signal averaged twice over T, with n samples in it, has the noise
+        s·√(2/n)/T.
+        """
+        averaged = max(float(np.sum(self.samples)) * _SLOW / self.duration, 1.0)
+        noise = self.noise * math.sqrt(2.0 / averaged) / _SLOW
+        top = float(np.quantile(self.slow.speed, 0.98))
+        return self.slow.speed < max(_STILL * top, min(_STILL_NOISE * noise, 0.2 * top))
+
+
+class _Smoothed(NamedTuple):
+    """A smoothed signal on a grid.
+
+    Attributes
+    ----------
+    whole : ndarray of float, shape (g,)
+        From all samples.
+    halves : ndarray of float, shape (2, g)
+        From the even samples and from the odd ones.
+    variance : ndarray of float, shape (g,)
+        Of the noise of `whole`.
+    window : int
+        Steps of the grid over which it is smoothed.
+    """
+
+    whole: NDArray[np.float64]
+    halves: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    window: int
+
+    def at(self, grid: NDArray[np.float64], steps: NDArray[np.float64]) -> "_Smoothed":
+        """Return it at other steps."""
+        whole, even, odd, variance = (
+            np.interp(steps, grid, row) for row in (self.whole, *self.halves, self.variance)
+        )
+        return _Smoothed(whole, np.stack([even, odd]), variance, self.window)
+
+    def averaged(self, length: int) -> "_Smoothed":
+        """Return its means over `length` steps about each; their noise is not taken as less."""
+        whole, even, odd = (_averaged(row, length) for row in (self.whole, *self.halves))
+        return _Smoothed(whole, np.stack([even, odd]), self.variance, self.window)
+
+
+def _averaged(signal: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    """Average over `length` samples about each, the outermost by half if even."""
+    half = length // 2
+    kernel = np.full(2 * half + 1, 1.0 / length)
+    if length % 2 == 0:
+        kernel[[0, -1]] /= 2.0
+    return np.asarray(np.convolve(np.pad(signal, half, mode="edge"), kernel, "valid"))
+
+
+def _noise_on_grid(signal: StampedSignal, grid: NDArray[np.float64], noise: float) -> float:
+    """Return the deviation of white noise that averages as the interpolated noise does.
+
+    A sample that counts w steps adds w²·s² to the variance of a sum of steps.
+    """
+    after = np.clip(np.searchsorted(signal.time, grid, side="right"), 1, signal.time.size - 1)
+    share = (grid - signal.time[after - 1]) / (signal.time[after] - signal.time[after - 1])
+    share = np.clip(share, 0.0, 1.0)
+    counts = np.bincount(after, share, signal.time.size)
+    counts += np.bincount(after - 1, 1.0 - share, signal.time.size)
+    return noise * math.sqrt(float(np.sum(counts**2)) / grid.size)
+
+
+def _smoothed(signal: StampedSignal, grid: NDArray[np.float64]) -> _Smoothed:
+    """Smooth a signal between its corners."""
+    period = float(grid[1] - grid[0])
+    whole = np.interp(grid, signal.time, signal.value)
+    noise = _noise_on_grid(signal, grid, stamped_noise(signal))
+    if noise < _NOISELESS * float(np.ptp(whole)):
+        return _Smoothed(whole, np.stack([whole, whole]), np.zeros(grid.size), 1)
+    corners, window = smoothing_of(whole, noise, period)
+    if window == 1:
+        return _Smoothed(whole, np.stack([whole, whole]), np.full(grid.size, noise**2), window)
+    parts = [np.interp(grid, signal.time[i::2], signal.value[i::2]) for i in (0, 1)]
+    whole, even, odd = (smooth_between(one, corners, window) for one in (whole, *parts))
+    variance = noise**2 * smoothing_leverage(grid.size, corners, window)
+    return _Smoothed(whole, np.stack([even, odd]), variance, window)
+
+
+def _averaged_twice(signal: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    """Average over `length` samples, twice; the ends are held."""
+    kernel = np.full(length, 1.0 / length)
+    for _ in range(2):
+        padded = np.pad(signal, length, mode="edge")
+        signal = np.convolve(padded, kernel, "same")[length:-length]
+    return signal
+
+
+def _gaps(signal: StampedSignal, grid: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which steps lie in a gap of the signal."""
+    pauses = np.diff(signal.time)
+    longest = max(_GAP_PERIODS * signal.period, _GAP_TIME)
+    lost = np.zeros(grid.size, dtype=np.bool_)
+    for index in np.flatnonzero(pauses > longest).tolist():
+        lost |= (grid > signal.time[index]) & (grid < signal.time[index + 1])
+    return lost
+
+
+def _line(stem: StampedSignal, noise: float, begin: float) -> tuple[float, float]:
+    """Return place and velocity of the stem at `begin`; the velocity is 0 where it may be noise."""
+    first = int(np.searchsorted(stem.time, begin))
+    last = max(int(np.searchsorted(stem.time, begin + _LINE_TIME)), first + _LINE_SAMPLES)
+    since, place = stem.time[first:last] - begin, stem.value[first:last]
+    if since.size < 3:
+        return float(place[0] if place.size else stem.value[-1]), 0.0
+    spread = float(np.sqrt(np.sum((since - since.mean()) ** 2)))
+    velocity, intercept = np.polyfit(since, place, 1).tolist()
+    if abs(velocity) * spread < _SURELY * noise:
+        return float(np.median(place)), 0.0
+    return intercept, velocity
+
+
+def _set_anew(
+    lost: NDArray[np.bool_], grid: NDArray[np.float64], stem: StampedSignal, noise: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return place and velocity of the stem at the first step and after each gap.
+
+    The place is nan elsewhere, and at the first step, where the fit finds it.
+    """
+    anew, leaving = np.full(grid.size, np.nan), np.zeros(grid.size)
+    leaving[0] = _line(stem, noise, float(stem.time[0]))[1]
+    for step in (np.flatnonzero(lost[:-1] & ~lost[1:]) + 1).tolist():
+        if grid[step] < stem.time[-1]:
+            anew[step], leaving[step] = _line(stem, noise, float(grid[step]))
+    return anew, leaving
+
+
+def fitted_record(record: StampedRecord, valve: Valve) -> FittedRecord:
+    """Smooth the pressure on a uniform grid, and leave the stem at its own stamps.
+
+    The pressure is smooth but for its corners, so it may be interpolated; the positions may not.
+    The simulated stem is read where the stem was stamped, so jitter, drops and rates cost no more
+    than the samples that they take. The positions of one step are averaged, which loses nothing.
+
+    Raises
+    ------
+    RefusalError
+        If the signals have too little time in common, or far too much for their sampling.
+    """
+    sampled, measured = without_repeats(record.drive), without_repeats(record.position)
+    begin = max(sampled.time[0], measured.time[0])
+    end = min(sampled.time[-1], measured.time[-1])
+    inside = (measured.time >= begin) & (measured.time <= end)
+    if np.count_nonzero(inside) < _FEWEST:
+        raise RefusalError(
+            f"the two signals share {np.count_nonzero(inside)} positions: their clocks differ, or "
+            f"the record is too short; at least {_FEWEST} are needed"
+        )
+    stem = StampedSignal(measured.time[inside] - begin, measured.value[inside])
+    drive = StampedSignal(sampled.time - begin, sampled.value)
+    finest = min(stem.period, drive.period)
+    grid: NDArray[np.float64] = np.arange(0.0, end - begin, finest, dtype=np.float64)
+    pressure = _smoothed(drive, grid)
+    longest = min(max((end - begin) / _MOST_STEPS, _LONGEST_PERIOD), 4.0 * _LONGEST_PERIOD)
+    if finest > longest:
+        if end - begin > _MOST_FINE_STEPS * longest:
+            raise RefusalError(
+                f"the record is too long for its sampling: {(end - begin) / 3600:.3g} h with a "
+                f"sample every {finest:.3g} s; use a stretch of "
+                f"{_MOST_FINE_STEPS * longest / 3600:.0f} h at most, and check the unit of time"
+            )
+        period = finest / math.ceil(finest / longest - 1e-9)
+        fine = np.arange(0.0, grid[-1], period, dtype=np.float64)
+        pressure, grid = pressure.at(grid, fine), fine
+    else:
+        stride = max(min(pressure.window // _SAMPLES_A_WINDOW, int(longest / finest + 1e-9)), 1)
+        if grid.size > _MOST_SAMPLES * stride and pressure.variance.any():
+            stride = math.ceil(grid.size / _MOST_SAMPLES)
+            pressure = pressure.averaged(stride)
+        period = stride * finest
+        pressure, grid = pressure.at(grid, grid[::stride]), grid[::stride]
+    lost = _gaps(drive, grid) | _gaps(stem, grid)
+    place = stem.time / period
+    step = np.minimum(place.astype(np.intp), grid.size - 2)
+    share = place - step
+    used = (share <= 1.0) & ~(lost[step] | lost[step + 1])
+    step, share = step[used], share[used]
+    first, cell, count = np.unique(step, return_inverse=True, return_counts=True)
+    weight: NDArray[np.float64] = 1.0 / count[cell]
+    position = np.bincount(cell, weight * stem.value[used])
+    time = np.bincount(cell, weight * stem.time[used])
+    force = valve.actuator_force(pressure.whole)
+    stem_noise = max(stamped_noise(stem), _NOISELESS * float(np.ptp(position)))
+    return FittedRecord(
+        period,
+        force,
+        valve.actuator_force(pressure.halves),
+        *_set_anew(lost, grid, stem, stem_noise),
+        first + np.bincount(cell, weight * share),
+        np.asarray(position, dtype=np.float64),
+        np.asarray(time, dtype=np.float64),
+        count.astype(np.float64),
+        stem_noise,
+        np.interp(time, grid, pressure.variance) * valve.force_per_drive**2,
+        max(pressure.window * finest / (_MEMORY * period), 1.0),
+        _slow_view(
+            np.interp(grid, time, position),
+            force,
+            period,
+            stem_noise * math.sqrt((end - begin) / used.size),
+        ),
+        valve.travel,
+        float(np.count_nonzero(lost)) * period,
+        _line(stem, stem_noise, float(stem.time[0]))[0],
+    )
+
+
+def _slow_view(
+    position: NDArray[np.float64], force: NDArray[np.float64], period: float, density: float
+) -> SlowView:
+    """Average stem and force, given at each step; `density` is the stem's noise, m·√s.
+
+    Averaged twice over T, the speed has the noise √2·density/T^1.5.
+    """
+    length = max(round(_SLOW / period), 1)
+    stem = _averaged_twice(position, length)
+    velocity = np.gradient(stem, period)
+    calm = (math.sqrt(2.0) * density / (_CALM * LOW_SPEED)) ** (2.0 / 3.0)
+    longest = min(round(calm / period), stem.size // _CALM_PARTS)
+    calmer = _averaged_twice(velocity, longest) if longest > length else velocity
+    lowest, highest = float(stem.min()), float(stem.max())
+    return SlowView(
+        (2.0 * stem - lowest - highest) / max(highest - lowest, np.finfo(float).tiny),
+        np.linspace(-1.0, 1.0, stem.size, dtype=np.float64),
+        np.abs(velocity),
+        np.exp(-np.abs(calmer) / LOW_SPEED),
+        velocity,
+        _averaged_twice(force, length),
+        lowest,
+        highest,
+    )
+
+
+def set_anew_at_rests(record: FittedRecord) -> FittedRecord:
+    """Return the record with the stem set to its measured place at the end of each rest.
+
+    A resting stem has forgotten all but its place, so each move stands for itself: a single jump
+    that is simulated at the wrong time then spoils no other. What a place is off by noise is the
+    price; the end of a fit does without.
+    """
+    positions = np.interp(
+        np.arange(record.force.size) * record.period, record.time, record.position
+    )
+    anew = record.anew.copy()
+    mean, margin = (max(round(time / record.period), 1) for time in (_REST_MEAN, _REST_MARGIN))
+    for begin, end in runs_of(record.still):
+        last = end - margin
+        if last - mean > begin and last > 0:
+            anew[last] = float(np.mean(positions[last - mean : last]))
+    return replace(record, anew=anew)

@@ -1,0 +1,317 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Friction over speed as a record shows it, before any stem is simulated.
+
+While the stem surely slides, the actuator force is
+
+    F(t − τ) = F_c·sgn ẋ + (F_s − F_c)·exp(−(ẋ/v_s)²)·sgn ẋ + F_v·ẋ + k·x + F_0 + … ,
+
+linear in all but the lag τ and the Stribeck speed v_s; the dots are the imperfections of a plant,
+each with its prior. Force and stem are averaged with the same weights, so the averages obey the
+same law. In each product of the normal equations one factor comes from the even samples and the
+other from the odd ones: noise of the regressors then biases nothing.
+
+A stick-slip valve, whose simulated stem jumps at other times than the measured one, is described
+here as well as any other. The numbers are also where the simulation starts (`search`).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.engine.balance_regression import (
+    LagPrior,
+    Posterior,
+    Regression,
+)
+from valve_friction_ros.identification.engine.intervals import Estimated
+from valve_friction_ros.identification.engine.sliding_averages import (
+    CLOSE,
+    LARGEST_LAG,
+    SURE_MARGIN,
+    Work,
+    averages_of,
+    force_and_stem,
+)
+from valve_friction_ros.identification.trust.correlation import Correlation, correlation_of
+from valve_friction_ros.identification.units import SLIDING
+from valve_friction_ros.model.stamped import StampedRecord
+from valve_friction_ros.model.valve import Valve
+
+_Array = NDArray[np.float64]
+
+_AVERAGING_TIMES = (0.03, 0.06, 0.12, 0.24, 0.48, 0.96)
+_SHORT_AVERAGING_TIMES = (0.015, 0.008, 0.004)
+"""Times, s, over which the signals are averaged, twice; the short ones where no longer ones leave
+samples of a stem that slides, as in the jumps of stick-slip."""
+
+_MOST_CURVES = 4
+_FEWEST_PERIODS = 2.9
+"""Averaging times that are used, and sampling periods in each."""
+
+_LEAST_HALF_WIDTH, _LEAST_OF_MACHINE, _LEAST_ALONE = 0.015, 0.04, 0.06
+"""Least half width over the value of any number, as no force balance of a plant is the whole truth
+to more than that; the same without a spring, where the reversals that are left out hold more of the
+friction; and where no second averaging time confirms it."""
+
+_CONFIRMED = 2
+"""Averaging times that confirm each other."""
+
+_AS_WELL = 1.1
+"""Half width over the least up to which an averaging time knows a number as well."""
+
+_NEARLY = 5.0
+_SCATTERS = 2.0
+"""Half width over the least up to which an averaging time counts, and deviations of their scatter
+that are added to the interval."""
+
+_CONTRADICTED, _NEITHER = 0.02, 0.1
+"""Difference of the lags, s, from which on two averaging times contradict each other: what looks
+like a lag may then be none, as in a packing that creeps before it slides. And how likely each lag
+is at least then, over the likeliest."""
+
+_PULL = 1.0 / 3.0
+"""Share of the difference from the force balance that widens the interval of a simulated spring:
+what only its transients know is known no better."""
+
+_TINY = float(np.finfo(float).tiny)
+_OPEN_SLIP = 0.3
+"""Half width of F_c over a slip force: it lies anywhere between what is left of it at the speeds of
+the record and none, half of it in the mean, and evenly (half of 1/√3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """Friction over speed, and the force balance that it comes from, at one averaging time.
+
+    Attributes
+    ----------
+    averaging_time : float
+        Over which force and stem are averaged, twice, s.
+    speed, friction, standard_error : ndarray of float, shape (b,)
+        Mean velocity of each bin (m/s, negative downward), mean friction there (N), and how far
+        chance moves it (N). No law is assumed but the spring.
+    numbers : mapping of str to Estimated
+        Parameters and sliding friction, SI units.
+    sliding_speed : float
+        Mean speed over the distance, m/s, at which the sliding friction is.
+    stribeck_velocity : float
+        v_s, m/s; 0 where friction does not surely fall with speed.
+    lag : float
+        Most probable time by which the stem is seen late, s.
+    inflation : float
+        Of the residual over what noise explains.
+    is_sure : bool
+        Whether each average is of a stem that surely slides all the time.
+    fit, misfit : float
+        Share of the force that the balance reproduces, and deviation of what it leaves, N.
+    correlation : Correlation or None
+        How the errors of the numbers go together.
+    """
+
+    averaging_time: float
+    speed: _Array = field(repr=False)
+    friction: _Array = field(repr=False)
+    standard_error: _Array = field(repr=False)
+    numbers: Mapping[str, Estimated]
+    sliding_speed: float
+    stribeck_velocity: float
+    lag: float
+    inflation: float
+    is_sure: bool
+    fit: float
+    misfit: float
+    correlation: Correlation | None = field(default=None, repr=False)
+
+
+def friction_curves(
+    record: StampedRecord,
+    valve: Valve,
+    lag: LagPrior | None = None,
+    fixed: Mapping[str, float] | None = None,
+) -> list[FrictionCurve]:
+    """Regress friction over speed, for several averaging times.
+
+    Parameters
+    ----------
+    record : StampedRecord
+        Drive and stem position at their own stamps.
+    valve : Valve
+        Geometry.
+    lag : LagPrior, optional
+        What is known of the timing.
+    fixed : mapping of str to float, optional
+        Known parameters; a spring constant of 0 for a machine without a spring.
+
+    Returns
+    -------
+    list of FrictionCurve
+        The shortest averaging time first; empty where the stem nowhere surely slides both ways.
+    """
+    lag, fixed = lag or LagPrior(), fixed or {}
+    force, stem = force_and_stem(record, valve)
+    least = _FEWEST_PERIODS * max(force.period, stem.period)
+    longer = [time for time in _AVERAGING_TIMES if time >= least] or [least, 2.0 * least]
+    shorter = [time for time in _SHORT_AVERAGING_TIMES if time >= least]
+    found: list[Posterior] = []
+    attempts = [(SURE_MARGIN, longer, _MOST_CURVES), (SURE_MARGIN, shorter, 1)]
+    attempts.append((CLOSE, [*reversed(shorter), *longer], 2))
+    for margin, times, most in attempts:
+        for time in times:
+            if len(found) < most:
+                averages = averages_of(force, stem, valve, time, margin)
+                if averages is not None:
+                    work = found[0].regression.work if found else Work.of(force, stem, averages)
+                    found.append(Regression(averages, work, valve, lag, fixed).posterior())
+        if found:
+            break
+    # A lag at the end of what is possible makes up for something else.
+    found = [one for one in found if abs(one.regression.later(one.solved)) < LARGEST_LAG]
+    likelihoods = [one.log_likelihood for one in found if one.log_likelihood is not None]
+    likelihoods = _believed(likelihoods, [one.regression.later(one.solved) for one in found])
+    for one in found:
+        if likelihoods:
+            one.of_record = one.weighed(_of_any(likelihoods))
+    return [_curve_of(one) for one in found]
+
+
+def _curve_of(posterior: Posterior) -> FrictionCurve:
+    """Say what a regression leaves open."""
+    regression, solved = posterior.regression, posterior.solved
+    averages, numbers = regression.averages, {}
+    gradients = {
+        name: gradient / solved.scale
+        for name, gradient in regression.gradients(posterior.stribeck, solved).items()
+    }
+    for name, gradient in gradients.items():
+        values = [one[name] for one in posterior.near if name in one]
+        spread = math.hypot(float(np.std(values or [0.0])), regression.definition(name, solved))
+        if name == SLIDING:
+            spread = math.hypot(spread, regression.work.noise, posterior.work_scatter)
+        numbers[name] = posterior.number(name, gradient, spread)
+    return FrictionCurve(
+        averages.length * float(averages.time[1] - averages.time[0]),
+        *regression.bins(solved),
+        numbers,
+        regression.sliding_speed,
+        posterior.stribeck,
+        regression.later(solved),
+        posterior.inflation,
+        averages.is_sure,
+        1.0 - solved.misfit / max(float(np.std(averages.force[0][averages.taken])), _TINY),
+        solved.misfit,
+        correlation_of(gradients, solved.covariance),
+    )
+
+
+def _believed(log_likelihoods: list[_Array], lags: Sequence[float]) -> list[_Array]:
+    """Return likelihoods of the lags, less sharp where averaging times contradict each other."""
+    if not lags or np.ptp(lags) <= _CONTRADICTED:
+        return log_likelihoods
+    return [np.logaddexp(one, math.log(_NEITHER)) for one in log_likelihoods]
+
+
+def _of_any(log_likelihoods: Sequence[_Array]) -> _Array:
+    """Return the logarithm of a likelihood of the lags that each averaging time has a part in.
+
+    They see one record, so that they cannot be multiplied; where they contradict each other, any
+    may be right. The sharper one counts more, by the inverse of its width.
+    """
+    parts = [np.exp(log) / np.sum(np.exp(log)) for log in log_likelihoods]
+    together = sum(math.sqrt(float(part @ part)) * part for part in parts)
+    return np.asarray(np.log(np.maximum(together / np.max(together), np.finfo(float).tiny)))
+
+
+def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
+    """Return each number from the shortest averaging time that knows it as well as any.
+
+    The interval holds the scatter of those averaging times that know it nearly as well, and at
+    least `_LEAST_HALF_WIDTH`.
+    """
+    result: dict[str, Estimated] = {}
+    has_spring = any("spring_constant" in curve.numbers for curve in curves)
+    least = _LEAST_HALF_WIDTH if has_spring else _LEAST_OF_MACHINE
+    if len(curves) < _CONFIRMED or not curves[0].is_sure:
+        least = _LEAST_ALONE
+    sure = [curve for curve in curves if curve.is_sure]
+    for name in {SLIDING, *(name for curve in sure for name in curve.numbers)}:
+        known = [curve.numbers[name] for curve in sure or curves if name in curve.numbers]
+        if not known:
+            continue
+        least_width = min(one.half_width for one in known)
+        best = next(one for one in known if one.half_width <= _AS_WELL * least_width)
+        near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
+        half_width = math.hypot(
+            best.half_width,
+            _SCATTERS * float(np.std(near)),
+            least * best.value,
+        )
+        result[name] = replace(best, half_width=half_width)
+    return result
+
+
+def checked_by_curve(
+    simulated: Mapping[str, Estimated],
+    balanced: Mapping[str, Estimated],
+    follows: bool,
+    slip_force: float = 0.0,
+) -> dict[str, Estimated]:
+    """Return the numbers of a simulation, checked and sharpened by those of the force balance.
+
+    Where the simulated stem `follows` the record to within noise, a number comes from the one that
+    knows it better; spring, preload and sliding friction from the simulation where both exclude
+    each other, as reversals and rests tell it a lag from a viscous friction; a part of their
+    difference then widens the intervals of spring and preload. Where the stem does not follow, they
+    come from the force balance. What both divide between dry and viscous friction is uncertain by
+    what they differ, and F_c also by a `slip_force`, N, of which no one knows at which speed it is
+    gone.
+    """
+    result = dict(simulated)
+    for name in ("coulomb_friction", "viscous_friction"):
+        ours, theirs = simulated.get(name), balanced.get(name)
+        if ours is None or theirs is None:
+            continue
+        open_ = _OPEN_SLIP * slip_force if name == "coulomb_friction" else 0.0
+        width = math.hypot(theirs.half_width, ours.value - theirs.value, open_)
+        if not (follows and ours.half_width < max(width, theirs.half_width)):
+            result[name] = replace(theirs, half_width=width, rival=ours.rival)
+    for name in (SLIDING, "spring_constant", "spring_preload"):
+        ours, theirs = simulated.get(name), balanced.get(name)
+        if ours is None or theirs is None or not (theirs.value > 0 or name == "spring_preload"):
+            continue
+        apart = abs(ours.value - theirs.value)
+        agree = apart <= math.hypot(ours.half_width, theirs.half_width)
+        if not follows:
+            wider = theirs.half_width if agree else max(theirs.half_width, apart)
+            result[name] = replace(theirs, half_width=wider)
+        elif agree and theirs.half_width < ours.half_width:
+            result[name] = replace(theirs, rival=ours.rival)
+        elif name != SLIDING:
+            result[name] = replace(ours, half_width=math.hypot(ours.half_width, _PULL * apart))
+    return result
+
+
+def curve_evidence(curves: Sequence[FrictionCurve]) -> dict[str, list[float] | float]:
+    """Return the friction curve that knows the sliding friction best, as plain lists, SI units.
+
+    It is that of a stem which is seen late by ``lag``, s.
+    """
+    if not curves:
+        return {}
+    best = min(curves, key=lambda curve: curve.numbers[SLIDING].half_width)
+    return {
+        "speed": best.speed.tolist(),
+        "friction": best.friction.tolist(),
+        "standard_error": best.standard_error.tolist(),
+        "lag": best.lag,
+    }

@@ -1,0 +1,149 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Imperfections of a plant that take part in the fit, and what is known of them beforehand.
+
+Each is a coordinate with a Gaussian prior about zero. Where the record does not determine it, the
+prior remains, and shows in every interval that depends on it.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+
+
+class Profile(Enum):
+    """What is known beforehand of a valve and its instruments.
+
+    ``PLANT`` expects every imperfection, and a lag between the signals even where none was stated.
+    ``BENCH`` is a rig with good instruments: the Karnopp model alone, with mass, slip and a
+    friction that falls with speed, and no lag but a stated one.
+    """
+
+    PLANT = "plant"
+    BENCH = "bench"
+
+    @property
+    def has_imperfections(self) -> bool:
+        """Whether imperfections take part in the fit."""
+        return self is Profile.PLANT
+
+
+TIMING = ("delay", "stem_lag", "force_lag")
+"""A late clock of the stem, s; a slow sensor of the stem, s; a volume before the diaphragm, or
+with the other sign a slow sensor of the pressure, s."""
+
+
+@dataclass(frozen=True)
+class Imperfection:
+    """What is known of an imperfection before the record is seen.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the prior, in the unit of the coordinate.
+    step : float
+        Change by which the motion is differentiated.
+    words : str
+        What to call it in a sentence.
+    """
+
+    deviation: float
+    step: float
+    words: str
+
+
+IMPERFECTIONS: Mapping[str, Imperfection] = MappingProxyType(
+    {
+        "delay": Imperfection(1.0, 0.0002, "clock offset (stem late or early)"),
+        "stem_lag": Imperfection(1.0, 0.0002, "lag of a slow stem sensor"),
+        "force_lag": Imperfection(1.0, 0.0002, "lag of the pressure: slow sensor or volume"),
+        "along_travel": Imperfection(0.1, 0.001, "friction that changes along the travel"),
+        "in_record": Imperfection(0.1, 0.001, "friction that changes during the record"),
+        "at_low_speed": Imperfection(0.1, 0.001, "friction that falls with speed (Stribeck)"),
+        "curvature": Imperfection(0.02, 0.0002, "curved spring, area or flow force along travel"),
+        "cubic": Imperfection(0.01, 0.0002, "stiffness of the spring varies along travel"),
+        "drift": Imperfection(1e-3, 5e-05, "zero of the pressure drifts with time"),
+        "presliding": Imperfection(2e-5, 2e-06, "presliding (elastic creep before it slides)"),
+        "limit_velocity": Imperfection(3e-4, 0.0001, "dead zone of speed (limit velocity DV)"),
+        "viscous_asymmetry": Imperfection(0.1, 0.001, "asymmetric friction, upward and downward"),
+        "mass": Imperfection(2.0, 0.05, "mass"),
+        "slip_force": Imperfection(0.5, 0.02, "static friction (slip jump)"),
+        "stribeck_velocity": Imperfection(4e-3, 1e-05, "friction that falls with speed"),
+    }
+)
+"""By the name of the coordinate. Shares are of F_c (friction, slip force), of k times the measured
+range (spring) and of the force's range in a minute (drift); times s, lengths m, speeds m/s. The
+deviations of the timing are shares of `timing_uncertainty`, that of the mass is one of the mass
+that is assumed."""
+
+BOUNDS: Mapping[str, float] = MappingProxyType(
+    {
+        "coulomb_friction": 0.0,
+        "viscous_friction": 0.0,
+        "spring_constant": 1e-12,
+        "slip_force": 0.0,
+        "mass": 0.02,
+        "stem_lag": 0.0,
+        "presliding": 0.0,
+        "limit_velocity": 0.0,
+        "stribeck_velocity": 1e-4,
+    }
+)
+"""Least values of the straight coordinates that have one; that of the spring is one of 1/k."""
+
+
+MASS_PER_AREA = 50.0
+"""Standard deviation of the moving mass per diaphragm area, kg/m²: 2 kg at 0.04 m²."""
+
+_LEAST_MINUTES = 0.1
+"""Duration of a record, as far as the drift of a zero goes, at least."""
+
+_OF_THE_MODEL = (*TIMING, "mass", "slip_force", "stribeck_velocity")
+"""Coordinates that no profile leaves out."""
+
+
+def zero_drift(span: float, minutes: float) -> float:
+    """Return the deviation of what the zero of a force drifts by from the middle of a record on, N.
+
+    `span` is the range of the force, N; with 1 it is a share of that.
+    """
+    return IMPERFECTIONS["drift"].deviation * span * max(minutes, _LEAST_MINUTES)
+
+
+def deviations(
+    timing_uncertainty: float,
+    assumed_mass: float,
+    dry_friction: float,
+    minutes: float,
+    profile: Profile = Profile.PLANT,
+    diaphragm_area: float = 0.0,
+) -> dict[str, float]:
+    """Return the standard deviation of each prior in the coordinate's own unit.
+
+    `timing_uncertainty` is that of the whole lag between the signals; its sources share it alike.
+    Without one they are left out, and so are the imperfections that the profile does not expect;
+    the mass of a bench lies anywhere between none and twice the assumed one, that of a plant may be
+    as large as its `diaphragm_area`, m², suggests.
+    """
+    own = {name: one.deviation for name, one in IMPERFECTIONS.items()}
+    own["mass"] = max(own["mass"] * assumed_mass, MASS_PER_AREA * diaphragm_area)
+    own["slip_force"] *= dry_friction
+    own["drift"] = zero_drift(1.0, minutes)
+    for name in TIMING:
+        if timing_uncertainty > 0:
+            own[name] *= timing_uncertainty / math.sqrt(len(TIMING))
+        else:
+            del own[name]
+    if profile.has_imperfections:
+        return own
+    own["mass"] = assumed_mass / math.sqrt(3.0)
+    return {name: deviation for name, deviation in own.items() if name in _OF_THE_MODEL}

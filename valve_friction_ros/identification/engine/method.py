@@ -1,0 +1,589 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Methods "plant" and "bench": one engine, with and without the imperfections of a plant."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from valve_friction_ros.identification.engine.balance_regression import SECOND_ORDER, LagPrior
+from valve_friction_ros.identification.engine.departures import Departed, static_friction
+from valve_friction_ros.identification.engine.fitted_record import fitted_record
+from valve_friction_ros.identification.engine.friction_curve import (
+    FrictionCurve,
+    checked_by_curve,
+    curve_evidence,
+    curve_numbers,
+    friction_curves,
+)
+from valve_friction_ros.identification.engine.imperfections import Profile
+from valve_friction_ros.identification.engine.intervals import (
+    NOISE_LIKE,
+    Estimated,
+    NumbersAt,
+    estimated,
+    has_tried_lags,
+)
+from valve_friction_ros.identification.engine.numbers import (
+    ASYMMETRY,
+    found_sizes,
+    reported_numbers,
+)
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.engine.remarks import sampling_remarks
+from valve_friction_ros.identification.engine.search import Prior, search
+from valve_friction_ros.identification.engine.sentences import (
+    by_departures,
+    found_imperfections,
+    main_doubt,
+)
+from valve_friction_ros.identification.engine.verdicts import (
+    curve_misfit,
+    curve_verdicts,
+    fit_misfit,
+    fit_verdicts,
+)
+from valve_friction_ros.identification.friction_drawing import FRICTION_CURVE, IMPERFECTIONS_FOUND
+from valve_friction_ros.identification.published.evidence import (
+    published_beside,
+    sweep_evidence,
+    sweep_finding,
+    with_published,
+)
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.identification.result import Result, StemComparison
+from valve_friction_ros.identification.settings import (
+    REGRESSED,
+    TIMING_UNCERTAINTY,
+    IdentificationSettings,
+)
+from valve_friction_ros.identification.trust.calibration import BUDGET, COVERAGE
+from valve_friction_ros.identification.trust.correlation import (
+    CORRELATION,
+    Correlation,
+    correlation_of,
+)
+from valve_friction_ros.identification.trust.excitation import (
+    require_changing_drive,
+    require_drive,
+    require_enough_samples,
+    require_motion,
+    require_related_signals,
+    require_two_directions,
+    require_unbroken,
+    require_within_travel,
+)
+from valve_friction_ros.identification.trust.misfit import Misfit, stem_distance
+from valve_friction_ros.identification.trust.plausible_units import (
+    require_plausible_units,
+    time_remarks,
+)
+from valve_friction_ros.identification.trust.sliding import COMPARABLE, SPEED_EXPONENT, mean_speed
+from valve_friction_ros.identification.trust.verdict import (
+    WEAK_SHARE,
+    Parameter,
+    Verdict,
+    interval_share,
+    with_verdict,
+)
+from valve_friction_ros.identification.units import SLIDING
+from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
+from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals import (
+    MeasuredRecord,
+    as_sent_on_change,
+    measured,
+    stamped_noise,
+)
+
+_AROUND = 2.0
+_END = 20
+_MOVED_NOISE, _MOVED_SHARE = 8.0, 5e-3
+"""Time, s, kept before and after the motion; samples whose median is where the stem stands; and
+the distance at which it has left there, in deviations of its noise and as a share of its range."""
+
+_WINDOWS, _SHORTEST_WINDOW = 10, 3
+"""Means of the position in which a record must show both directions, and the fewest samples in one:
+sensors that send on change leave few."""
+
+_SAME_SPEED = 0.25
+"""Share by which the simulated and the measured stem may differ in their mean speeds."""
+
+_CLEARLY = 1.0 / 3.0
+"""Half width over the sliding friction below which force and stem surely belong together.
+
+Chosen: noise, drift or another valve's pressure gave 0.49 and more in 116 records."""
+
+
+def identify_plant(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
+    """Identify a record of a plant: stamps as they are, imperfections in the fit.
+
+    The most probable model is found where each imperfection (lags, curved spring, friction that
+    changes, …) has a Gaussian prior about zero. An imperfection that the record does not determine
+    widens every interval that depends on it.
+
+    Parameters
+    ----------
+    recording : Recording
+        Pressure and stem position; `Recording.stamped` is used where it is given.
+    valve : Valve
+        Geometry.
+    settings : IdentificationSettings, optional
+        Fixed parameters, assumed mass and timing uncertainty (by default `TIMING_UNCERTAINTY`).
+        Derivative window, order, sweep, position bias and a fixed limit velocity are those of the
+        published method, whose estimate stands beside.
+
+    Returns
+    -------
+    Result
+        Parameters with intervals and verdicts, `sliding_friction` among them: the work of friction
+        over the distance. The evidence is the uncertainty budget of each: its standard uncertainty
+        by the record and by the timing. The derivative window is 0.
+
+    Raises
+    ------
+    RefusalError
+        If the record does not determine the friction; the message names cause and remedy.
+    """
+    return _identified(recording, valve, settings or IdentificationSettings(), Profile.PLANT)
+
+
+def identify_bench(
+    recording: Recording, valve: Valve, settings: IdentificationSettings | None = None
+) -> Result:
+    """Identify a record of a rig with good instruments: the Karnopp model alone.
+
+    As `identify_plant`, without imperfections; the signals belong together to the stated timing
+    uncertainty, and exactly where none is stated. The intervals hold only as far as that is true.
+
+    Parameters
+    ----------
+    recording, valve, settings
+        As for `identify_plant`.
+
+    Returns
+    -------
+    Result
+        Parameters with intervals and verdicts.
+
+    Raises
+    ------
+    RefusalError
+        If the record does not determine the friction; the message names cause and remedy.
+    """
+    return _identified(recording, valve, settings or IdentificationSettings(), Profile.BENCH)
+
+
+def _identified(
+    recording: Recording, valve: Valve, settings: IdentificationSettings, profile: Profile
+) -> Result:
+    """Identify with the priors of a profile."""
+    if "static_friction" in settings.fixed:
+        raise RefusalError(
+            f"the method {profile.value} finds F_s itself and takes no known one: leave it out, or "
+            "use the method published"
+        )
+    uniform = measured(recording)
+    require_moving_stem(uniform, valve, settings, recording.stamped is not None)
+    record = around_motion(stamped_record(recording))
+    lag = lag_prior_of(settings, profile)
+    curves = friction_curves(record, valve, lag, known_of(settings))
+    balanced, departed = curve_numbers(curves), None
+    if settings.fixed.get("spring_constant") != 0.0:
+        departed = static_friction(record, valve, balanced, lag)
+    known = _Beforehand(curves, balanced, departed)
+    try:
+        require_related_signals(uniform)
+        outcome = _of_simulation(record, valve, settings, profile, known)
+    except RefusalError as refusal:
+        if not _dissipates(balanced):
+            raise
+        force = float(np.ptp(valve.force_per_drive * record.drive.value))
+        outcome = _of_force_balance(curves, balanced, settings, str(refusal), force)
+    outcome = _with_departures(outcome, departed)
+    published, beside = published_beside(uniform, valve, settings)
+    misfit = outcome.misfit
+    return Result(
+        method=profile.value,
+        recording=recording,
+        valve=valve,
+        settings=settings,
+        parameters=with_published(outcome.parameters, published),
+        fit=misfit.fit,
+        rms=math.nan if outcome.stem is None else misfit.rms,
+        misfit=misfit,
+        derivative_window=0,
+        warnings=(
+            *time_remarks(uniform, valve),
+            *_doubts(misfit),
+            *outcome.warnings,
+            *sampling_remarks(record),
+            *beside,
+        ),
+        evidence={
+            **({} if published is None else sweep_evidence(published)),
+            BUDGET: {
+                name: {"record": one.budget.record, "timing": one.budget.timing}
+                for name, one in outcome.numbers.items()
+            },
+            IMPERFECTIONS_FOUND: {
+                name: {"value": one.value, "half_width": one.half_width}
+                for name, one in outcome.imperfections.items()
+                if one.half_width > 0
+            },
+            **({} if outcome.correlation is None else {CORRELATION: outcome.correlation}),
+            FRICTION_CURVE: curve_evidence(curves),
+            COMPARABLE: _comparable(outcome.numbers[SLIDING], balanced.get(SPEED_EXPONENT)),
+        },
+        findings=(
+            *outcome.findings,
+            *_left_to_published(settings),
+            *(() if published is None else (sweep_finding(published),)),
+        ),
+        model=outcome.model,
+        exhibit=published,
+        stem=outcome.stem,
+        sliding_speed=outcome.sliding_speed,
+    )
+
+
+def _comparable(sliding: Estimated, exponent: Estimated | None) -> dict[str, float]:
+    """Return what a comparison with another record of the same sensors needs (`COMPARABLE`)."""
+    found = {"shared_half_width": sliding.shared_half_width}
+    if exponent is not None:
+        found |= {"speed_exponent": exponent.value, "half_width": exponent.own_half_width}
+    return found
+
+
+def _dissipates(balanced: Mapping[str, Estimated]) -> bool:
+    """Whether friction surely takes work from the force, as it does where both are of one valve."""
+    sliding = balanced.get(SLIDING)
+    return sliding is not None and sliding.half_width < _CLEARLY * sliding.value
+
+
+class _Outcome(NamedTuple):
+    """What a simulation or, where none follows the record, the force balance says of it."""
+
+    parameters: Mapping[str, Parameter]
+    numbers: Mapping[str, Estimated]
+    misfit: Misfit
+    sliding_speed: float
+    findings: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    imperfections: Mapping[str, Estimated] = MappingProxyType({})
+    correlation: Correlation | None = None
+    model: KarnoppParameters | None = None
+    stem: StemComparison | None = None
+
+
+class _Beforehand(NamedTuple):
+    """What the record says without a simulation."""
+
+    curves: Sequence[FrictionCurve]
+    balanced: Mapping[str, Estimated]
+    departed: Departed | None
+
+
+def _of_simulation(
+    record: StampedRecord,
+    valve: Valve,
+    settings: IdentificationSettings,
+    profile: Profile,
+    known: _Beforehand,
+) -> _Outcome:
+    """Simulate the stem as the profile has it; the friction curve is its start and its check."""
+    curves, balanced, departed = known
+    if settings.fixed.get("spring_constant") == 0.0:
+        raise RefusalError(
+            "the forces with and against the motion do not surely differ: check that both signals "
+            "belong to this machine, and that it has no spring"
+        )
+    prior = prior_of(settings, profile, valve)
+    static = math.nan if departed is None else departed.static_friction.value
+    fits = search(fitted_record(record, valve), prior, curves, static)
+    fit, numbers = fits[0], estimated(fits, numbers_of(profile))
+    misfit = fit_misfit(fit, numbers, profile)
+    if misfit.is_gross:
+        raise RefusalError(
+            f"no friction model reproduces the record (fit {100 * misfit.fit:.0f} %, "
+            f"{misfit.systematic * 1e3:.2g} mm of misfit): check that both signals belong to this "
+            "valve, and their units, and that its stem reaches both ends of the travel; if the "
+            "packing was changed during the record, clear the buffer and record again"
+        )
+    follows = fit.inflation <= NOISE_LIKE and has_tried_lags(fits)
+    if profile.has_imperfections:
+        numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"])
+        if "mass" in numbers and prior.timing_uncertainty > 0:
+            numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
+        misfit = fit_misfit(fit, numbers)
+    return _Outcome(
+        parameters=fit_verdicts(fits, numbers, settings, misfit, profile),
+        numbers=numbers,
+        misfit=misfit,
+        sliding_speed=_sliding_speed(fit, curves, follows),
+        findings=(
+            f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is "
+            f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not "
+            "noise",
+        ),
+        warnings=found_imperfections(fit),
+        imperfections=estimated(fits, found_sizes),
+        correlation=_correlation(fit, numbers_of(profile)),
+        model=_model(fit),
+        stem=_stem(fit, record),
+    )
+
+
+def _correlation(fit: PosteriorFit, numbers_at: NumbersAt) -> Correlation:
+    """Return how the errors of the numbers go together at the most probable place."""
+    numbers = numbers_at(fit.model, fit.at)
+    gradients = {
+        name: np.array([one.gradient.get(free, 0.0) for free in fit.names])
+        for name, one in numbers.items()
+    }
+    own = {name: one.definition**2 for name, one in numbers.items()}
+    return correlation_of(gradients, fit.stages[-1].covariance, own)
+
+
+def _beside_lags(mass: Estimated, spring: float) -> Estimated:
+    """Return the mass with the doubt that lags leave: seen late by τ, a spring has the mass k·τ²/2.
+
+    That is what a shift by a lag leaves of it, beside the elastic creep of a packing.
+    """
+    return replace(mass, half_width=math.hypot(mass.half_width, spring * SECOND_ORDER**2))
+
+
+def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
+    """Take F_s from the departures of the stem, unless a simulated stem has identified it."""
+    name = "static_friction"
+    known = outcome.parameters[name]
+    if departed is None or known.verdict in (Verdict.IDENTIFIED, Verdict.FIXED):
+        return outcome
+    one = departed.static_friction
+    width, share = one.half_width, one.half_width / one.value
+    words = interval_share(one.value, share)
+    reason = main_doubt(one.budget, words) if share > WEAK_SHARE else ""
+    return outcome._replace(
+        parameters={
+            **outcome.parameters,
+            name: with_verdict(name, one.value, width / COVERAGE, width, reason),
+        },
+        numbers={**outcome.numbers, name: one},
+        findings=(*outcome.findings, by_departures(departed.departures)),
+    )
+
+
+def _sliding_speed(fit: PosteriorFit, curves: Sequence[FrictionCurve], follows: bool) -> float:
+    """Return the mean speed of the simulated stem over the distance, m/s.
+
+    Averages of the measured stem lose some of the speed of its jumps. A simulated stem that misses
+    the record may be faster than that; then the measured one counts.
+    """
+    speed = mean_speed(fit.model.simulate(fit.at).velocity)
+    if follows or not curves:
+        return speed
+    measured_speed = curves[0].sliding_speed
+    return speed if abs(speed - measured_speed) < _SAME_SPEED * measured_speed else measured_speed
+
+
+def _of_force_balance(
+    curves: Sequence[FrictionCurve],
+    numbers: Mapping[str, Estimated],
+    settings: IdentificationSettings,
+    why: str,
+    force_range: float,
+) -> _Outcome:
+    """Take the force balance of the sliding stem alone; `why` says why none was simulated."""
+    numbers = {name: one for name, one in numbers.items() if name != SPEED_EXPONENT}
+    best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
+    misfit = curve_misfit(best, numbers[SLIDING])
+    return _Outcome(
+        parameters=curve_verdicts(numbers, settings, best.stribeck_velocity, force_range),
+        numbers=numbers,
+        misfit=misfit,
+        sliding_speed=best.sliding_speed,
+        correlation=best.correlation,
+        findings=(
+            f"the force balance of the sliding stem reproduces {100 * misfit.fit:.2f} % of the "
+            f"force; {misfit.words} of the rest are not noise",
+        ),
+        warnings=() if settings.fixed.get("spring_constant") == 0.0 else (f"simulation: {why}",),
+        model=_balanced_model(numbers, settings),
+    )
+
+
+def require_moving_stem(
+    record: MeasuredRecord,
+    valve: Valve,
+    settings: IdentificationSettings,
+    has_own_stamps: bool = False,
+) -> None:
+    """Refuse a record whose stem does not move both ways within the travel."""
+    require_drive(record, valve)
+    require_plausible_units(record, valve, settings)
+    window = settings.published_window
+    if has_own_stamps:
+        window = int(np.clip(len(record) // _WINDOWS, _SHORTEST_WINDOW, window))
+    require_enough_samples(record, window)
+    require_motion(record)
+    require_two_directions(record, window)
+    require_within_travel(record, valve)
+    require_changing_drive(record)
+
+
+def require_record(record: MeasuredRecord, valve: Valve, settings: IdentificationSettings) -> None:
+    """Refuse a record in which the stem does not move both ways, or not with the drive."""
+    require_moving_stem(record, valve, settings)
+    require_related_signals(record)
+
+
+def around_motion(record: StampedRecord) -> StampedRecord:
+    """Return the part of a record in which the stem moves, and `_AROUND` before and after it.
+
+    A stem that stands, at a stop above all, says nothing of its friction.
+    """
+    stem = record.position
+    span = float(np.ptp(stem.value))
+    reach = max(_MOVED_NOISE * stamped_noise(stem), _MOVED_SHARE * span)
+    ends = [float(np.median(part)) for part in (stem.value[:_END], stem.value[-_END:])]
+    left = np.flatnonzero(np.abs(stem.value - ends[0]) > reach)
+    back = np.flatnonzero(np.abs(stem.value - ends[1]) > reach)
+    if not (left.size and back.size):
+        return record
+    begin, end = stem.time[left[0]] - _AROUND, stem.time[back[-1]] + _AROUND
+    signals = []
+    for signal in (record.drive, stem):
+        kept = (signal.time >= begin) & (signal.time <= end)
+        if np.count_nonzero(kept) < StampedSignal.FEWEST:
+            return record
+        signals.append(StampedSignal(signal.time[kept], signal.value[kept]))
+    return StampedRecord(signals[0], signals[1], record.driven_by)
+
+
+def stamped_record(recording: Recording) -> StampedRecord:
+    """Return the samples at their own stamps, or on the grid where there are no others."""
+    if (stamped := recording.stamped) is not None:
+        return replace(
+            stamped,
+            drive=as_sent_on_change(stamped.drive),
+            position=as_sent_on_change(stamped.position),
+        )
+    require_unbroken(recording)
+    time = recording.time
+    return StampedRecord(
+        StampedSignal(time, recording.drive),
+        StampedSignal(time, recording.position),
+        recording.driven_by,
+    )
+
+
+def prior_of(
+    settings: IdentificationSettings,
+    profile: Profile = Profile.PLANT,
+    valve: Valve | None = None,
+) -> Prior:
+    """Return what is known before a record is seen, of any valve or of that one."""
+    known = known_of(settings)
+    timing = settings.timing_uncertainty
+    if timing is None:
+        timing = TIMING_UNCERTAINTY if profile.has_imperfections else 0.0
+    area = 0.0
+    if valve is not None and settings.assumed_mass == IdentificationSettings.assumed_mass:
+        area = valve.diaphragm_area or 0.0
+    mass = known.get("mass", settings.assumed_mass)
+    return Prior(timing, mass, known, profile, area)
+
+
+def numbers_of(profile: Profile) -> NumbersAt:
+    """Return the reported numbers as functions of a place of the fit."""
+    asymmetry = ASYMMETRY if profile.has_imperfections else 0.0
+    return partial(reported_numbers, asymmetry=asymmetry)
+
+
+def known_of(settings: IdentificationSettings) -> dict[str, float]:
+    """Return the known parameters that a force balance has."""
+    return {name: value for name, value in settings.fixed.items() if name in REGRESSED}
+
+
+def lag_prior_of(settings: IdentificationSettings, profile: Profile = Profile.PLANT) -> LagPrior:
+    """Return what is known of the lag between the signals."""
+    timing = settings.timing_uncertainty
+    return LagPrior(0.0 if timing is None and not profile.has_imperfections else timing)
+
+
+def _balanced_model(
+    numbers: Mapping[str, Estimated], settings: IdentificationSettings
+) -> KarnoppParameters | None:
+    """Return the Karnopp model of a force balance; None where one of its numbers is impossible."""
+    values = {name: one.value for name, one in numbers.items()} | known_of(settings)
+    try:
+        return KarnoppParameters(
+            mass=values.get("mass", settings.assumed_mass),
+            viscous_friction=values["viscous_friction"],
+            coulomb_friction=values["coulomb_friction"],
+            static_friction=values.get("static_friction", values["coulomb_friction"]),
+            spring_constant=values["spring_constant"],
+            spring_preload=values["spring_preload"],
+        )
+    except (KeyError, ValueError):
+        return None
+
+
+def _doubts(misfit: Misfit) -> tuple[str, ...]:
+    if misfit.describes:
+        return ()
+    return (
+        f"the Karnopp model does not describe this valve: {misfit.words} of what was measured are "
+        "more than noise",
+    )
+
+
+def _left_to_published(settings: IdentificationSettings) -> tuple[str, ...]:
+    """Say that a position bias has no part in a fit that finds the preload."""
+    if settings.position_bias is None:
+        return ()
+    return (
+        f"the position bias of {settings.position_bias * 1e3:.4g} mm is of the published method "
+        "alone: here the preload is found",
+    )
+
+
+def _stem(fit: PosteriorFit, stamped: StampedRecord) -> StemComparison:
+    """Return the measured stem and the simulated one as its sensor shows it, at each step."""
+    record = fit.model.record
+    steps = np.arange(record.force.size) * record.period
+    readings = fit.model.readings(fit.at).mean(axis=0)
+    measured, simulated = (np.interp(steps, record.time, y) for y in (record.position, readings))
+    start = max(float(stamped.drive.time[0]), float(stamped.position.time[0]))
+    return StemComparison(record.period, measured, simulated, start)
+
+
+def _model(fit: PosteriorFit) -> KarnoppParameters:
+    """Return the Karnopp model without its imperfections."""
+    at = fit.at
+    return KarnoppParameters(
+        mass=at["mass"],
+        viscous_friction=at["viscous_friction"],
+        coulomb_friction=at["coulomb_friction"],
+        static_friction=at["coulomb_friction"] + at["slip_force"],
+        spring_constant=at["spring_constant"],
+        spring_preload=at["spring_preload"],
+        limit_velocity=at["limit_velocity"],
+        stribeck_velocity=at["stribeck_velocity"],
+    )

@@ -1,0 +1,305 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Most probable coordinates of a model with priors, and what is left uncertain."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.engine.bounded_step import bounded_minimum
+from valve_friction_ros.identification.engine.broad_model import BroadModel
+from valve_friction_ros.identification.engine.coordinates import (
+    Coordinates,
+    jacobian,
+    physical,
+    straight,
+)
+from valve_friction_ros.identification.engine.imperfections import BOUNDS
+from valve_friction_ros.identification.engine.weights import inflation, stroke_cells
+
+_DAMPINGS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 0.03, 0.3, 3.0)
+_SHORTER = (1.0, 0.5, 0.2)
+_WORTH = 0.1
+"""Fall of the sum of squares, in variances, below which a step is not worth taking."""
+
+_NOISE = 1.2
+"""Largest squared difference of the halves that is noise, over what is foreseen.
+
+In right fits of 13 records of a benchmark it is 0.2 to 1.04."""
+
+_LARGEST_CHANGE = 0.5
+_LEAST_COMMON = 0.01
+_BLOCK = 512
+_MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A place that the fit came by.
+
+    Attributes
+    ----------
+    at : mapping of str to float
+        All coordinates.
+    covariance : ndarray of float, shape (p, p)
+        Posterior covariance of the free ones, the model taken as linear there.
+    misfit : float
+        Sum of the squared residuals over their effective variances, not inflated.
+    penalty : float
+        Sum of the squared distances from the priors over their variances.
+    """
+
+    at: Coordinates
+    covariance: NDArray[np.float64] = field(repr=False)
+    misfit: float
+    penalty: float
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorFit:
+    """The end of a fit.
+
+    Attributes
+    ----------
+    model : BroadModel
+        The model.
+    names : tuple of str
+        The free coordinates.
+    stages : tuple of Stage
+        All that it came by, the last is the end.
+    inflation : float
+        Of the residual at the end.
+    precision : ndarray of float, shape (p,)
+        One over the variance of each prior, 0 without one.
+    remaining : ndarray of float, shape (p,)
+        Step that the linear model would still take.
+    residual : ndarray of float, shape (c,)
+        Measured less simulated readings, m, the mean of both halves.
+    kept : tuple of str
+        Free coordinates that stay where their priors are centred, and widen the intervals only.
+    """
+
+    model: BroadModel
+    names: tuple[str, ...]
+    stages: tuple[Stage, ...] = field(repr=False)
+    inflation: float
+    precision: NDArray[np.float64] = field(repr=False)
+    remaining: NDArray[np.float64] = field(repr=False)
+    residual: NDArray[np.float64] = field(repr=False)
+    kept: tuple[str, ...] = ()
+
+    @property
+    def at(self) -> Coordinates:
+        """Coordinates at the end."""
+        return self.stages[-1].at
+
+    @property
+    def objective(self) -> float:
+        """Squares of residuals and of distances from the priors together."""
+        return self.stages[-1].misfit + self.stages[-1].penalty
+
+
+def _misfit(model: BroadModel, residual: NDArray[np.float64]) -> float:
+    """Sum the products of both halves' residuals: noise of the pressure adds nothing to it.
+
+    The product of two numbers is the square of their mean less that of half their difference. The
+    difference counts as far as the noise of the pressure explains it: the simulated stems of both
+    halves may go different ways.
+    """
+    even, odd = residual * model.weights
+    mean, apart = float(np.sum((even + odd) ** 2)), float(np.sum((even - odd) ** 2))
+    return 0.25 * mean - min(0.25 * apart, _NOISE * model.foreseen_difference)
+
+
+def _common(own: NDArray[np.float64], cross: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the information that both halves share.
+
+    What the noise of the pressure adds to the derivatives is not in their products `cross`. Where
+    chance leaves less than `_LEAST_COMMON` of what one half for itself claims, that much is kept.
+    """
+    values, vectors = np.linalg.eigh(own)
+    root = np.sqrt(np.maximum(values, max(1e-15 * float(values[-1]), np.finfo(float).tiny)))
+    shares, turned = np.linalg.eigh((vectors / root).T @ cross @ (vectors / root))
+    back = (vectors * root) @ turned
+    return np.asarray((back * np.clip(shares, _LEAST_COMMON, 1.0)) @ back.T, dtype=np.float64)
+
+
+def _products(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Multiply a matrix by its transpose, block by block.
+
+    For larger ones NumPy's library starts threads, which wait for one another on a busy machine.
+    """
+    blocks = np.array_split(rows, max(rows.shape[1] // _BLOCK, 1), axis=1)
+    return np.asarray(np.sum([block @ block.T for block in blocks], axis=0))
+
+
+class _Problem:
+    """The linear problem at one place, in straight coordinates scaled to unit curvature."""
+
+    def __init__(
+        self,
+        model: BroadModel,
+        at: Coordinates,
+        names: tuple[str, ...],
+        deviations: Mapping[str, float],
+        centre: Coordinates,
+        readings: NDArray[np.float64],
+    ) -> None:
+        record = model.record
+        self.model, self.at, self.names = model, at, names
+        self.centre, self.deviations = centre, deviations
+        self.residual = record.position - readings
+        scaled = self.residual * model.weights
+        self.inflation = inflation(scaled.mean(axis=0), stroke_cells(record))
+        self.precision = np.array(
+            [1.0 / deviations[name] ** 2 if name in deviations else 0.0 for name in names]
+        )
+        self.distance = np.array([at[name] - centre.get(name, 0.0) for name in names])
+        self.jacobian = jacobian(at, names)
+        size = np.abs(np.diag(self.jacobian))
+        even, odd = model.sensitivity(at, names, readings) * model.weights
+        same, apart = _products(even + odd), _products(even - odd)
+        own, cross = 0.25 * (same + apart), 0.25 * (same - apart)
+        diagonal = np.diag(own) / self.inflation + self.precision * size**2
+        self.scale = np.where(diagonal > 0, np.sqrt(np.abs(diagonal)), 1.0)
+        outer = np.outer(self.scale, self.scale) * self.inflation
+        information = _common(own / outer, cross / outer)
+        self.curvature = information + np.diag(self.precision * size**2 / self.scale**2)
+        gradient = 0.5 * np.sum(even * scaled[1] + odd * scaled[0], axis=1) / self.inflation
+        self.slope = (gradient - self.precision * size * self.distance) / self.scale
+        self.straight = straight(at, names)
+        lowest = [BOUNDS.get(name, -np.inf) - self.straight[name] for name in names]
+        self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
+
+    def stage(self) -> Stage:
+        inverse = np.linalg.pinv(self.curvature, rcond=1e-15, hermitian=True)
+        inverse /= np.outer(self.scale, self.scale)
+        return Stage(
+            self.at,
+            self.jacobian @ inverse @ self.jacobian.T,
+            _misfit(self.model, self.residual),
+            self.penalty(self.at),
+        )
+
+    def step(self, damping: float) -> NDArray[np.float64]:
+        damped = self.curvature + damping * np.eye(self.scale.size)
+        return np.asarray(bounded_minimum(damped, self.slope, self.lowest) / self.scale)
+
+    def gain(self, step: NDArray[np.float64]) -> float:
+        scaled = step * self.scale
+        return float(2.0 * self.slope @ scaled - scaled @ self.curvature @ scaled)
+
+    def objective(self, at: Coordinates, readings: NDArray[np.float64]) -> float:
+        misfit = _misfit(self.model, self.model.record.position - readings)
+        return misfit / self.inflation + self.penalty(at)
+
+    def penalty(self, at: Coordinates) -> float:
+        """Squared distances from the priors, those of coordinates that are not free among them."""
+        return sum(
+            ((at[name] - self.centre.get(name, 0.0)) / deviation) ** 2
+            for name, deviation in self.deviations.items()
+        )
+
+    def moved(self, step: NDArray[np.float64]) -> dict[str, float]:
+        there = dict(self.straight)
+        for name, change in zip(self.names, step.tolist(), strict=True):
+            there[name] = max(there[name] + change, BOUNDS.get(name, -np.inf))
+        return physical(there, self.names)
+
+    def largest_share(self, step: NDArray[np.float64]) -> float:
+        """Share of a step that changes no force by more than half of its size."""
+        share = 1.0
+        for name, change in zip(self.names, step.tolist(), strict=True):
+            if name in _MOVED and change != 0:
+                size = 1e5 * self.model.step(self.at, name) / self.model.coarseness
+                if name == "slip_force":
+                    size = self.straight["coulomb_friction"] + 1e-12
+                share = min(share, _LARGEST_CHANGE * size / abs(change))
+        return share
+
+
+def _descended(problem: _Problem) -> tuple[dict[str, float], NDArray[np.float64], float] | None:
+    """Take the first step that leads down; return the place, its readings and the fall."""
+    now = problem.objective(problem.at, problem.model.record.position - problem.residual)
+    for damping in _DAMPINGS:
+        step = problem.step(damping)
+        share = problem.largest_share(step)
+        for shorter in _SHORTER if damping == 0 else (1.0,):
+            there = problem.moved(share * shorter * step)
+            readings = problem.model.readings(there)
+            then = problem.objective(there, readings)
+            if then < now:
+                return there, readings, now - then
+    return None
+
+
+def fit(
+    model: BroadModel,
+    start: Coordinates,
+    names: tuple[str, ...],
+    deviations: Mapping[str, float],
+    centre: Coordinates,
+    steps: int,
+) -> PosteriorFit:
+    """Go down from `start` to the most probable coordinates, by Gauss–Newton's method.
+
+    With the readings y, those of the model h(θ), the weights W and the priors N(c, Λ⁻¹), the sum
+
+        |W·(y − h(θ))|²/κ + (θ − c)ᵀ·Λ·(θ − c)
+
+    is made small; κ is the `inflation` of the residual. The posterior covariance is
+
+        (HᵀW²H/κ + Λ)⁻¹ .
+
+    The simulated stem carries noise of the pressure, and less of it the more the model damps; a
+    plain sum of squares would take that for information. In each product one factor is therefore
+    of the even samples of the pressure, the other one of the odd ones, whose noise is independent.
+
+    Parameters
+    ----------
+    model : BroadModel
+        The model.
+    start : mapping of str to float
+        All coordinates.
+    names : tuple of str
+        The free ones.
+    deviations : mapping of str to float
+        Standard deviations of the priors; without one a coordinate is free.
+    centre : mapping of str to float
+        Their means; 0 where none is given.
+    steps : int
+        Steps at most; with 0 the posterior at `start` is told.
+    """
+    at = dict(start)
+    problem = _Problem(model, at, names, deviations, centre, model.readings(at))
+    stages = [problem.stage()]
+    for _ in range(steps):
+        if problem.gain(problem.step(0.0)) < _WORTH:
+            break
+        found = _descended(problem)
+        if found is None:
+            break
+        at, readings, fall = found
+        problem = _Problem(model, at, names, deviations, centre, readings)
+        stages.append(problem.stage())
+        if fall < _WORTH:
+            break
+    remaining = problem.jacobian @ problem.step(0.0)
+    return PosteriorFit(
+        model,
+        names,
+        tuple(stages),
+        problem.inflation,
+        problem.precision,
+        remaining,
+        problem.residual.mean(axis=0),
+    )

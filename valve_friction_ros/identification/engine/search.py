@@ -1,0 +1,457 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""From a record to the best fit: starts from a regression, and branches where it is stuck."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from valve_friction_ros.identification.engine.broad_model import ABSENT, SWINGING, BroadModel
+from valve_friction_ros.identification.engine.coordinates import MAIN, Coordinates
+from valve_friction_ros.identification.engine.fitted_record import (
+    FittedRecord,
+    set_anew_at_rests,
+)
+from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
+from valve_friction_ros.identification.engine.imperfections import TIMING, Profile, deviations
+from valve_friction_ros.identification.engine.intervals import UNLIKELY
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit, fit
+from valve_friction_ros.identification.engine.starts import (
+    lagging,
+    nearest,
+    sliding,
+    split,
+    splits,
+)
+
+_SLIP_SHARES = (0.35, 0.55, 0.75, 0.9)
+_SLIPS = (0.15, 0.4, 0.8)
+_FALLS = (0.05, 0.2)
+"""Stribeck speeds to start from, over the sliding speed, where the stem surely slips."""
+
+_LIMIT_VELOCITIES = (2e-4, 6e-4)
+_SUSPICIOUS = 1.5
+"""Inflation of a residual beyond which other starts are tried: a third of it is not noise."""
+
+_START_NOISE = 3.0
+_START_TIME = 5e-3
+"""The first position is known to so many deviations of its noise, and to what the stem moves in
+such a time (s) and in that by which its sensor may be late."""
+
+_MOST_WORK, _FOR_LAGS = 12_000_000, 4_000_000
+"""Steps of simulations after which no other branch begins, and what is left for other lags after
+them: a second of a processor or so, and a third of one.
+
+A count and not a time, so that the answer does not depend on the machine."""
+
+_OF_TANGENT = 5
+"""Simulations that take as long as one that carries all derivatives along."""
+
+_COARSENESS = 100.0
+"""Of the derivatives until a fit is near its end."""
+
+_FEWEST_STEPS = 2
+_TRADED = (0.25, 0.5, 1.0)
+_TRADED_STEPS = 6
+_IMPROBABLE = 25.0
+"""Steps along that valley each way, shares of the timing uncertainty; steps of a fit there; and the
+rise of the sum of squares after which the valley is left."""
+
+_DEMANDED = 30.0
+"""Fall of the sum of squares, in inflated variances (5.5 standard errors), below which the record
+of a bench does not demand a further coordinate."""
+
+_FEW_STEPS = 6
+_MORE_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known beforehand.
+
+    Attributes
+    ----------
+    timing_uncertainty : float
+        Standard deviation of the time by which one signal may lag the other in all, s.
+    mass : float
+        Mass to be expected, kg.
+    fixed : mapping of str to float
+        Coordinates that are known.
+    profile : Profile
+        Which imperfections take part in the fit.
+    diaphragm_area : float
+        By which the mass of a plant may be larger than expected, m²; 0 where there is none, or the
+        mass was stated.
+    """
+
+    timing_uncertainty: float
+    mass: float
+    fixed: Mapping[str, float]
+    profile: Profile = Profile.PLANT
+    diaphragm_area: float = 0.0
+
+
+class _Search:
+    """The fits of one record."""
+
+    def __init__(
+        self,
+        record: FittedRecord,
+        prior: Prior,
+        curves: Sequence[FrictionCurve] = (),
+        static_friction: float = math.nan,
+    ) -> None:
+        self.work, self.most_work = 0, _MOST_WORK
+        self.curves, self.static_friction = curves, static_friction
+        self.prior = prior
+        self.sliding = sliding(record)
+        self.exact = BroadModel(record, self.sliding.spring_constant)
+        self.model = replace(self.exact, coarseness=_COARSENESS)
+        self.stepwise = replace(self.exact, record=set_anew_at_rests(record))
+        self.known = dict(prior.fixed)
+        self.centre = {"mass": prior.mass}
+        self.spread = deviations(
+            prior.timing_uncertainty,
+            prior.mass,
+            self.sliding.friction,
+            record.duration / 60,
+            prior.profile,
+            prior.diaphragm_area,
+        )
+        self.centre["start_position"] = record.start
+        late = _START_TIME + 2.0 * prior.timing_uncertainty
+        self.spread["start_position"] = _START_NOISE * record.noise + late * abs(
+            float(record.leaving[0])
+        )
+        self.main = tuple(name for name in MAIN if name not in self.known)
+        self.timing = tuple(name for name in TIMING if name in self.spread)
+        later = {"stribeck_velocity", "start_position", *self.known}
+        if not prior.profile.has_imperfections:
+            later.add("mass")
+        self.all = (*self.main, *(name for name in self.spread if name not in later))
+        self.base = {
+            **ABSENT,
+            "mass": prior.mass,
+            "spring_constant": self.sliding.spring_constant,
+            "spring_preload": self.sliding.spring_preload,
+            "start_position": record.start,
+            **split(self.sliding, 0.9),
+            **self.known,
+        }
+
+    def fit(
+        self,
+        start: Coordinates,
+        names: tuple[str, ...],
+        steps: int,
+        model: BroadModel | None = None,
+    ) -> PosteriorFit:
+        """Fit from a start, and count the work."""
+        start, model = {**start, **self.known}, model or self.model
+        derivatives = len(names) if model.coarseness > 1.0 else _OF_TANGENT
+        a_step = 2 * derivatives * model.effort(start)
+        allowed = (self.most_work - self.work) // a_step
+        found = fit(
+            model,
+            start,
+            names,
+            self.spread,
+            self.centre,
+            min(steps, max(allowed, _FEWEST_STEPS)),
+        )
+        self.work += len(found.stages) * a_step
+        return found
+
+    def full(self, start: Coordinates, names: tuple[str, ...] = ()) -> PosteriorFit:
+        """Fit with all imperfections, or with those that are named."""
+        names = names or self.all
+        near = self.fit(start, names, _MORE_STEPS)
+        return self.fit(near.at, names, _MORE_STEPS, self.exact)
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether another branch may be tried."""
+        return self.work < self.most_work
+
+    def slip_starts(self, *places: Coordinates) -> list[Coordinates]:
+        """Return starts whose friction falls as soon as the stem moves."""
+        starts: list[Coordinates] = []
+        for at in places:
+            total = max(at["coulomb_friction"], 0.1 * self.sliding.friction)
+            for share in _SLIP_SHARES:
+                for slip in _SLIPS:
+                    lost = (1 - share) * total / self.sliding.speed
+                    starts.append(
+                        {
+                            **at,
+                            "coulomb_friction": share * total,
+                            "viscous_friction": at["viscous_friction"] + lost,
+                            "slip_force": slip * share * total,
+                        }
+                    )
+        return starts
+
+    def curved(self) -> PosteriorFit | None:
+        """Fit a friction that falls with speed, from the friction curves, each move alone first.
+
+        None without such curves, or where that alone takes all the time.
+        """
+        starts = self.from_curves()
+        if not starts:
+            return None
+        near = nearest(self.stepwise, starts)[0]
+        near = nearest(self.stepwise, [near, *self.falling(near)])[0]
+        falls = near["stribeck_velocity"] > 0
+        own = ("slip_force", "stribeck_velocity") if falls else ()
+        first = self.fit(near, (*self.main, *own), _MORE_STEPS, self.stepwise)
+        if not falls:
+            return self.full(first.at)
+        if not self.may_go_on:
+            return None
+        others = tuple(name for name in self.all if name != "at_low_speed")
+        return self.fit(first.at, (*others, "stribeck_velocity"), 2 * _MORE_STEPS, self.exact)
+
+    def falling(self, at: Coordinates) -> list[Coordinates]:
+        """Let the friction fall with speed, from the static friction of the departures if known.
+
+        How slow the stem must be for that, a curve of the sliding friction seldom tells.
+        """
+        dry = at["coulomb_friction"]
+        slips = [dry * share for share in _SLIPS]
+        if self.static_friction > dry:
+            slips = [self.static_friction - dry]
+        speeds = [self.sliding.speed * share for share in _FALLS]
+        speeds += [at["stribeck_velocity"]] if at["stribeck_velocity"] > 0 else []
+        return [
+            {**at, "slip_force": slip, "stribeck_velocity": speed}
+            for slip in slips
+            for speed in speeds
+        ]
+
+    def stopping(self, full: PosteriorFit) -> PosteriorFit:
+        """Fit a dead zone of the speed."""
+        if "limit_velocity" not in self.all:
+            return full
+        dead = [{**full.at, "limit_velocity": speed} for speed in _LIMIT_VELOCITIES]
+        return self.full(nearest(self.model, dead)[0])
+
+    def demanded(self, best: PosteriorFit) -> PosteriorFit:
+        """Take a falling friction, and a slip, only where the record of a bench demands them.
+
+        The mass stays as expected, and is as uncertain as its prior says.
+        """
+        if not best.at["stribeck_velocity"] and any(one.stribeck_velocity for one in self.curves):
+            falling = self.curved()
+            if falling and best.objective - falling.objective > _DEMANDED * falling.inflation:
+                best = falling
+        if not best.at["stribeck_velocity"] and "slip_force" in best.names:
+            plain = self.full({**best.at, "slip_force": 0.0}, (*self.main, *self.timing))
+            if plain.objective - best.objective < _DEMANDED * best.inflation:
+                best = plain
+        if "mass" in self.known:
+            return best
+        end = self.fit(best.at, (*best.names, "mass"), 0, self.exact)
+        (stage,) = end.stages
+        with_mass, known = stage.covariance[:, -1], float(stage.covariance[-1, -1])
+        wider = self.spread["mass"] ** 2 / known**2 - 1.0 / known
+        covariance = stage.covariance + wider * np.outer(with_mass, with_mass)
+        return replace(
+            end,
+            stages=(replace(stage, covariance=covariance),),
+            remaining=np.append(best.remaining, 0.0),
+            kept=("mass",),
+        )
+
+    def traded(self, best: PosteriorFit) -> list[PosteriorFit]:
+        """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
+
+        The two trade places along a valley that is too bent for the linear model at its deepest
+        point. Both ways along it the fit goes as far as the timing is uncertain, or until it is
+        improbable. And a slow sensor of the stem may make up for all viscous friction; half of each
+        does not, so that no valley leads there.
+        """
+        lag = self.prior.timing_uncertainty
+        if lag == 0.0 or "viscous_friction" not in best.names:
+            return []
+        self.most_work = max(self.most_work, self.work + _FOR_LAGS)
+        names = tuple(
+            name
+            for name in best.names
+            if name in (*MAIN, *TIMING, "mass", "slip_force") and name != "viscous_friction"
+        )
+
+        def with_delay(fit: PosteriorFit, delay: float) -> PosteriorFit | None:
+            own = _delay(fit)
+            delay = max(delay, min(own, SWINGING))
+            if not (delay != own and self.may_go_on):
+                return None
+            steps, late = _TRADED_STEPS, {"force_lag": fit.at["force_lag"] + own - delay}
+            if delay <= SWINGING:
+                whole = own - delay + sum(fit.at[name] for name in TIMING)
+                steps, late = _MORE_STEPS, {"delay": 0.0, "force_lag": 0.0, "stem_lag": whole}
+            late["viscous_friction"] = fit.at["spring_constant"] * delay
+            return self.fit({**fit.at, **late}, names, steps, self.exact)
+
+        exchanged = with_delay(best, 0.0)
+        found = [] if exchanged is None else [exchanged]
+        for way in (-1.0, 1.0):
+            last: PosteriorFit | None = best
+            for share in _TRADED:
+                last = with_delay(last, _delay(last) - way * share * lag) if last else None
+                if last is None:
+                    break
+                found.append(last)
+                if last.objective - best.objective > _IMPROBABLE * best.inflation**2:
+                    break
+        return found
+
+    def all_probable(self) -> list[PosteriorFit]:
+        """Return the most probable fit, and those with which it competes."""
+        best = self.best()
+        if not self.prior.profile.has_imperfections:
+            best = self.demanded(best)
+        others = self.traded(best)
+        lowest = min(others, key=lambda one: one.objective, default=best)
+        if lowest.objective < best.objective - 1.0:
+            deeper = self.fit(lowest.at, best.names, _MORE_STEPS, self.exact)
+            if deeper.objective < best.objective:
+                best, others = deeper, [*others, best]
+        return [best, *others]
+
+    def from_curves(self) -> list[Coordinates]:
+        """Return what the friction curves say, as starts."""
+        starts: list[Coordinates] = []
+        for curve in self.curves:
+            values = {name: one.value for name, one in curve.numbers.items() if name in MAIN}
+            spring = values.get("spring_constant", 0.0)
+            if not (spring > 0 and values.get("coulomb_friction", 0.0) > 0):
+                continue
+            if "viscous_friction" in values:  # else it is given
+                values["viscous_friction"] = max(values["viscous_friction"], SWINGING * spring)
+            static = curve.numbers.get("static_friction")
+            slip = 0.0 if static is None else max(static.value - values["coulomb_friction"], 0.0)
+            starts.append(
+                {
+                    **self.base,
+                    **values,
+                    "slip_force": slip,
+                    "stribeck_velocity": curve.stribeck_velocity if slip > 0 else 0.0,
+                    **({"delay": curve.lag} if self.timing else {}),
+                }
+            )
+        return starts
+
+    def start(self) -> Coordinates:
+        """Fit few coordinates, without and with a slip, each with its likeliest lag."""
+        plain = self.lagged(splits(self.sliding, self.base), self.main)
+        if "slip_force" not in self.all:
+            return plain.at
+        slipping = self.slip_starts(self.base, {**self.base, **plain.at})
+        slipped = self.lagged(slipping, (*self.main, "slip_force"))
+        return min(plain, slipped, key=lambda one: one.objective).at
+
+    def lagged(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
+        """Fit from the nearest start, and again from there with the likeliest lag."""
+        plain = self.fit(nearest(self.model, starts)[0], names, _FEW_STEPS)
+        if not self.timing:
+            return plain
+        lags = [plain.at, *lagging(plain.at, self.prior.timing_uncertainty)]
+        near = nearest(self.model, lags)[0]
+        return self.fit(near, tuple(dict.fromkeys((*names, *self.timing))), _FEW_STEPS)
+
+    def smooth(self) -> PosteriorFit | None:
+        """Fit from the friction curves, without a fall of the friction with speed.
+
+        That costs ten times as much.
+        """
+        starts = [{**one, "stribeck_velocity": 0.0} for one in self.from_curves()]
+        if not starts:
+            return None
+        few = tuple(name for name in (*self.main, "slip_force") if name in self.all)
+        return self.full(self.fit(nearest(self.model, starts)[0], few, _FEW_STEPS).at)
+
+    def best(self) -> PosteriorFit:
+        """Return the most probable of all fits; one that is likely ends the search."""
+        branches: list[Callable[[], PosteriorFit | None]]
+        branches = [self.smooth, self.curved, lambda: self.full(self.start())]
+        fits: list[PosteriorFit] = []
+        while branches and not (fits and self.is_enough(fits)):
+            found = branches.pop(0)()
+            fits += [] if found is None else [found]
+        best = min(fits, key=lambda one: one.objective)
+        if self.is_enough(fits):
+            return best
+        return min(best, self.stopping(best), key=lambda one: one.objective)
+
+    def is_enough(self, fits: Sequence[PosteriorFit]) -> bool:
+        """Whether one of the fits is likely, or no other may be tried."""
+        likely = any(
+            one.inflation < _SUSPICIOUS and one.stages[-1].penalty < UNLIKELY for one in fits
+        )
+        return likely or not self.may_go_on
+
+
+def _delay(fit: PosteriorFit) -> float:
+    """Return the time by which viscous friction delays the stem, s."""
+    return fit.at["viscous_friction"] / fit.at["spring_constant"]
+
+
+def search(
+    record: FittedRecord,
+    prior: Prior,
+    curves: Sequence[FrictionCurve] = (),
+    static_friction: float = math.nan,
+) -> list[PosteriorFit]:
+    """Find the most probable model of a record, and the ones that compete with it.
+
+    The friction curve starts a fit of few coordinates, and that one a fit with all imperfections.
+    Where the residual is more than noise, a fit with friction that falls with speed follows, of
+    each move for itself first; it starts at the `static_friction`, N, that the departures tell, if
+    they do. Where that does not do either, or there is no curve, the sliding friction of a plain
+    regression is split into F_c and F_v in several ways, without and with a slip; the way whose
+    simulated stem is nearest starts a fit, and again with the likeliest lag. Then follows one with
+    a dead zone. At the end viscous friction is traded for lag, both ways along their common valley,
+    and all of it for a slow sensor of the stem.
+
+    Raises
+    ------
+    RefusalError
+        If the stem does not follow the force.
+    """
+    return _Search(record, prior, curves, static_friction).all_probable()
+
+
+def posteriors_at(
+    record: FittedRecord, prior: Prior, truth: Coordinates, with_competitors: bool
+) -> list[PosteriorFit]:
+    """Return what a record says of a model that is known to be the right one, without a search.
+
+    Parameters
+    ----------
+    record : FittedRecord
+        A simulated record.
+    prior : Prior
+        What an identification would know beforehand.
+    truth : mapping of str to float
+        Coordinates of the simulated valve; the others are absent.
+    with_competitors : bool
+        Whether the fits follow that trade viscous friction for lag, as those of `search` do.
+
+    Raises
+    ------
+    RefusalError
+        If the stem does not follow the force.
+    """
+    found = _Search(record, prior)
+    at = {**found.base, **truth}
+    best = fit(found.exact, {**at, **found.known}, found.all, found.spread, found.centre, 0)
+    return [best, *(found.traded(best) if with_competitors else ())]

@@ -1,0 +1,317 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Force and stem of a record averaged alike, and the work of the force over the distance."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.signals import stamped_noise, without_repeats
+
+_Array = NDArray[np.float64]
+
+_FEWEST, _FEWEST_EACH_WAY = 20, 6
+_MOST = 4000
+"""Averages that a regression needs, in all and of each direction, and takes at most."""
+
+_SLIDES = 0.02
+_SURELY = 3.0
+_NOISE_OF_SPEED = 0.1
+"""The stem slides above this share of twice the mean speed, and so many deviations of the speed's
+noise, which may be at most this share of twice the mean speed."""
+
+_OF_STOPS = 3e-3
+"""Share of the travel next to a stop where nothing is taken: the stop carries force there."""
+
+_FEW_PAUSES, _PAUSE = 0.05, 3.0
+"""A signal is sent on change if more than that share of its pauses are so many times the usual."""
+
+SURE_MARGIN, CLOSE = 2.0, 0.5
+"""Distance of an average from a rest or a reversal, in its own lengths: that at which it surely is
+of a sliding stem, and that at which it is taken where there is no other, for the sliding friction
+alone."""
+
+LARGEST_LAG = 0.15
+LAGS: _Array = np.linspace(-LARGEST_LAG, LARGEST_LAG, 301, dtype=np.float64)
+WORK_LAGS: _Array = LAGS[::10]
+"""Lags over which the posterior is integrated, s, beyond which the signals are not one record; and
+those at which the work is computed."""
+
+_CHANCE_OF_SPEED = 0.03
+"""Largest share of chance in the mean speed."""
+
+_WORK_NOISE = 5e-3
+_STROKE_NOISE, _STROKE = 6.0, 0.03
+"""Largest share of noise in the work; least stroke that is part of the distance, in deviations of
+the stem's noise and as a share of its range: a wandering sensor, or its last bit, moves no stem."""
+
+
+def averaged_twice(signal: _Array, length: int) -> _Array:
+    """Average over `length` samples, twice, centred; the ends are held."""
+    if length <= 1:
+        return signal
+    for before in (length // 2, length - 1 - length // 2):
+        padded = np.pad(signal, (before, length - 1 - before), mode="edge")
+        sums = np.concatenate([[0.0], np.cumsum(padded)])
+        signal = (sums[length:] - sums[:-length]) / length
+    return signal
+
+
+def _strokes(seen: _Array, measured: _Array, least: float) -> tuple[float, int]:
+    """Return the distance of all strokes of at least that length, m, and their number.
+
+    The strokes end where the one half of the samples, `seen`, turns round, and are as long as the
+    other half says: noise makes the extremes of a half, and not the other's values there.
+    """
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(seen)))) + 1
+    ends, way = [0], 0
+    low = high = far = 0
+    for turn in (*turns.tolist(), seen.size - 1):
+        place = float(seen[turn])
+        if way == 0:
+            low = turn if place < seen[low] else low
+            high = turn if place > seen[high] else high
+            if seen[high] - seen[low] >= least:
+                way = 1 if turn == high else -1
+                ends, far = [low if way > 0 else high], turn
+        elif way * (place - seen[far]) >= 0:
+            far = turn
+        elif abs(place - seen[far]) >= least:
+            ends.append(far)
+            far, way = turn, -way
+    ends.append(far)
+    lengths = np.diff(measured[ends]) * np.sign(np.diff(seen[ends]))
+    return float(np.sum(lengths)), max(len(ends) - 1, 1)
+
+
+def _all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Return where all samples up to `reach` before and after are set."""
+    sums = np.concatenate([[0], np.cumsum(np.pad(which, reach, mode="edge"))])
+    width = 2 * reach + 1
+    return np.asarray(sums[width:] - sums[:-width] == width)
+
+
+class MeasuredSignal(NamedTuple):
+    """A signal of a sensor, N or m, with the deviation of its noise and its sampling period, s."""
+
+    time: _Array
+    value: _Array
+    noise: float
+    period: float
+
+    @classmethod
+    def of(cls, signal: StampedSignal, scale: float, zero: float) -> "MeasuredSignal":
+        """Take a signal times a scale, less a zero; each repeated value once."""
+        fresh = without_repeats(signal)
+        noise = abs(scale) * stamped_noise(fresh)
+        return cls(fresh.time, scale * fresh.value - zero, noise, fresh.period)
+
+    def halves(self, grid: _Array) -> list[_Array]:
+        """Return even and odd samples on a grid, averaged where it is coarser than they are.
+
+        Of a signal that is sent on change each sample is needed: both halves are the whole then.
+        """
+        length = int((grid[1] - grid[0]) / self.period)
+        pauses = np.diff(self.time)
+        if float(np.quantile(pauses, 1.0 - _FEW_PAUSES)) > _PAUSE * self.period:
+            return [np.interp(grid, self.time, self.value)] * 2
+        parts = [(self.time[part::2], self.value[part::2]) for part in (0, 1)]
+        return [np.interp(grid, time, averaged_twice(value, length)) for time, value in parts]
+
+
+def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal, MeasuredSignal]:
+    """Return the actuator force, N, and the stem, m, of a record."""
+    scale = valve.force_per_drive
+    zero = 0.0 if valve.diaphragm_area is None else scale * valve.pressure_reference
+    return (
+        MeasuredSignal.of(record.drive, scale, zero),
+        MeasuredSignal.of(record.position, 1.0, 0.0),
+    )
+
+
+class Averages(NamedTuple):
+    """What the regression takes of a record at one averaging time; two halves where there are two.
+
+    `taken` are the indices of the averages of a stem that surely slides; `is_free` says where it is
+    away from the stops and from both ends of the record.
+    """
+
+    time: _Array
+    force: list[_Array]
+    position: list[_Array]
+    velocity: list[_Array]
+    length: int
+    is_free: NDArray[np.bool_]
+    taken: NDArray[np.intp]
+    speed: float
+    noise: Mapping[str, float]
+    is_sure: bool
+
+    @property
+    def mean_velocity(self) -> _Array:
+        """Mean of both halves, m/s."""
+        return 0.5 * (self.velocity[0] + self.velocity[1])
+
+
+def averages_of(
+    force: MeasuredSignal, stem: MeasuredSignal, valve: Valve, averaging_time: float, margin: float
+) -> Averages | None:
+    """Average a record; None where it leaves too little of a stem that surely slides.
+
+    `margin` is how far from a stop, a rest or a reversal an average must be, in its own lengths.
+    """
+    begin, end = max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1])
+    step = max(min(force.period, stem.period), averaging_time / 24.0)
+    time = np.arange(begin, end, step)
+    length = max(round(averaging_time / step), 1)
+    lost = round(LARGEST_LAG / step) + 2 * length
+    if time.size < 2 * lost + _FEWEST:
+        return None
+    position = [averaged_twice(half, length) for half in stem.halves(time)]
+    velocity = [np.gradient(half, step) for half in position]
+    mean = 0.5 * (velocity[0] + velocity[1])
+    size = np.abs(mean)
+    speed = 2.0 * float(np.sum(size**2) / max(np.sum(size), np.finfo(float).tiny))
+    per_average = [max(averaging_time / one.period, 1.0) for one in (force, stem)]
+    noise = {
+        "force": force.noise * math.sqrt(2.0 / (3.0 * per_average[0])),
+        "position": stem.noise * math.sqrt(2.0 / (3.0 * per_average[1])),
+        "velocity": stem.noise * math.sqrt(2.0 / per_average[1]) / averaging_time,
+    }
+    side = np.sign(mean) * (size > max(_SLIDES * speed, _SURELY * noise["velocity"]))
+    reach = int(margin * length)
+    slides = _all_around(side > 0, reach) | _all_around(side < 0, reach)
+    free = away_from_stops(0.5 * (position[0] + position[1]), valve)
+    free[:lost] = free[-lost:] = False
+    taken = np.flatnonzero(slides & free)
+    taken = taken[taken % max(length // 2, 1) == 0]
+    taken = taken[:: taken.size // _MOST + 1]
+    up = int(np.count_nonzero(mean[taken] > 0))
+    if (
+        noise["velocity"] > _NOISE_OF_SPEED * speed
+        or taken.size < _FEWEST
+        or min(up, taken.size - up) < _FEWEST_EACH_WAY
+    ):
+        return None
+    averaged = [averaged_twice(half, length) for half in force.halves(time)]
+    return Averages(
+        time,
+        averaged,
+        position,
+        velocity,
+        length,
+        free,
+        taken,
+        speed,
+        noise,
+        margin >= SURE_MARGIN,
+    )
+
+
+class Work(NamedTuple):
+    """The work of the measured force, averaged as little as its noise allows.
+
+    Averages lose the work of fast moves. `along` are the moves over the distance of all strokes;
+    noise in them is not that of the force, so that it biases nothing. `noise`, N, is what chance
+    makes of the work, and half of what averaging over twice the time does. `speed` is the mean one
+    over the distance, m/s, by the product of two halves of the samples.
+    """
+
+    time: _Array
+    force: _Array
+    position: _Array
+    along: _Array
+    distance: float
+    strokes: int
+    noise: float
+    speed: float
+    by_lag: _Array = WORK_LAGS
+
+    @classmethod
+    def of(cls, force: MeasuredSignal, stem: MeasuredSignal, averages: Averages) -> "Work":
+        """Take strokes and stops from the `averages`."""
+        step = min(force.period, stem.period)
+        time = np.arange(averages.time[0], averages.time[-1], step)
+        after = np.minimum(np.searchsorted(averages.time, time), averages.time.size - 1)
+        is_free = averages.is_free[after]
+        even, odd = (half[averages.is_free] for half in averages.position)
+        least = max(_STROKE_NOISE * stem.noise, _STROKE * float(np.ptp(even)))
+        (distance, count), (other, _) = _strokes(even, odd, least), _strokes(odd, even, least)
+        distance = max(0.5 * (distance + other), np.finfo(float).tiny)
+        longest = averages.length * float(averages.time[1] - averages.time[0]) / step
+        length = 2 * max(round(max(force.period, stem.period) / step), 1)
+
+        whole = [np.interp(time, one.time, one.value) for one in (force, stem)]
+        squares = _squares(stem, time, is_free, longest)
+        speed = squares / (step * distance)
+
+        def by(length: int) -> "Work":
+            pressed, position = (averaged_twice(one, length) for one in whole)
+            along = np.gradient(position) * is_free / distance
+            # Twice averaged noise is that of some samples at a time: as much as of each alone.
+            noise = force.noise * math.sqrt(step / force.period * float(along @ along))
+            return cls(time, pressed, position, along, distance, count, noise, speed)
+
+        work = by(length)
+        while work.noise > _WORK_NOISE * abs(work.of_friction) and 2 * length <= longest:
+            length *= 2
+            work = by(length)
+        hidden = work.of_friction - by(2 * length).of_friction
+        return work._replace(noise=math.hypot(work.noise, 0.5 * hidden)).seen_late()
+
+    @property
+    def of_friction(self) -> float:
+        """The work over the distance, N, but for a straight line of the force along the travel."""
+        moving = self.along != 0.0
+        away = self.position - np.mean(self.position[moving])
+        force = self.force - np.mean(self.force[moving])
+        square = max(float(away[moving] @ away[moving]), np.finfo(float).tiny)
+        return float(self.along @ (force - float(away[moving] @ force[moving]) / square * away))
+
+    def seen_late(self) -> "Work":
+        """Compute the work over the distance, N, if the stem is seen late by each of the lags."""
+        seen = [
+            float(self.along @ np.interp(self.time - lag, self.time, self.force))
+            for lag in WORK_LAGS
+        ]
+        return self._replace(by_lag=np.array(seen))
+
+
+def _squares(
+    stem: MeasuredSignal, time: _Array, is_free: NDArray[np.bool_], longest: float
+) -> float:
+    """Return the sum of the squares of all steps of a stem on a grid, m².
+
+    It is that of the products of both halves, averaged as little as their noise allows.
+    """
+    step, length = float(time[1] - time[0]), 1
+    halves = stem.halves(time)
+    while True:
+        even, odd = (np.gradient(averaged_twice(half, length)) for half in halves)
+        total = float(np.sum(even * odd * is_free))
+        samples = max(length, stem.period / step)
+        noise = stem.noise * math.sqrt(2.0 * stem.period / step / samples) / samples
+        chance = math.sqrt(float(np.count_nonzero(is_free)) * samples) * noise**2
+        if chance <= _CHANCE_OF_SPEED * total or 2 * length > longest:
+            return max(total, 0.0)
+        length *= 2
+
+
+def away_from_stops(position: _Array, valve: Valve) -> NDArray[np.bool_]:
+    """Return where a stem is away from the stops."""
+    if not math.isfinite(valve.travel):
+        return np.ones(position.size, dtype=np.bool_)
+    near = _OF_STOPS * valve.travel
+    return np.asarray((position > near) & (position < valve.travel - near))

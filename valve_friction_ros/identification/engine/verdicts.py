@@ -1,0 +1,235 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Verdicts on the numbers of a fit with imperfections."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from valve_friction_ros.identification.engine.friction_curve import FrictionCurve
+from valve_friction_ros.identification.engine.imperfections import Profile
+from valve_friction_ros.identification.engine.intervals import NOISE_LIKE, Estimated, has_tried_lags
+from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
+from valve_friction_ros.identification.engine.sentences import late_sensor, main_doubt, slips
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.limits import FALL_SPEED, NO_SLIP
+from valve_friction_ros.identification.trust.misfit import Misfit
+from valve_friction_ros.identification.trust.verdict import (
+    PRELOAD_SCALE,
+    WEAK_SHARE,
+    Parameter,
+    fixed,
+    interval_share,
+    not_identifiable,
+    share_of,
+    with_verdict,
+)
+from valve_friction_ros.identification.units import SLIDING, UNITS
+
+USABLE = 0.1
+"""Half width over value up to which a sliding friction is of use to maintenance.
+
+Chosen: well below the 25 % of growth that raises the first alarm."""
+
+_SPLIT_DOUBT = (
+    "the motion is not quite that of any friction model here ({:.2g} µm are not noise), which "
+    "leaves the sliding friction but not what it is made of"
+)
+_FAILED = 100.0
+"""Inflation of the residual beyond which nothing that only the simulation knows is reported: ten
+times the noise."""
+
+_UNTRIED = "the search ended before it had tried other lags: bring a shorter record"
+_FURTHER = 0.35
+"""Half width over F_c of what it may fall further beyond the speeds of a slow record: of packings
+that slip, F_s is up to twice F_c, and half of all packings slip."""
+
+_BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction", "stribeck_velocity")
+"""What a friction that falls with speed has in other proportions at higher speeds."""
+
+_UNCONFIRMED = "it follows from the forces alone: no simulated stem confirms it"
+_OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
+"""What the force balance of the sliding stem determines without a simulation."""
+
+_NOISE_SHARE, _LEAST = 0.2, 2e-4
+"""Shares of the stem's noise and of its range in the misfit that is tolerated on a bench.
+
+Chosen: 70 of 71 simulated records of Karnopp valves stay within it."""
+
+_TWO = 2.0
+
+
+def fit_misfit(
+    fit: PosteriorFit, numbers: Mapping[str, Estimated], profile: Profile = Profile.PLANT
+) -> Misfit:
+    """Return how well the simulated stem follows the measured one.
+
+    The model of a plant is doubted only where its misfit is more than noise and the friction stays
+    uncertain: where the interval of the sliding friction is wider than twice `USABLE`. That of a
+    bench is doubted where its misfit is more than what the noise of the pressure does to the
+    simulated stem, by the difference of both halves, and small shares of the stem's noise and
+    range.
+    """
+    record = fit.model.record
+    rms = float(np.sqrt(np.mean(fit.residual**2)))
+    fitted = 1.0 - rms / float(np.std(record.position))
+    noise = float(np.mean(record.noise**2 / record.samples))
+    if not profile.has_imperfections:
+        even, odd = record.position - fit.model.readings(fit.at)
+        systematic = math.sqrt(max(float(np.mean(even * odd)) - noise, 0.0))
+        by_pressure = min(0.25 * float(np.mean((even - odd) ** 2)), noise)
+        tolerated = (
+            math.sqrt(by_pressure)
+            + _NOISE_SHARE * math.sqrt(noise)
+            + _LEAST * float(np.ptp(record.position))
+        )
+        return Misfit(fitted, rms, systematic, tolerated)
+    systematic = math.sqrt(max(rms**2 - noise, 0.0))
+    sliding = numbers["sliding_friction"]
+    certain = sliding.half_width <= _TWO * USABLE * abs(sliding.value)
+    describes = certain or fit.inflation < NOISE_LIKE
+    return Misfit(fitted, rms, systematic, systematic if describes else 0.5 * systematic)
+
+
+def fit_verdicts(
+    fits: Sequence[PosteriorFit],
+    numbers: Mapping[str, Estimated],
+    settings: IdentificationSettings,
+    misfit: Misfit,
+    profile: Profile = Profile.PLANT,
+) -> dict[str, Parameter]:
+    """Return every reported number of the first fit with its verdict.
+
+    Where the model is doubted none is more than weak. Where the misfit of a plant is more than
+    noise, or the search ended before it tried other lags, what the force balance gives
+    (`checked_by_curve`) may be identified all the same.
+    """
+    fit, doubt = fits[0], ""
+    force_range = float(np.ptp(fit.model.record.force))
+    if not misfit.describes:
+        doubt = (
+            "the Karnopp model does not describe this valve: "
+            f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
+        )
+    slow, split = _slow_doubt(fit), _split_doubt(fits, misfit, profile)
+    unseen = _unseen(fit, numbers, settings, split)
+    verdicts = {}
+    for name, one in numbers.items():
+        width = one.half_width
+        if slow and name == "coulomb_friction":
+            width = math.hypot(width, _FURTHER * _slowness(fit) * abs(one.value))
+        reason = doubt or (slow if name in _BY_SPEED else "")
+        if split:
+            reason = "" if name in _OF_THE_BALANCE else reason or split
+        scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
+        share = share_of(one.value, width, scale)
+        if not reason and WEAK_SHARE < share < math.inf:
+            reason = main_doubt(one.budget, interval_share(one.value, share, scale))
+        if not reason and one.has_rival:
+            reason = late_sensor(name, one.rival)
+        if name in settings.fixed and name != "limit_velocity":
+            verdicts[name] = fixed(name, settings.fixed[name])
+        elif name in unseen:
+            verdicts[name] = not_identifiable(name, unseen[name])
+        else:
+            verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason, scale)
+    return verdicts
+
+
+def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
+    """Return why only what the force balance determines too can be identified, or nothing."""
+    if fits[0].inflation > NOISE_LIKE and profile.has_imperfections:
+        return _SPLIT_DOUBT.format(1e6 * misfit.systematic)
+    return "" if has_tried_lags(fits) else _UNTRIED
+
+
+def _unseen(
+    fit: PosteriorFit,
+    numbers: Mapping[str, Estimated],
+    settings: IdentificationSettings,
+    split: str,
+) -> dict[str, str]:
+    """Return which of mass, F_s and v_s the record does not show, and why."""
+    why = {}
+    mass = numbers.get("mass")
+    if mass is not None and ("mass" in fit.kept or mass.half_width > abs(mass.value)):
+        why["mass"] = (
+            "inertia is too small a part of the force to be seen; "
+            f"{settings.assumed_mass:g} kg assumed"
+        )
+    for name in ("static_friction", "stribeck_velocity"):
+        one = numbers.get(name)
+        if one is not None and not (slips(fit) and fit.at["slip_force"] > one.half_width):
+            why[name] = NO_SLIP
+        elif split and fit.inflation > _FAILED:
+            why[name] = split
+    return why
+
+
+def curve_misfit(curve: FrictionCurve, sliding: Estimated) -> Misfit:
+    """Return how well the force balance of the sliding stem reproduces the force, N.
+
+    As for a simulation, the model is doubted only where the sliding friction stays uncertain.
+    """
+    systematic = curve.misfit * math.sqrt(max(1.0 - 1.0 / curve.inflation, 0.0))
+    describes = sliding.half_width <= _TWO * USABLE * abs(sliding.value)
+    tolerated = systematic if describes else 0.5 * systematic
+    return Misfit(curve.fit, curve.misfit, systematic, tolerated, "N")
+
+
+def curve_verdicts(
+    numbers: Mapping[str, Estimated],
+    settings: IdentificationSettings,
+    stribeck_velocity: float,
+    force_range: float = 0.0,
+) -> dict[str, Parameter]:
+    """Return every reported number of a force balance with its verdict.
+
+    Mass, spring, preload and sliding friction may be identified. What the sliding friction is made
+    of is at most weak, as no simulated stem confirms it. A preload may be small against the
+    `force_range` of the record, N.
+    """
+    verdicts = {}
+    for name in (*UNITS, SLIDING):
+        one = numbers.get(name)
+        if name in settings.fixed and name != "limit_velocity":
+            verdicts[name] = fixed(name, settings.fixed[name])
+        elif name == "static_friction" and not stribeck_velocity:
+            verdicts[name] = not_identifiable(name, NO_SLIP)
+        elif one is None or (one.value < 0 and name != "spring_preload"):
+            verdicts[name] = not_identifiable(name, "the record does not determine it")
+        else:
+            width = one.half_width
+            reason = _UNCONFIRMED if name in _BY_SPEED else ""
+            scale = PRELOAD_SCALE * force_range if name == "spring_preload" else 0.0
+            share = share_of(one.value, width, scale)
+            if not reason and share > WEAK_SHARE:
+                reason = main_doubt(one.budget, interval_share(one.value, share, scale))
+            if not reason and one.has_rival:
+                reason = late_sensor(name, one.rival)
+            verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason, scale)
+    return verdicts
+
+
+def _slowness(fit: PosteriorFit) -> float:
+    """Return by which share the fastest motion misses the speed at which no friction falls more."""
+    return max(1.0 - float(np.max(fit.model.record.slow.speed)) / FALL_SPEED, 0.0)
+
+
+def _slow_doubt(fit: PosteriorFit) -> str:
+    """Return that the record is too slow to separate F_c from friction at low speed, or nothing."""
+    if not _slowness(fit):
+        return ""
+    top = float(np.max(fit.model.record.slow.speed))
+    return (
+        f"holds up to {top * 1e3:.2g} mm/s, the fastest here: "
+        f"friction may fall further up to {FALL_SPEED * 1e3:.2g} mm/s"
+    )

@@ -1,1 +1,0 @@
-"""The refined model: its simulated stem follows the measured one."""

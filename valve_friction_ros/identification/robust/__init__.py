@@ -1,1 +1,0 @@
-"""The fit in which every imperfection of a plant takes part, with a stated prior."""

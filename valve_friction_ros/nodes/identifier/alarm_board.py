@@ -1,0 +1,267 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The alarms of a valve: followed, kept in the history, and moved on by requests of people."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
+
+from valve_friction_ros import history as database
+from valve_friction_ros.health import (
+    Alarm,
+    AlarmAction,
+    AlarmError,
+    AlarmEvent,
+    AlarmKind,
+    AlarmRequest,
+    Condition,
+    Delay,
+    Finding,
+    FrictionHold,
+    FrictionMonitor,
+    Level,
+    StatusSignal,
+)
+from valve_friction_ros.health.alarm_conditions import ALARM_OF_SIDE, shown_by
+from valve_friction_ros.health.alarms import NO_CONDITION, all_followed, all_requested
+from valve_friction_ros.history.status_values import alarm_values
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
+from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.trigger_service import create_service, create_trigger_service
+from valve_friction_ros.settings import NODES
+
+if TYPE_CHECKING:
+    from valve_friction_ros.history import AlarmSteps, HistoryFile
+
+_RISE, _FALL = 15.0, 60.0
+"""Times, s, for which samples must be unusable, or usable again. Chosen, within the delays of 15 to
+60 s that ISA-18.2 proposes to begin with."""
+_SETTLE = 600.0
+"""Time, s, for which what moves show must be gone. Chosen: a loop makes some moves within it."""
+
+_ASKED = ("alarm_kind", "alarm_who", "alarm_text", "alarm_hours")
+
+
+class _Step:
+    """A change of the history that says what it has made of the alarms, once it is made."""
+
+    def __init__(self, make: Callable[["HistoryFile"], "AlarmSteps"]) -> None:
+        self._make = make
+        self.made: AlarmSteps | None = None
+        self.refusal: AlarmError | None = None
+
+    def __call__(self, file: "HistoryFile") -> None:
+        try:
+            self.made = self._make(file)
+        except AlarmError as error:
+            self.refusal = error
+
+
+class AlarmBoard:
+    """Follows the alarms of a valve, and offers the services by which people move them on.
+
+    The alarms are those of the history; without one, or while it cannot be written, those of this
+    run.
+    """
+
+    def __init__(
+        self,
+        node: PolledNode,
+        monitor: FrictionMonitor,
+        history: HistoryWriter,
+        evidence: EvidenceWatch,
+    ) -> None:
+        self._node, self._monitor, self._history = node, monitor, history
+        self._evidence = evidence
+        self._alarms: dict[AlarmKind, Alarm] = history.alarms()
+        self._hold = FrictionHold(
+            {side: self._condition(kind) for side, kind in ALARM_OF_SIDE.items()}
+        )
+        self._delays = {
+            AlarmKind.STUCK: Delay(0.0, _FALL, self._condition(AlarmKind.STUCK)),
+            AlarmKind.DATA_QUALITY: Delay(_RISE, _FALL, self._condition(AlarmKind.DATA_QUALITY)),
+            AlarmKind.POSITIONER: Delay(0.0, _SETTLE, self._condition(AlarmKind.POSITIONER)),
+        }
+        self._identified: int | None = None
+        self._under_way: _Step | None = None
+        self._changed: list[AlarmEvent] = []
+        if not node.tells_parameters:
+            return  # who asks is a parameter
+        for name, action in (
+            ("acknowledge", AlarmAction.ACKNOWLEDGE),
+            ("shelve", AlarmAction.SHELVE),
+            ("unshelve", AlarmAction.UNSHELVE),
+            ("comment", AlarmAction.COMMENT),
+        ):
+            create_trigger_service(node, f"~/{name}", partial(self._ask, action))
+        create_service(node, SetBool, "~/out_of_service", self._switch)
+
+    @property
+    def alarms(self) -> Mapping[AlarmKind, Alarm]:
+        """The alarms by kind; one that was never raised is not there."""
+        return self._alarms
+
+    def news(self) -> list[AlarmEvent]:
+        """Return the events since the last call."""
+        found, self._changed = self._changed, []
+        return found
+
+    def _condition(self, kind: AlarmKind) -> Condition:
+        return self._alarms[kind].condition if kind in self._alarms else NO_CONDITION
+
+    # What the valve shows
+
+    def follow(
+        self,
+        found: Mapping[AlarmKind, Sequence[Finding]],
+        faults: Sequence[str],
+        renewal: int,
+        now: float,
+    ) -> None:
+        """Follow what the valve shows: findings by kind, and faults of its data.
+
+        `renewal` is when its packing was renewed, ns; `now` is s of a clock that does not go back.
+        """
+        self._settle()
+        time = self._node.get_clock().now().nanoseconds
+        if not time:  # simulated time has not begun
+            return
+        conditions = {
+            **self._frictions(renewal),
+            AlarmKind.WHOLE_VALVE: self._whole_valve(found[AlarmKind.WHOLE_VALVE]),
+        }
+        fault = Condition(Level.WARN, StatusSignal.CHECK_FUNCTION, "; ".join(faults))
+        shown = {
+            AlarmKind.STUCK: shown_by(found[AlarmKind.STUCK]),
+            AlarmKind.POSITIONER: shown_by(found[AlarmKind.POSITIONER]),
+            AlarmKind.DATA_QUALITY: fault if faults else NO_CONDITION,
+        }
+        for kind, condition in shown.items():
+            delay = self._delays[kind] = self._delays[kind].seen(condition, now)
+            conditions[kind] = delay.shown
+        if events := all_followed(self._alarms, conditions, time):
+            self._take(events)
+            self._under_way = _Step(
+                partial(
+                    database.follow_alarms,
+                    valve=self._history.valve,
+                    conditions=conditions,
+                    time=time,
+                    days=self._days,
+                )
+            )
+            self._history.keep_soon(self._under_way)
+
+    @property
+    def _days(self) -> float:
+        return float(self._node.get_parameter("history_days").value)
+
+    def _take(self, events: Sequence[AlarmEvent]) -> None:
+        self._alarms |= {one.alarm.kind: one.alarm for one in events}
+        self._changed += events
+        for one in events:
+            by = f" by {one.who}" if one.who else ""
+            said = one.text or (one.alarm.message if one.alarm.is_active else "")
+            words = f": {said}" if said else ""
+            self._node.get_logger().info(
+                f"alarm {one.alarm.kind.words} {one.action.value}{by}{words}"
+            )
+
+    def _settle(self) -> None:
+        """Take the alarms of the history once what was written is there: others may write, too."""
+        step = self._under_way
+        if step is not None and step.made is not None:
+            self._alarms = dict(step.made.alarms)
+            self._under_way = None
+        if self._under_way is None:
+            self._alarms |= self._history.alarm_news()
+
+    def _frictions(self, renewal: int) -> dict[AlarmKind, Condition]:
+        """Look at the friction where there is something new: an identification, or moves."""
+        monitor, evidence = self._monitor, self._evidence.evidence
+        limits = monitor.settings.limits
+        before, self._hold = self._hold, self._hold.based_on((monitor.baseline, limits, renewal))
+        if before.basis is not None and before.basis != self._hold.basis:
+            self._identified = None
+        stamp, until = monitor.stamp, monitor.seen_until
+        if stamp is not None and until is not None and stamp not in (self._identified, 0):
+            elapsed = None if self._identified is None else stamp - self._identified
+            self._identified = stamp
+            if stamp > renewal:
+                self._hold = self._hold.looked(monitor.diagnosis(), until, limits, elapsed)
+        if evidence.moves and evidence.until != self._hold.until:
+            found = self._evidence.diagnosis
+            if found is not None:
+                self._hold = self._hold.looked(found, evidence.until, limits)
+        return {kind: self._hold.conditions[side] for side, kind in ALARM_OF_SIDE.items()}
+
+    def _whole_valve(self, findings: Sequence[Finding]) -> Condition:
+        """Return what has changed beside the friction; it ends where nothing may have changed."""
+        worst, before = shown_by(findings), self._condition(AlarmKind.WHOLE_VALVE)
+        if worst.level >= before.level or not self._monitor.may_have_changed():
+            return worst
+        return before
+
+    # What people ask
+
+    async def _switch(self, request: Any) -> str:
+        return await self._ask(AlarmAction.TAKE_OUT if request.data else AlarmAction.PUT_BACK)
+
+    async def _ask(self, action: AlarmAction) -> str:
+        """Make what the parameters ask for; they hold for one request."""
+        values = {name: self._node.get_parameter(name).value for name in _ASKED}
+        kind = None if values["alarm_kind"] == "all" else AlarmKind(values["alarm_kind"])
+        self._forget()
+        try:
+            request = AlarmRequest(
+                action, values["alarm_who"], values["alarm_text"], 3600 * values["alarm_hours"]
+            )
+            return await self._made(kind, request)
+        except AlarmError as error:
+            raise RefusalError(str(error)) from None
+
+    def _forget(self) -> None:
+        initial = {one.name: one.default for one in NODES["identifier"] if one.name in _ASKED}
+        self._node.set_parameters([Parameter(name, value=one) for name, one in initial.items()])
+
+    async def _made(self, kind: AlarmKind | None, request: AlarmRequest) -> str:
+        time = self._node.get_clock().now().nanoseconds
+        step = _Step(
+            partial(
+                database.request_alarms,
+                valve=self._history.valve,
+                kind=kind,
+                request=request,
+                time=time,
+                days=self._days,
+            )
+        )
+        if self._history.path is not None:
+            await self._history.keep_step(step)
+        if step.refusal is not None:
+            raise step.refusal
+        if step.made is None:  # nothing is kept, or not yet
+            events = all_requested(self._alarms, kind, request, time)
+        else:
+            events, self._alarms = step.made.events, dict(step.made.alarms)
+            self._under_way = None  # it was made before
+        self._take(events)
+        return "; ".join(str(one.alarm) for one in events) + self._history.reservation
+
+    # What the graph shows
+
+    def values(self) -> dict[str, str]:
+        """Return the state of each alarm, and what is known of those that are not normal."""
+        return alarm_values(self._alarms)

@@ -1,0 +1,73 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What rclpy offers no public way to do: the only file of the package that reaches behind it.
+
+Its own executors and ``wait_for_message`` take messages and requests in this way. Where a version
+of rclpy no longer has it, the nodes leave their streams and services to the executor: they work as
+before and cost more. The versions are those with which the tests have run.
+"""
+
+from typing import Any
+
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+
+CHECKED = ("7.1.6", "9.1.2")
+"""Versions of rclpy with which the tests have run, of Jazzy and of Kilted."""
+
+
+PROFILES = (
+    "FASTDDS_DEFAULT_PROFILES_FILE"
+    if hasattr(Executor, "create_future")
+    else "FASTRTPS_DEFAULT_PROFILES_FILE"
+)
+"""The variable that names a profile of Fast DDS: that of Kilted warns of the one of Jazzy."""
+
+
+def takes_directly(entity: Subscription | Service) -> bool:
+    """Return whether this rclpy lets messages, or requests, be taken without an executor."""
+    way = "take_message" if isinstance(entity, Subscription) else "service_take_request"
+    return hasattr(entity.handle, way)
+
+
+def take_messages(subscription: Subscription, most: int) -> list[tuple[Any, dict[str, Any]]]:
+    """Take at most `most` messages, each with what the middleware says of it."""
+    taken: list[tuple[Any, dict[str, Any]]] = []
+    kind, raw, handle = subscription.msg_type, subscription.raw, subscription.handle
+    with handle:  # so that nothing destroys it meanwhile
+        while len(taken) < most and (found := handle.take_message(kind, raw)) is not None:
+            taken.append(found)
+    return taken
+
+
+def take_request(service: Service) -> tuple[Any, Any] | None:
+    """Take the next request and its header; None if there is none."""
+    with service.handle:
+        request, header = service.handle.service_take_request(service.srv_type.Request)
+    return None if header is None else (request, header)
+
+
+def awaits_coroutines(executor: Executor | None) -> bool:
+    """Return whether an executor awaits callbacks that are coroutines.
+
+    The experimental EventsExecutor of Jazzy sends the coroutine itself as the response. That of
+    Kilted, whose executors create futures, awaits it.
+    """
+    is_of_events = type(executor).__name__ == "EventsExecutor"
+    return not is_of_events or hasattr(Executor, "create_future")
+
+
+def parameter_overrides(node: Node) -> dict[str, Parameter]:
+    """Return the parameters given at the start, declared or not; none where they are not known."""
+    overrides: dict[str, Parameter] = getattr(node, "_parameter_overrides", {})
+    return overrides

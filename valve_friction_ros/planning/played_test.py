@@ -1,0 +1,218 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A planned stroke test as it is played on a valve: set points in time, and limits that end it.
+
+Nothing here knows a clock or a bus: whoever plays says what time it is and what was heard.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from valve_friction_ros.identification import RefusalError
+from valve_friction_ros.model.excitations import SampledPressure
+from valve_friction_ros.wording import played_test_words
+
+
+class PlayPhase(Enum):
+    """Where a test stands."""
+
+    WAITING = auto()
+    """Nothing is set."""
+    PLAYING = auto()
+    ENDED = auto()
+    """Played to its end; the last set point stays."""
+    BACK = auto()
+    """Ended before its time; the pressure of its begin is set."""
+
+
+class Abort(Enum):
+    """Why a test goes back before its end."""
+
+    POSITION = auto()
+    PRESSURE = auto()
+    SILENT_STEM = auto()
+    SILENT_PRESSURE = auto()
+    HELD_UP = auto()
+    """The player itself stood still: set points would have jumped."""
+    ASKED = auto()
+    SHUTDOWN = auto()
+
+
+@dataclass(frozen=True)
+class PlayLimits:
+    """What ends a test at once.
+
+    Attributes
+    ----------
+    position : tuple of float
+        Lowest and highest position of the stem, m.
+    pressure : tuple of float
+        Lowest and highest measured pressure, Pa.
+    silence : float
+        Longest time without a sample of either signal, and between two set points, s.
+    duration : float
+        Longest time that a test may take, s.
+
+    Raises
+    ------
+    ValueError
+        If a range is empty or open, or a time is not above zero.
+    """
+
+    position: tuple[float, float]
+    pressure: tuple[float, float]
+    silence: float = 1.0
+    duration: float = 3600.0
+
+    def __post_init__(self) -> None:
+        """Refuse limits that would end nothing."""
+        for name in ("position", "pressure"):
+            low, high = getattr(self, name)
+            if not -math.inf < low < high < math.inf:
+                raise ValueError(
+                    f"the limits of the {name} must be two numbers in order, got {low:g} and "
+                    f"{high:g}: give those at which the test has to end"
+                )
+        for name in ("silence", "duration"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be above 0 s, got {getattr(self, name):g}")
+
+
+class PlayedTest:
+    """A stroke test that is played once each time it is started, and goes back when it must.
+
+    Times are seconds of a clock that does not go back.
+
+    Parameters
+    ----------
+    signal : SampledPressure
+        The pressure to set; it is brought there by hand before the start.
+    limits : PlayLimits
+        What ends it.
+
+    Attributes
+    ----------
+    phase : PlayPhase
+        Where it stands.
+    aborted : Abort or None
+        Why it went back.
+    """
+
+    def __init__(self, signal: SampledPressure, limits: PlayLimits) -> None:
+        self.signal, self.limits = signal, limits
+        self.phase, self.aborted = PlayPhase.WAITING, None
+        self._begun = self._stepped = 0.0
+        self._heard: dict[str, tuple[float, float]] = {}
+        self._told: tuple[float, float] = (math.nan, math.nan)
+        self._pending: Abort | None = None
+        if self.duration > limits.duration:
+            raise ValueError(
+                f"the test takes {self.duration:g} s, and {limits.duration:g} s are allowed: plan "
+                "a shorter one, or allow it"
+            )
+
+    aborted: Abort | None
+
+    @property
+    def duration(self) -> float:
+        """Length of the test, s."""
+        return float(self.signal.times[-1] - self.signal.times[0])
+
+    @property
+    def home(self) -> float:
+        """Pressure of its begin, Pa, to which it goes back."""
+        return float(self.signal.pressures[0])
+
+    def heard_stem(self, position: float, now: float) -> None:
+        """Take a position of the stem, m. While it plays, any sample beyond the limits ends it."""
+        self._hear("position", position, now)
+
+    def heard_pressure(self, pressure: float, now: float) -> None:
+        """Take a measured pressure, Pa."""
+        self._hear("pressure", pressure, now)
+
+    def _hear(self, name: str, value: float, now: float) -> None:
+        self._heard[name] = value, now
+        if self.phase is PlayPhase.PLAYING and self._pending is None:
+            self._pending = self._beyond(name)
+
+    def _beyond(self, name: str) -> Abort | None:
+        """Return whether the last sample of a signal lies beyond its limits; nan does."""
+        low, high = getattr(self.limits, name)
+        value, _ = self._heard[name]
+        if low <= value <= high:
+            return None
+        self._told = value, (low if value < low else high)
+        return Abort[name.upper()]
+
+    def _doubt(self, now: float) -> Abort | None:
+        """Return what is wrong with the signals now."""
+        for name, silent in (
+            ("position", Abort.SILENT_STEM),
+            ("pressure", Abort.SILENT_PRESSURE),
+        ):
+            _, at = self._heard.get(name, (math.nan, -math.inf))
+            if not now - at <= self.limits.silence:
+                self._told = now - at, self.limits.silence
+                return silent
+            if (beyond := self._beyond(name)) is not None:
+                return beyond
+        return None
+
+    def start(self, now: float) -> None:
+        """Begin to play.
+
+        Raises RefusalError if it plays already, or the signals do not come or lie beyond limits.
+        """
+        if self.phase is PlayPhase.PLAYING:
+            raise RefusalError("the test is being played: stop it first")
+        doubt = self._doubt(now)
+        if doubt is not None:
+            raise RefusalError(f"nothing is set: {self._words(doubt)}")
+        self.phase, self.aborted, self._pending = PlayPhase.PLAYING, None, None
+        self._begun = self._stepped = now
+
+    def abort(self, why: Abort) -> None:
+        """Go back at once, if it plays."""
+        if self.phase is PlayPhase.PLAYING:
+            self.phase, self.aborted = PlayPhase.BACK, why
+
+    def step(self, now: float) -> float | None:
+        """Return the pressure, Pa, that is to be set now; None where nothing is."""
+        if self.phase is PlayPhase.WAITING:
+            return None
+        if self.phase is PlayPhase.PLAYING:
+            late = now - self._stepped
+            doubt = self._pending or self._doubt(now)
+            if doubt is None and late > self.limits.silence:
+                self._told = late, self.limits.silence
+                doubt = Abort.HELD_UP
+            self._stepped = now
+            if doubt is not None:
+                self.abort(doubt)
+            elif now - self._begun >= self.duration:
+                self.phase = PlayPhase.ENDED
+        if self.phase is PlayPhase.BACK:
+            return self.home
+        return float(self.signal.sample(min(now - self._begun, self.duration)))
+
+    def _words(self, why: Abort) -> str:
+        return played_test_words(why.name, *self._told)
+
+    def __str__(self) -> str:
+        """Return where it stands, on one line."""
+        if self.phase is PlayPhase.BACK and self.aborted is not None:
+            return f"went back to {self.home / 1e3:.4g} kPa: {self._words(self.aborted)}"
+        return {
+            PlayPhase.WAITING: "waits to be started",
+            PlayPhase.PLAYING: f"plays for {self.duration:.4g} s",
+            PlayPhase.ENDED: "played to its end",
+        }.get(self.phase, "went back")

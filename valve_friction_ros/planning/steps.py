@@ -1,0 +1,215 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A planned test as set points: for a control system, or for a person with a stopwatch."""
+
+import csv
+import io
+import itertools
+import math
+from dataclasses import dataclass
+
+from valve_friction_ros.model.valve import Valve
+from valve_friction_ros.planning.search import StrokePlan
+from valve_friction_ros.planning.stroke_test import FrictionRange
+
+_LOW_CURRENT, _CURRENT_SPAN = 4.0, 16.0
+"""mA of a signal of 0 %, and from there to 100 %."""
+_LEVEL = 1e-6
+"""Change of pressure, share of the band, below which a step is a hold."""
+_QUICK = 0.9
+"""Share of the largest rate from which a stroke is called quick. Chosen."""
+
+
+def signal_range(valve: Valve, frictions: FrictionRange) -> tuple[float, float]:
+    """Return the pressures of 0 and 100 %, Pa: those between which the spring alone moves the stem.
+
+    A positioner's set point in percent is then where a stem without friction stands.
+    """
+    constant, preload = frictions.spring
+    return valve.actuator_drive(preload), valve.actuator_drive(preload + constant * valve.travel)
+
+
+@dataclass(frozen=True)
+class SetPoint:
+    """A step of a test: within `duration`, go evenly to a pressure.
+
+    Attributes
+    ----------
+    time, duration : float
+        When it begins, and how long it takes, s.
+    pressure : float
+        At its end, Pa.
+    share : float
+        The same as a share of the signal's range.
+    stem : tuple of float
+        Shares of the travel between which the stem has to be from then on until the next step ends:
+        beyond them the test is aborted.
+    tells : str
+        What the step is for.
+    """
+
+    time: float
+    duration: float
+    pressure: float
+    share: float
+    stem: tuple[float, float]
+    tells: str
+
+    @property
+    def milliamperes(self) -> float:
+        """The set point on a loop of 4 to 20 mA."""
+        return _LOW_CURRENT + _CURRENT_SPAN * self.share
+
+
+def _tells(before: float, now: float, after: float, largest: float) -> str:
+    """Say what a step is for; the arguments are rates, Pa/s."""
+    if now == 0:
+        return "rest: the next start tells whether static friction exceeds Coulomb friction"
+    words = ["reversal: Coulomb friction, the dead band"] if before * now < 0 else []
+    if abs(now) >= _QUICK * largest:
+        words.append("quick: viscous friction, with the slow strokes")
+    if not words:
+        words.append("the spring, and Coulomb friction in one direction")
+    if before == 0 and after == before:
+        words.append("start from rest: static friction")
+    return "; ".join(words)
+
+
+def set_points(
+    plan: StrokePlan, signal: tuple[float, float] | None = None, margin: float = 0.05
+) -> tuple[SetPoint, ...]:
+    """Return the steps of a planned test.
+
+    Parameters
+    ----------
+    plan : StrokePlan
+        The test.
+    signal : tuple of float, optional
+        Pressures of a signal of 0 and 100 %, Pa; by default `signal_range`.
+    margin : float
+        Share of the travel by which the stem may leave what any of the planned valves does.
+
+    Raises
+    ------
+    ValueError
+        If the signal's range does not hold the pressures of the test.
+    """
+    low, high = signal or signal_range(plan.valve, plan.frictions)
+    if not low < high:
+        raise ValueError(f"the signal's range must rise, got {low:g} to {high:g} Pa")
+    travel, test = plan.valve.travel, plan.test
+    reaches = [one.reach for one in plan.forecasts]
+    stem = (
+        max(min(reach[0] for reach in reaches) / travel - margin, 0.0),
+        min(max(reach[1] for reach in reaches) / travel + margin, 1.0),
+    )
+    times, pressures = test.times.tolist(), test.pressures.tolist()
+    span = plan.band.high - plan.band.low
+    rates = [
+        0.0 if abs(after - before) < _LEVEL * span else (after - before) / (end - begin)
+        for (begin, before), (end, after) in itertools.pairwise(zip(times, pressures, strict=True))
+    ]
+    steps = [SetPoint(0.0, 0.0, pressures[0], _share(pressures[0], low, high), stem, "start")]
+    moving = 0.0
+    for place, rate in enumerate(rates):
+        after = rates[place + 1] if place + 1 < len(rates) else 0.0
+        steps.append(
+            SetPoint(
+                times[place],
+                times[place + 1] - times[place],
+                pressures[place + 1],
+                _share(pressures[place + 1], low, high),
+                stem,
+                _tells(moving, rate, after, test.largest_rate),
+            )
+        )
+        moving = rate or moving
+    if any(not 0 <= round(one.share, 6) <= 1 for one in steps):
+        raise ValueError(
+            f"the test needs {plan.band.low / 1e5:.4g} to {plan.band.high / 1e5:.4g} bar, and the "
+            f"signal has {low / 1e5:.4g} to {high / 1e5:.4g}: give the converter's range "
+            "(--signal-range '0.2..1.0 bar')"
+        )
+    return tuple(steps)
+
+
+def _share(pressure: float, low: float, high: float) -> float:
+    return (pressure - low) / (high - low)
+
+
+def table_of(steps: tuple[SetPoint, ...], plan: StrokePlan) -> str:
+    """Write set points as a table (CSV): seconds, %, mA, kPa, bar, mm, limits, what each tells."""
+    travel = plan.valve.travel * 1e3
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        ["time_s", "within_s", "setpoint_percent", "setpoint_ma", "pressure_kpa", "pressure_bar",
+         "abort_below_mm", "abort_above_mm", "tells"]
+    )  # fmt: skip
+    for one in steps:
+        low, high = (share * travel for share in one.stem)
+        writer.writerow(
+            [f"{one.time:.2f}", f"{one.duration:.2f}", f"{100 * one.share:.2f}",
+             f"{one.milliamperes:.3f}", f"{one.pressure / 1e3:.3f}", f"{one.pressure / 1e5:.5f}",
+             f"{low:.2f}", f"{high:.2f}", one.tells]
+        )  # fmt: skip
+    return text.getvalue()
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(seconds, 60)
+    return f"{int(minutes)}:{rest:04.1f}"
+
+
+def form_of(steps: tuple[SetPoint, ...], plan: StrokePlan, tag: str) -> str:
+    """Write a form of a partial-stroke test for a person: before, limits, steps, after."""
+    travel, (low, high) = plan.valve.travel * 1e3, steps[0].stem
+    band, likely = plan.band, plan.likely
+    lines = [
+        f"PARTIAL-STROKE TEST   valve {tag or '________________'}   date ____________   "
+        "by ________________",
+        "",
+        "BEFORE   [ ] operations agree   [ ] loop in manual   [ ] nobody near the stem",
+        f"         [ ] signal brought slowly to {100 * steps[0].share:.1f} % "
+        f"({steps[0].milliamperes:.2f} mA, {steps[0].pressure / 1e3:.1f} kPa)   "
+        "[ ] recording of pressure and stem runs",
+        "",
+        "ABORT    and go back slowly to the signal before the test, if",
+        f"         the stem is below {100 * low:.0f} % ({low * travel:.1f} mm) or above "
+        f"{100 * high:.0f} % ({high * travel:.1f} mm) of the travel,",
+        f"         the pressure is below {band.low / 1e3:.1f} or above {band.high / 1e3:.1f} kPa,",
+        f"         the stem has not moved after {_clock(_first_return(steps))} (min:s),",
+        "         or the process moves further than ________________",
+        "",
+        f"{'at':>8} {'within':>8} {'to %':>7} {'mA':>7} {'kPa':>8}  done  stem mm  what it tells",
+    ]
+    lines += [
+        f"{_clock(one.time):>8} {one.duration:>6.1f} s {100 * one.share:>7.1f} "
+        f"{one.milliamperes:>7.2f} {one.pressure / 1e3:>8.1f}  [ ]   _______  {one.tells}"
+        for one in steps
+    ]
+    friction = likely.half_widths.get("coulomb_friction", math.nan)
+    lines += [
+        "",
+        f"EXPECTED the stem moves between {100 * likely.reach[0] / plan.valve.travel:.0f} and "
+        f"{100 * likely.reach[1] / plan.valve.travel:.0f} % of the travel; Coulomb friction will "
+        f"be known to ± {friction:.3g} N",
+        "AFTER    [ ] signal as before the test   [ ] recording saved   [ ] loop in automatic   "
+        "aborted [ ] because ________________",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _first_return(steps: tuple[SetPoint, ...]) -> float:
+    """Return when the first full stroke has ended, s: by then a healthy stem has moved."""
+    lowest = min(one.share for one in steps)
+    highest = max(one.share for one in steps)
+    reached = [one for one in steps if one.share in (lowest, highest)]
+    return reached[min(1, len(reached) - 1)].time + reached[min(1, len(reached) - 1)].duration

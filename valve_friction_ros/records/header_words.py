@@ -1,0 +1,180 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What headers and tags say: the quantity, its unit, and the valve."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from valve_friction_ros.records.units import (
+    FORCE_UNITS,
+    NANOSECONDS,
+    POSITION_UNITS,
+    PRESSURE_UNITS,
+    SHARES,
+    unit_named,
+)
+
+_WORDS = {
+    "time": "time zeit timestamp stamp datetime date datum uhrzeit zeitstempel tstamp elapsed",
+    "position": "position pos stem travel lift hub stellung weg opening öffnung oeffnung feedback "
+    "readback rückmeldung displacement stroke ventilstellung stellweg stemposition",
+    "pressure": "pressure druck press air luft stelldruck actuator diaphragm antriebsdruck p "
+    "ventildruck",
+    "force": "force kraft load",
+    "command": "setpoint sp op output out command cmd demand sollwert soll cv request target "
+    "stellsignal stellgröße mv",
+    "quality": "quality status qstatus confidence güte qualität qualitaet valid questionable "
+    "annotated good stat q",
+    "tag": "tag tagname name point pointname signal series variable messstelle kanal sensor metric "
+    "item id kks channel tags field varname",
+    "value": "value wert val messwert vtq y varvalue",
+    "unit": "unit units einheit eu uom engunits",
+}
+_QUANTITY = {word: name for name, words in _WORDS.items() for word in words.split()}
+_OTHER_WORDS = (
+    "supply inlet outlet upstream downstream line process differential dp zuluft vordruck "
+    "nachdruck flow durchfluss temperature temperatur level speed p1 p2"
+)
+_STRONG_WORDS = "actuator diaphragm stelldruck antriebsdruck stem valve actual ist ventil"
+_OTHER = frozenset(_OTHER_WORDS.split())
+"""Words of signals that are neither the actuator's nor the stem's."""
+_STRONG = frozenset(_STRONG_WORDS.split())
+"""Words that speak of the actuator or of the stem itself."""
+_ISA = re.compile(r"(pi?t|pi|zi?t|zi|gi?t)(\d+[a-z]?)?")
+"""Letters of instruments by ISA 5.1: pressure, position (Z), gauge of position (G)."""
+_CAMEL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])|(?<=[A-Z])(?=[A-Z][a-zäöü])")
+_BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
+_LAST = re.compile(r"(?P<mark>\s+in\s+|\s*/\s*|_|[\s,:]+)(?P<unit>[^\s_/,:]+)\s*$")
+_VAGUE = frozenset(("in", "h", "d", "m", "s", "n", "pu"))
+"""Units that as the last word of a header, without a mark before them, may be something else."""
+_IDLE = frozenset(["pv", "x", "t", "state", "fluid", "msg", "data"])
+"""Words that name neither a quantity nor a valve."""
+
+UNITS = {
+    "time": frozenset(NANOSECONDS),
+    "position": frozenset(POSITION_UNITS),
+    "pressure": frozenset(PRESSURE_UNITS),
+    "force": frozenset(FORCE_UNITS),
+}
+_KNOWN = frozenset(unit for units in UNITS.values() for unit in units) | frozenset(SHARES)
+
+
+class Named(NamedTuple):
+    """What a header or a tag says.
+
+    Attributes
+    ----------
+    quantity : str
+        ``time``, ``position``, ``pressure``, ``force``, ``command``, ``quality``, ``tag``,
+        ``value``, ``unit``, ``other``, or nothing.
+    unit : str
+        As `records.units` calls it, or nothing.
+    label : str
+        What is left of the name: the valve.
+    is_strong : bool
+        Whether it speaks of the actuator or the stem itself.
+    is_absolute : bool
+        Whether the unit is of an absolute pressure.
+    """
+
+    quantity: str
+    unit: str = ""
+    label: str = ""
+    is_strong: bool = False
+
+
+def known_unit(text: str) -> str:
+    """Return the unit that a text is, or nothing."""
+    plain = text.strip().strip("[](){}<>").strip()
+    unit = unit_named(plain)
+    return unit if unit in _KNOWN else ""
+
+
+def _unit_and_rest(text: str) -> tuple[str, str]:
+    """Return the unit in a header, and the header without it."""
+    for found in reversed(list(_BRACKETS.finditer(text))):
+        if unit := known_unit(found[1]):
+            return unit, text[: found.start()] + " " + text[found.end() :]
+    last = _LAST.search(text)
+    unit = known_unit(last["unit"]) if last is not None else ""
+    if last is not None and unit:
+        is_marked = last["mark"].strip() in ("_", "/", "in")
+        if is_marked or last["unit"].casefold() not in _VAGUE:
+            return unit, text[: last.start()]
+    if text.endswith("%"):
+        return "percent", text[:-1]
+    return "", text
+
+
+_PRESSURE_MESSAGE = re.compile(r"/.*[/.]fluid_pressure")
+_JOINT_MESSAGE = re.compile(r"/.*/position(?:[/.\[]\w+\]?)?|/.*state.*[/.]position")
+
+
+def _of_message(name: str) -> str:
+    """Return the unit of a field of a ROS message, which has an SI unit: it begins with a topic."""
+    if _PRESSURE_MESSAGE.fullmatch(name):
+        return "Pa"
+    return "m" if _JOINT_MESSAGE.fullmatch(name) else ""
+
+
+def named(texts: Sequence[str], unit_cell: str = "") -> Named:
+    """Say what the header of a column means, by all rows of the header and its row of units."""
+    unit, rest = _of_message(texts[0]), []
+    for text in texts:
+        own, without = _unit_and_rest(text.strip())
+        unit = unit or own
+        rest.append(without)
+    unit = known_unit(unit_cell) or unit
+    if texts[0].strip().casefold() == "x_value":  # LabVIEW's seconds
+        return Named("time", unit or "s")
+    words = [
+        word.casefold() for word in re.split(r"[^\w]+|_", _CAMEL.sub(" ", " ".join(rest))) if word
+    ]
+    found, label, is_strong = [], [], False
+    for place, word in enumerate(words):
+        isa = _ISA.fullmatch(word)
+        quantity = _QUANTITY.get(word, "")
+        is_strong |= word in _STRONG
+        if word in _OTHER:
+            found.append("other")
+        elif isa and (isa[2] or (words[place + 1 : place + 2] and words[place + 1][:1].isdigit())):
+            found.append("pressure" if isa[1].startswith("p") else "position")
+            label += [isa[2]] if isa[2] else []
+        elif isa and isa[1] in ("pt", "zt", "pit", "zit", "gt"):
+            found.append("pressure" if isa[1].startswith("p") else "position")
+        elif quantity:
+            found.append(quantity)
+        elif word not in _STRONG and word not in _IDLE:
+            label.append(word)
+        elif word == "t" and len(words) == 1:
+            found.append("time")
+    return Named(_quantity(found, unit, words), unit, " ".join(label), is_strong)
+
+
+def _quantity(found: Sequence[str], unit: str, words: Sequence[str]) -> str:
+    """Choose the quantity: by the unit where only one has it, else by the words."""
+    of_unit = next((name for name, units in UNITS.items() if unit in units), "")
+    for name in ("other", "quality", "command"):
+        if name in found and not (name == "quality" and unit):
+            return name
+    if of_unit and (of_unit != "time" or not set(found) - {"time"}):
+        return of_unit
+    ranked = [name for name in ("force", "position", "pressure") if name in found]
+    if "position" in ranked and "pressure" in ranked:
+        weak = {"actuator", "diaphragm", "air", "p", "luft"}
+        firm = [one for one in words if _QUANTITY.get(one) == "pressure" and one not in weak]
+        return "" if firm else "position"
+    if ranked:
+        return ranked[0]
+    for name in ("time", "tag", "value", "unit"):
+        if name in found:
+            return name
+    return ""

@@ -1,0 +1,515 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What a table is: its times, units, valves and qualities, found before it is read.
+
+What is ambiguous is asked for, all at once, with the option that settles it.
+"""
+
+import re
+import shlex
+import zoneinfo
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from statistics import median, mode
+from typing import Any
+
+from valve_friction_ros.records.columns import KNOWN_UNITS, Columns
+from valve_friction_ros.records.first_look import Look, SeenColumn
+from valve_friction_ros.records.header_words import Named, named
+from valve_friction_ros.records.layout import LONGEST_QUOTE, OWN, Layout, TableSignal, quoted
+from valve_friction_ros.records.numbers_in_text import is_number, number_and_unit
+from valve_friction_ros.records.table_rows import RawTable
+from valve_friction_ros.records.written_times import TimeForm, clock_of, date_forms, is_date
+
+_MOST_NAMES, _MOST_CHOICES = 20, 6
+_COARSE = 0.5
+"""Steps of a time without a unit that are seconds; larger ones may be milliseconds. Chosen."""
+_GOOD = re.compile(r"(good|ok|gut|valid|true|g|yes|ja|gültig)\b.*|\(?good\b.*", re.IGNORECASE)
+_OPC_GOOD, _OPC_MOST, _CERTAIN = 192, 255, 100
+"""Qualities of OPC from good on, and the confidence of a historian in a value that was measured."""
+
+_LOCAL = ("d", "microdays")
+"""Units of clocks that count days: they are local, as those of spreadsheets are."""
+
+_Candidate = tuple[str, Named, int]
+"""Name, what it says, and column of what may be a signal."""
+
+
+class _Recognition(Look):
+    """Finds signals and times in a table that was looked at."""
+
+    def __init__(
+        self,
+        raw: RawTable,
+        form: Columns,
+        scan: Callable[[RawTable, Look, Sequence[int]], list[list[str]]],
+    ) -> None:
+        super().__init__(raw, form)
+        self._scan = scan
+        self.times: dict[tuple[int, ...], TimeForm] = {}
+        self.good: dict[int, Callable[[str], bool]] = {}
+        self.tag_place: int | None = None
+        self.tags: dict[str, Named] = {}
+        said = vars(form).items()
+        self.given = {value for one, value in said if one.endswith("_column") and value}
+
+    # Times.
+
+    def _time_places(self) -> list[tuple[int, ...]]:
+        if self.form.time_column:
+            column = self.by_name(self.form.time_column, "--time-column")
+            return [(column.place,)] if column else []
+        dates: list[tuple[int, ...]] = [
+            (column.place,) for column in self.columns if column.kind == "date"
+        ]
+        fine = [place for place in dates if not self._repeats(place[0])]
+        if dates and (fine or not self._numeric_times()):
+            return fine or dates
+        for day, clock in pairwise(self.columns):
+            if (day.kind, clock.kind) == ("day", "clock"):
+                return [(day.place, clock.place)]
+        if clocks := [column for column in self.columns if column.kind == "clock"]:
+            return [(clocks[0].place,)]
+        numeric = self._numeric_times()
+        if len(numeric) == 1 or (numeric and self._are_pairs(numeric)):
+            return [(column.place,) for column in numeric]
+        choice = numeric or [
+            column
+            for column in self.columns
+            if column.kind == "number" and not column.said.quantity
+        ]
+        self._ask_column("time", choice)
+        return []
+
+    def _repeats(self, place: int) -> bool:
+        """Return whether times come more often than the signals of a long form explain."""
+        cells = self.columns[place].filled
+        texts = (len({*column.filled}) for column in self.columns if column.kind == "text")
+        return len(cells) > 1 and mode_count(cells) > max(texts, default=1)
+
+    def _numeric_times(self) -> list[SeenColumn]:
+        found = [
+            column
+            for column in self.columns
+            if column.kind == "number" and column.said.quantity == "time"
+        ]
+        return found or [
+            column
+            for column in self.columns
+            if column.kind == "number" and not column.said.quantity and self._clock(column)
+        ]
+
+    def _are_pairs(self, times: Sequence[SeenColumn]) -> bool:
+        """Return whether each time has its own value beside it."""
+        return all(self.columns[one.place + 1 : one.place + 2] for one in times) and all(
+            later.place - earlier.place > 1 for earlier, later in pairwise(times)
+        )
+
+    def _numbers(self, column: SeenColumn) -> list[float]:
+        read = (number_and_unit(cell, self.marks) for cell in column.filled)
+        return [one[0] for one in read if one is not None]
+
+    def _clock(self, column: SeenColumn) -> tuple[str, int] | None:
+        numbers = self._numbers(column)
+        if len(numbers) < 2:
+            return None
+        steps = [abs(b - a) for a, b in pairwise(numbers) if b != a]
+        return clock_of(numbers[0], median(steps)) if steps else None
+
+    def _time_form(self, places: tuple[int, ...]) -> TimeForm:
+        form, column = self.form, self.columns[places[0]]
+        zone = form.time_zone or self._stated_zone()
+        if form.time_format:
+            return TimeForm((form.time_format,), zone, has_zone="%z" in form.time_format)
+        if len(places) == 2:
+            clock = self.columns[places[1]]
+            texts = [f"{a} {b}" for a, b in zip(column.cells, clock.cells, strict=True) if a and b]
+            return self._dates(texts, zone)
+        if column.kind == "date":
+            return self._dates([cell for cell in column.filled if is_date(cell)], zone)
+        if column.kind == "clock":
+            return TimeForm()
+        return self._numeric_form(column, zone)
+
+    def _numeric_form(self, column: SeenColumn, zone: str) -> TimeForm:
+        given = self.form.time_unit
+        if clock := self._clock(column):
+            unit, origin = clock
+            if not given or given == unit:
+                return TimeForm(unit=unit, origin=origin, zone=zone if unit in _LOCAL else "")
+        if given or column.said.unit:
+            return TimeForm(unit=given or column.said.unit)
+        numbers = self._numbers(column)
+        steps = [b - a for a, b in pairwise(numbers) if b != a]
+        if not steps or abs(median(steps)) <= _COARSE or self.form.time_column:
+            return TimeForm(unit="s")
+        self.questions.append(
+            f"the unit of the time {quoted(column.name)}, which rises by {median(steps):g} "
+            "(--time-unit s or --time-unit ms)"
+        )
+        return TimeForm(unit="s")
+
+    def _dates(self, texts: Sequence[str], zone: str) -> TimeForm:
+        forms = date_forms(texts)
+        if forms is None or not (forms.day_first or forms.month_first):
+            self.questions.append(
+                f"the form of the dates, as {quoted(texts[0])} (--time-format "
+                "'%d.%m.%Y %H:%M:%S.%f')"
+            )
+            return TimeForm(("%Y",))
+        if forms.is_ambiguous:
+            self.questions.append(
+                f"whether {quoted(texts[0])} has the day first (--time-format "
+                f"{shlex.quote(forms.day_first[0])}) or the month (--time-format "
+                f"{shlex.quote(forms.month_first[0])})"
+            )
+        return TimeForm(forms.day_first or forms.month_first, zone, has_zone=forms.has_zone)
+
+    def _stated_zone(self) -> str:
+        """Return the zone that stands above the values, as Europe/Berlin."""
+        above = " ".join(cell for _, row in self.rows[: self.start] for cell in row)
+        found = re.findall(r"\b[A-Z][A-Za-z]+/[A-Z][A-Za-z_]+\b", above)
+        known = [one for one in dict.fromkeys(found) if one in zoneinfo.available_timezones()]
+        return known[0] if len(known) == 1 else ""
+
+    # Signals.
+
+    def _candidates(self, times: set[int]) -> list[_Candidate]:
+        """Return the names that may be signals, with what they say and their columns."""
+        if self.tag_place is not None:
+            value = self._value_column(times)
+            return [(tag, said, value) for tag, said in self.tags.items()] if value >= 0 else []
+        return [
+            (column.name, column.said, column.place)
+            for column in self.columns
+            if column.place not in times and self._may_be_signal(column)
+        ]
+
+    def _may_be_signal(self, column: SeenColumn) -> bool:
+        """Return whether a column holds numbers, or is called as a signal is."""
+        if column.kind == "number" or column.name in self.given:
+            return True
+        return column.kind != "" and column.said.quantity in ("position", "pressure", "force")
+
+    def _value_column(self, times: set[int]) -> int:
+        if self.form.value_column:
+            column = self.by_name(self.form.value_column, "--value-column")
+            return column.place if column else -1
+        numeric = [
+            column
+            for column in self.columns
+            if column.kind == "number"
+            and column.place not in times
+            and column.said.quantity != "quality"
+        ]
+        called = [column for column in numeric if column.said.quantity == "value"]
+        if len(called or numeric) == 1:
+            return (called or numeric)[0].place
+        self._ask_column("value", called or numeric)
+        return -1
+
+    def _find_tags(self, times: set[int]) -> None:
+        """Find out whether each row is one value, and its tags."""
+        texts = [
+            column
+            for column in self.columns
+            if column.kind in ("text", "number")
+            and column.place not in times
+            and column.said.quantity == "tag"
+            and column.kind == "text"
+        ]
+        values = [c for c in self.columns if c.kind == "number" and c.said.quantity == "value"]
+        if self.form.tag_column:
+            column = self.by_name(self.form.tag_column, "--tag-column")
+            texts = [column] if column else []
+        elif not values:
+            return
+        if len(texts) > 1:
+            self._ask_column("tag", texts)
+        if len(texts) != 1:
+            return
+        self.tag_place = texts[0].place
+        unit = next((c for c in self.columns if c.said.quantity == "unit"), None)
+        wanted = [self.tag_place] + ([unit.place] if unit else [])
+        for row in self._scan(self.raw, self, wanted):
+            self.tags.setdefault(row[0], named([row[0]], row[1] if unit else ""))
+
+    def _ask_column(self, quantity: str, among: Sequence[SeenColumn]) -> None:
+        self._ask_name(quantity, [column.name for column in among])
+
+    def _ask_name(self, quantity: str, among: Sequence[str]) -> None:
+        listed = " or ".join(shlex.quote(name) for name in among[:_MOST_CHOICES])
+        more = " …" if len(among) > _MOST_CHOICES else ""
+        names = [column.name[:LONGEST_QUOTE] or "''" for column in self.columns[:_MOST_NAMES]]
+        listed = listed or f"one of {', '.join(names)}"
+        article = "the column of the" if self.tag_place is None else "the tag of the"
+        self.questions.append(f"{article} {quantity} (--{quantity}-column {listed}{more})")
+
+    def _signal(self, quantity: str, name: str, said: Named, place: int) -> TableSignal:
+        unit = self._unit(quantity, name, said, place)
+        before = [key for key in self.times if key[0] < place]
+        time = max(before, key=lambda key: key[0], default=next(iter(self.times), (0,)))
+        tag = name if self.tag_place is not None else ""
+        return TableSignal(quantity, name, unit, place, time, self._quality(place, said, time), tag)
+
+    def _unit(self, quantity: str, name: str, said: Named, place: int) -> str:
+        given = getattr(self.form, f"{quantity}_unit")
+        stated = self.unit_row.get(name, "") if self.tag_place is None else ""
+        if given:
+            if stated in KNOWN_UNITS[quantity] and stated != given:
+                self.questions.append(
+                    f"the row under the headers says that {name!r} is in {stated}, and {given} was "
+                    f"named: name it by {quantity}_unit (--{quantity}-unit {stated})"
+                )
+            return str(given)
+        for unit in (said.unit, self._unit_in_cells(place)):
+            if unit in KNOWN_UNITS[quantity]:
+                return unit
+        if name in self.given:
+            return {"position": "m", "pressure": "Pa", "force": "N"}[quantity]
+        numbers = self._of_signal(name, place)
+        span = f", values from {min(numbers):g} to {max(numbers):g}" if numbers else ""
+        known = " ".join(KNOWN_UNITS[quantity])
+        self.questions.append(
+            f"the unit of the {quantity} {quoted(name)}{span} (--{quantity}-unit, one of {known})"
+        )
+        return ""
+
+    def _of_signal(self, name: str, place: int) -> list[float]:
+        column = self.columns[place]
+        if self.tag_place is None:
+            return self._numbers(column)
+        tags = self.columns[self.tag_place].cells
+        own = [cell for tag, cell in zip(tags, column.cells, strict=True) if tag == name and cell]
+        return self._numbers(SeenColumn(place, name, column.said, own))
+
+    def _unit_in_cells(self, place: int) -> str:
+        cells = self.columns[place].filled
+        units = [read[1] for cell in cells if (read := number_and_unit(cell, self.marks))]
+        return mode(units) if units else ""
+
+    def _quality(self, place: int, said: Named, time: tuple[int, ...]) -> int | None:
+        """Return the column of the qualities of a signal: that with its name, or the next one."""
+        found = [column for column in self.columns if column.said.quantity == "quality"]
+        found = [column for column in found if column.filled and column.place not in time]
+        if not found:
+            return None
+        alike = [c for c in found if said.label and c.said.label == said.label]
+        beside = [c for c in found if c.place == place + 1] or (alike if len(found) > 1 else found)
+        if not beside:
+            return None
+        column = beside[0]
+        if column.place not in self.good:
+            self.good[column.place] = self._goodness(column)
+        return column.place
+
+    def _goodness(self, column: SeenColumn) -> Callable[[str], bool]:
+        if self.form.good_quality:
+            words = {word.strip().casefold() for word in self.form.good_quality.split(",")}
+            return lambda cell: cell.strip().casefold() in words
+        cells = column.filled
+        numbers = [read[0] for cell in cells if (read := number_and_unit(cell, self.marks))]
+        if len(numbers) == len(cells):
+            is_opc = any(_OPC_GOOD <= value <= _OPC_MOST for value in numbers)
+            least = _OPC_GOOD if is_opc else max(numbers)
+            if is_opc or least == _CERTAIN or len(set(numbers)) == 1:
+                return lambda cell: is_number(cell) and float(cell) >= least
+        elif any(map(_GOOD.fullmatch, cells)):
+            return lambda cell: _GOOD.fullmatch(cell.strip()) is not None
+        elif len(set(cells)) == 1:
+            return lambda cell: cell.strip() == cells[0]
+        said = ", ".join(map(quoted, dict.fromkeys(cells[:_MOST_CHOICES])))
+        self.questions.append(
+            f"which of {quoted(column.name)} are good: {said} (--good-quality, with commas)"
+        )
+        return lambda _: True
+
+    def signals(self) -> dict[str, tuple[TableSignal, ...]]:
+        """Return the signals of each valve; what is open is asked for."""
+        if self.start == len(self.rows):
+            where = "under the header" if len(self.columns) > 1 else f"in {len(self.rows)} rows"
+            self.questions.append(f"what it holds: there are no values {where}")
+            return {}
+        places = self._time_places()
+        taken = {place for group in places for place in group}
+        self.times = {group: self._time_form(group) for group in places}
+        self._find_tags(taken)
+        candidates = self._candidates(taken)
+        chosen = {
+            quantity: self._chosen(quantity, candidates)
+            for quantity in ("position", "pressure", "force")
+        }
+        if chosen["pressure"]:
+            chosen["force"] = []
+        drive = "pressure" if chosen["pressure"] or not chosen["force"] else "force"
+        drives, positions = chosen[drive], chosen["position"]
+        pairs = self._pairs(drives, positions)
+        if not pairs:
+            self._ask_signals(drive, drives, positions, candidates)
+            return {}
+        return {
+            _as_written(label, one[0]) if len(pairs) > 1 else "": (
+                self._signal(drive, *one),
+                self._signal("position", *other),
+                *self._opposing(),
+            )
+            for label, (one, other) in pairs.items()
+        }
+
+    def _opposing(self) -> Iterator[TableSignal]:
+        name = self.form.opposing_pressure_column
+        found = [each for each in self._candidates(set()) if each[0] == name]
+        if name and found:
+            yield self._signal("pressure", *found[0])
+        elif name:
+            self.by_name(name, "--opposing-pressure-column")
+
+    def _chosen(self, quantity: str, candidates: Sequence[_Candidate]) -> list[_Candidate]:
+        name = getattr(self.form, f"{quantity}_column")
+        if name:
+            found = [each for each in candidates if each[0] == name]
+            if len(found) != 1 and (quantity != "force" or self.form.pressure_column == ""):
+                if self.tag_place is None:
+                    self.by_name(name, f"--{quantity}-column")
+                else:
+                    self._ask_name(quantity, list(self.tags))
+            return found if len(found) == 1 else []
+        other = self.form.opposing_pressure_column
+        found = [each for each in candidates if each[1].quantity == quantity and each[0] != other]
+        own = [each for each in found if each[0] == OWN[quantity]]
+        return own or found
+
+    def _pairs(
+        self,
+        drives: Sequence[_Candidate],
+        positions: Sequence[_Candidate],
+    ) -> dict[str, tuple[_Candidate, _Candidate]]:
+        """Return drive and position of each valve, by its label."""
+        if len(drives) == 1 and len(positions) == 1:
+            return {"": (drives[0], positions[0])}
+        pairs = {}
+        for label in dict.fromkeys(said.label for _, said, _ in drives):
+            own = [one for one in drives if one[1].label == label]
+            stems = [one for one in positions if one[1].label == label]
+            own = [one for one in own if one[1].is_strong] if len(own) > 1 else own
+            stems = [one for one in stems if one[1].is_strong] if len(stems) > 1 else stems
+            if label and len(own) == 1 and len(stems) == 1:
+                pairs[label] = (own[0], stems[0])
+        if not pairs and drives and positions:
+            own = [one for one in drives if one[1].is_strong] if len(drives) > 1 else [*drives]
+            stems = (
+                [one for one in positions if one[1].is_strong]
+                if len(positions) > 1
+                else [*positions]
+            )
+            if len(own) == 1 and len(stems) == 1:
+                pairs[""] = (own[0], stems[0])
+        return pairs
+
+    def _ask_signals(
+        self,
+        drive: str,
+        drives: Sequence[_Candidate],
+        positions: Sequence[_Candidate],
+        candidates: Sequence[_Candidate],
+    ) -> None:
+        said = " ".join(self.questions)
+        for quantity, found in ((drive, drives), ("position", positions)):
+            if len(found) == 1 or f"--{quantity}-column" in said:
+                if len(found) == 1:
+                    self._unit(quantity, *found[0])
+                continue
+            unknown = [
+                name
+                for name, named_, _ in candidates
+                if named_.quantity in ("", "value", "command")
+            ]
+            self._ask_name(quantity, [name for name, _, _ in found] or unknown)
+
+
+def _as_written(label: str, name: str) -> str:
+    """Return the words of a label as they stand in a name, as FV-101."""
+    pattern = r"[\W_]*".join(map(re.escape, label.split()))
+    found = re.search(pattern, name, re.IGNORECASE)
+    return found[0] if found else label
+
+
+def mode_count(cells: Sequence[str]) -> int:
+    """Return how often the most frequent cell is there."""
+    return Counter(cells).most_common(1)[0][1]
+
+
+def recognized(
+    raw: RawTable,
+    form: Columns,
+    scan: Callable[[RawTable, Look, Sequence[int]], list[list[str]]],
+) -> Layout:
+    """Find out how a table is to be read.
+
+    Parameters
+    ----------
+    raw : RawTable
+        The table.
+    form : Columns
+        What is said of it.
+    scan : callable
+        Returns the different rows of some columns of the whole table: its tags.
+
+    Returns
+    -------
+    Layout
+        With the questions that the table leaves open.
+    """
+    look = _Recognition(raw, form, scan)
+    valves = look.signals()
+    first = next(iter(look.times), ())
+    time = look.times.get(first, TimeForm())
+    drive, position = next(iter(valves.values()), (None, None))[:2] if valves else (None, None)
+    found: dict[str, Any] = {
+        "delimiter": look.delimiter,
+        "decimal": look.marks.decimal if raw.is_text else "",
+        "encoding": form.encoding or (raw.encoding if raw.encoding == "cp1252" else ""),
+        "time_zone": form.time_zone or time.zone,
+    }
+    if len(first) == 1:
+        found["time_column"] = look.columns[first[0]].name
+        found["time_unit"] = time.unit if not time.origin else ""
+        if len(time.formats) > 0 and not time.formats[0].startswith("%Y"):
+            found["time_format"] = form.time_format
+    if len(valves) == 1 and drive and position:
+        for signal in (drive, position):
+            found[f"{signal.quantity}_column"] = signal.name
+            found[f"{signal.quantity}_unit"] = signal.unit
+    if look.tag_place is not None:
+        found["tag_column"] = look.columns[look.tag_place].name
+        found["value_column"] = look.columns[drive.place].name if drive else ""
+    taken = {place for places in look.times for place in places}
+    above = look.rows[look.start - 1][0] if look.start else 0
+    texts = [cell for _, row in look.rows[: look.start] for cell in row if cell]
+    return Layout(
+        raw,
+        replace(form, **{name: value for name, value in found.items() if value}),
+        tuple(column.name for column in look.columns),
+        look.start + 1,
+        above,
+        valves,
+        look.times,
+        look.tag_place,
+        look.good,
+        look.marks,
+        (*texts, *look.tags),
+        {
+            column.name: "time" if column.place in taken else column.said.quantity or column.kind
+            for column in look.columns
+        },
+        tuple(dict.fromkeys(look.questions)),
+    )

@@ -1,0 +1,430 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A table that is read: the samples of each signal, what was left out of them, and why."""
+
+import csv
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.first_look import Look
+from valve_friction_ros.records.layout import AmbiguousTableError, Layout, TableSignal, quoted
+from valve_friction_ros.records.numbers_in_text import numbers
+from valve_friction_ros.records.recognition import recognized
+from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.records.table_rows import RawTable, open_raw
+from valve_friction_ros.records.whole_file import cause_of
+from valve_friction_ros.records.written_times import NO_TIME, TimeForm, WrittenTimes
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_MOST_WORDS = 4
+"""Kinds of bad entries that a message names. Chosen: it stays on one line."""
+_MOST_TAGS = 10_000
+_MOST_REPEATED = 0.5
+"""Share of rows that may repeat the row above, to the last value. Chosen."""
+
+
+@dataclass(eq=False)
+class ReadSignal:
+    """The samples of a signal as they were read, in the unit of the table.
+
+    Attributes
+    ----------
+    signal : TableSignal
+        Where it is in the table.
+    stamps, values, rows : ndarray, shape (n,)
+        Times, ns, values, and rows as a spreadsheet counts.
+    bad : Counter of str
+        What was left out, and how often.
+    example : tuple of int, str and str
+        Row, column and text of the first bad value.
+    """
+
+    signal: TableSignal
+    stamps: NDArray[np.int64]
+    values: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    bad: Counter[str] = field(default_factory=Counter)
+    example: tuple[int, str, str] = (0, "", "")
+
+    def where(self, kept: NDArray[np.bool_] | slice) -> "ReadSignal":
+        """Return some of the samples."""
+        return replace(
+            self, stamps=self.stamps[kept], values=self.values[kept], rows=self.rows[kept]
+        )
+
+    def place(self, sample: int) -> str:
+        """Return row and column of a sample."""
+        return f"row {self.rows[sample]}, column {self.signal.name!r}"
+
+
+@dataclass(eq=False)
+class _Parts:
+    """The blocks of a signal while it is read."""
+
+    signal: TableSignal
+    stamps: list[NDArray[np.int64]] = field(default_factory=list)
+    values: list[NDArray[np.float64]] = field(default_factory=list)
+    rows: list[NDArray[np.int64]] = field(default_factory=list)
+    bad: Counter[str] = field(default_factory=Counter)
+    example: tuple[int, str, str] = (0, "", "")
+
+    def forget_before(self, begin: float) -> None:
+        while self.stamps and not (self.stamps[0] >= begin).all():
+            kept = self.stamps[0] >= begin
+            self.stamps[0], self.rows[0] = self.stamps[0][kept], self.rows[0][kept]
+            self.values[0] = self.values[0][kept]
+            if kept.any():
+                return
+            del self.stamps[0], self.values[0], self.rows[0]
+
+    def joined(self) -> ReadSignal:
+        stamps = np.concatenate([np.empty(0, np.int64), *self.stamps])
+        values = np.concatenate([np.empty(0), *self.values])
+        rows = np.concatenate([np.empty(0, np.int64), *self.rows])
+        return ReadSignal(self.signal, stamps, values, rows, self.bad, self.example)
+
+
+class OpenTable:
+    """A table whose layout is known; `require_settled` asks for what is not.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    layout : Layout
+        How it is read.
+    """
+
+    def __init__(self, path: Path, form: Columns | None = None) -> None:
+        self.path = path
+        raw = open_raw(path, form or Columns())
+        self.layout: Layout = recognized(raw, form or Columns(), _different)
+        self._stretched = Stretch()
+
+    def require_settled(self) -> None:
+        """Raise AmbiguousTableError if the table leaves something open: all of it, in one line."""
+        layout = self.layout
+        if not layout.questions:
+            return
+        if not layout.times and not layout.valves and len(layout.headers) < 2:
+            (only, *_) = (*layout.headers, "")
+            raise AmbiguousTableError(
+                f"{self.path}: there is only one column, {quoted(only)}: name the delimiter of the "
+                "file (--delimiter)"
+            )
+        raise AmbiguousTableError(f"{self.path}: cannot tell {'; '.join(layout.questions)}")
+
+    def read(
+        self,
+        signals: Sequence[TableSignal],
+        stretch: Stretch | None = None,
+    ) -> list[ReadSignal]:
+        """Read signals within a stretch, and keep no more of the table than that.
+
+        Raises
+        ------
+        ValueError
+            If the table cannot be read to its end, holds more rows than are to be read, or times
+            that go back: the row, and what to do.
+        RefusalError
+            If the stretch holds no rows.
+        """
+        stretch = stretch or Stretch()
+        parts = [_Parts(signal) for signal in signals]
+        start: int | None = None
+        for stamps_of, block, row_numbers in self._blocks(signals):
+            first = _first(stamps_of.values())
+            if first is None:
+                for part in parts:
+                    self._keep(part, block, row_numbers, stamps_of, None)
+                continue
+            start = first if start is None else start
+            bounds = (start + stretch.begin * 1e9, start + stretch.end * 1e9)
+            if all((known := each[each != NO_TIME]).size and known.min() > bounds[1]
+                   for each in stamps_of.values()):  # fmt: skip
+                break
+            for part in parts:
+                self._keep(part, block, row_numbers, stamps_of, bounds)
+            self._drop_old(parts, stretch)
+            most = max(sum(each.size for each in part.stamps) for part in parts)
+            self._require_room(most)
+        if start is None and not any(part.bad for part in parts):
+            raise ValueError(f"{self.path}: there are no rows under the header")
+        found = [_within(part.joined(), stretch) for part in parts]
+        if not any(each.stamps.size for each in found) and not any(each.bad for each in found):
+            raise RefusalError(
+                f"{self.path}: the chosen stretch holds no rows: choose another begin or end"
+            )
+        return [self._in_order(each) for each in found]
+
+    def _blocks(
+        self, signals: Sequence[TableSignal]
+    ) -> Iterator[
+        tuple[dict[tuple[int, ...], NDArray[np.int64]], "pd.DataFrame", NDArray[np.int64]]
+    ]:
+        """Yield blocks with their times."""
+        layout = self.layout
+        keys = dict.fromkeys(signal.time for signal in signals)
+        clocks = {key: WrittenTimes(layout.times[key]) for key in keys}
+        wanted = [place for key in keys for place in key]
+        wanted += [signal.place for signal in signals]
+        wanted += [signal.quality for signal in signals if signal.quality is not None]
+        if layout.tag_place is not None:
+            wanted.append(layout.tag_place)
+        places = sorted(set(wanted))
+        blocks = layout.raw.blocks(places, layout.form.delimiter, layout.first, layout.above)
+        for rows, block in blocks:
+            if not len(block):
+                continue
+            yield (
+                {key: self._times(clocks[key], key, block) for key in keys},
+                block,
+                rows,
+            )
+
+    def _times(
+        self, clock: WrittenTimes, key: tuple[int, ...], block: "pd.DataFrame"
+    ) -> NDArray[np.int64]:
+        form = self.layout.times[key]
+        cells = block[key[0]]
+        if len(key) == 2:
+            cells = cells.fillna("").str.strip() + " " + block[key[1]].fillna("").str.strip()
+        values = self._numbers(cells, form.unit) if form.unit else np.empty(0)
+        return clock(cells, values)
+
+    def _numbers(self, cells: "pd.Series[Any]", unit: str) -> NDArray[np.float64]:
+        if cells.dtype.kind in "fiu":
+            found = cells.to_numpy(np.float64)
+            return np.where(np.isfinite(found), found, np.nan)
+        return numbers(cells.fillna("").astype(str).tolist(), self.layout.marks, unit)
+
+    def _keep(
+        self,
+        part: _Parts,
+        block: "pd.DataFrame",
+        rows: NDArray[np.int64],
+        stamps_of: Mapping[tuple[int, ...], NDArray[np.int64]],
+        bounds: tuple[float, float] | None,
+    ) -> None:
+        """Keep the good samples of a block, and count the bad ones."""
+        signal = part.signal
+        stamps, cells = stamps_of[signal.time], block[signal.place]
+        there = self._there(block, cells, signal)
+        if bounds is not None:
+            there &= (stamps == NO_TIME) | ((stamps >= bounds[0]) & (stamps <= bounds[1]))
+        values = np.full(len(block), np.nan)
+        values[there] = self._numbers(cells[there], signal.unit)
+        good = there & np.isfinite(values)
+        if signal.quality is not None:
+            tell = self.layout.good[signal.quality]
+            told = block[signal.quality].fillna("").astype(str)
+            verdicts = {word: tell(word) for word in told.unique()}
+            trusted = told.map(verdicts).to_numpy(bool)
+            self._count(part, rows, told, good & ~trusted)
+            good &= trusted
+        self._count(part, rows, cells, there & ~np.isfinite(values))
+        timeless = good & (stamps == NO_TIME)
+        self._count(part, rows, block[signal.time[-1]], timeless)
+        good &= ~timeless
+        part.stamps.append(stamps[good])
+        part.values.append(values[good])
+        part.rows.append(rows[good])
+        self._in_order(ReadSignal(signal, stamps[good], values[good], rows[good]))
+
+    def _there(
+        self, block: "pd.DataFrame", cells: "pd.Series[Any]", signal: TableSignal
+    ) -> NDArray[np.bool_]:
+        """Return which rows hold a value of a signal; an empty entry is none."""
+        if cells.dtype.kind in "fiu":
+            there = cells.notna().to_numpy()
+        else:
+            there = (cells.fillna("").astype(str).str.strip() != "").to_numpy()
+        if self.layout.tag_place is not None and signal.tag:
+            there &= (block[self.layout.tag_place].str.strip() == signal.tag).to_numpy()
+        return np.asarray(there, np.bool_)
+
+    def _count(
+        self,
+        part: _Parts,
+        rows: NDArray[np.int64],
+        cells: "pd.Series[Any]",
+        bad: NDArray[np.bool_],
+    ) -> None:
+        if not bad.any():
+            return
+        texts = cells[bad].astype(str).str.strip()
+        counted = texts.value_counts()
+        part.bad.update({str(word): int(count) for word, count in counted.items()})
+        if len(part.bad) > _MOST_TAGS:
+            part.bad = Counter({"": part.bad.total()})
+        if not part.example[0]:
+            name = part.signal.name
+            if cells.name != part.signal.place:
+                name = self.layout.headers[int(cells.name)]
+            part.example = (int(rows[bad][0]), name, str(texts.iloc[0]))
+
+    def _drop_old(self, parts: Sequence[_Parts], stretch: Stretch) -> None:
+        newest = [part.stamps[-1][-1] for part in parts if part.stamps and part.stamps[-1].size]
+        if not newest or not math.isfinite(stretch.last) or self._is_newest_first(parts):
+            return
+        for part in parts:
+            part.forget_before(min(newest) - (stretch.last + 1) * 1e9)
+
+    def _is_newest_first(self, parts: Sequence[_Parts]) -> bool:
+        stamps = next(stamps for part in parts for stamps in part.stamps if stamps.size)
+        return bool(stamps[0] > stamps[-1])
+
+    def _require_room(self, count: int) -> None:
+        most = self.layout.form.maximum_rows
+        if count > most:
+            raise ValueError(
+                f"{self.path}: more than {most} rows: raise maximum_rows (--maximum-rows), or "
+                "choose a part by --begin and --end"
+            )
+
+    def _in_order(self, read: ReadSignal) -> ReadSignal:
+        """Return the samples in the order of time; refuse times that go back."""
+        if read.stamps.size < 2:
+            return read
+        steps = np.diff(read.stamps)
+        if (steps <= 0).all() and (steps < 0).any():  # the newest first, as some programs list
+            read = read.where(slice(None, None, -1))
+            steps = np.diff(read.stamps)
+        same = (steps == 0) & (np.diff(read.values) == 0)
+        if 0 < same.sum() <= _MOST_REPEATED * same.size:
+            kept = np.concatenate([[True], ~same])
+            read.bad["repeated row"] += int(same.sum())
+            read = read.where(kept)
+            steps = np.diff(read.stamps)
+        if (steps <= 0).any():
+            raise ValueError(self._goes_back(read, int(np.argmax(steps <= 0)) + 1))
+        return read
+
+    def _goes_back(self, read: ReadSignal, sample: int) -> str:
+        form = self.layout.times[read.signal.time]
+        repeats = read.stamps[sample] == read.stamps[sample - 1]
+        now, before = (_shown(read.stamps[one], form) for one in (sample, sample - 1))
+        column = self.layout.headers[read.signal.time[0]]
+        what = "repeats" if repeats else "goes back"
+        remedy = "sort the rows, or use the record before or after it"
+        if repeats:
+            remedy = "export it with fractions of a second, or delete one of the rows"
+        elif form.is_date and not form.has_zone and not form.zone:
+            remedy += "; of clocks that were put back name the zone (--time-zone)"
+        place = f"row {read.rows[sample]}, column {column!r}"
+        return f"{self.path}: {place} {what} ({now} after {before}): {remedy}"
+
+
+def _shown(stamp: int, form: TimeForm) -> str:
+    return str(np.datetime64(int(stamp), "ns")) if form.is_date else f"{stamp / 1e9:.12g} s"
+
+
+def _first(stamps: Any) -> int | None:
+    firsts = [int(known[0]) for each in stamps if (known := each[each != NO_TIME]).size]
+    return min(firsts) if firsts else None
+
+
+def _within(read: ReadSignal, stretch: Stretch) -> ReadSignal:
+    if math.isfinite(stretch.last) and read.stamps.size:
+        return read.where(read.stamps >= read.stamps[-1] - stretch.last * 1e9)
+    return read
+
+
+def _different(raw: RawTable, look: Look, places: Sequence[int]) -> list[list[str]]:
+    """Return the different rows of some columns of the whole table: its tags."""
+    found: dict[tuple[str, ...], None] = {}
+    above = look.rows[look.start - 1][0] if look.start else 0
+    for _, block in raw.blocks(places, look.delimiter, look.start + 1, above):
+        parts = block[list(places)].astype(str).drop_duplicates()
+        for row in parts.itertuples(index=False):
+            cells = tuple(str(cell).strip() for cell in row)
+            if cells[0]:
+                found.setdefault(cells)
+        if len(found) > _MOST_TAGS:
+            raise ValueError(f"{raw.path}: more than {_MOST_TAGS} tags: name the --tag-column")
+    return [list(row) for row in found]
+
+
+def left_out(read: ReadSignal) -> str:
+    """Return in words what was left out of a signal; nothing for a whole one."""
+    if not read.bad:
+        return ""
+    named = [
+        f"{quoted(word)} {count}" if word else f"{count} others"
+        for word, count in read.bad.most_common(_MOST_WORDS)
+    ]
+    more = ", …" if len(read.bad) > _MOST_WORDS else ""
+    whole = read.bad.total() + read.values.size
+    return (
+        f"{read.bad.total()} of {whole} values of {quoted(read.signal.name)} are bad and were "
+        f"left out ({', '.join(named)}{more})"
+    )
+
+
+def require_good(path: Path, read: ReadSignal, form: Columns) -> None:
+    """Refuse a signal with more bad values than are to be left out."""
+    count = read.bad.total() - read.bad["repeated row"]
+    whole = count + read.values.size
+    if count <= form.maximum_bad_share * whole:
+        return
+    share, most = count / whole, 100 * form.maximum_bad_share
+    row, column, text = read.example
+    raise ValueError(
+        f"{path}: row {row}, column {column!r}: {quoted(text)} is no good value, and so are "
+        f"{count} of {whole} of {read.signal.name!r}, more than {most:.3g} %: "
+        "use a stretch of the record without them, or allow more (--maximum-bad-share "
+        f"{math.ceil(share * 100 + 0.5) / 100:g})"
+    )
+
+
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Read named columns of finite numbers from a CSV file of this package, shape (n,) each.
+
+    Needs no library. Raises ValueError, in one line, if the file cannot be read or holds anything
+    else.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            rows = csv.reader(stream)
+            header = [name.strip() for name in next(rows, [])]
+            if missing := [name for name in names if name not in header]:
+                raise ValueError(f"no column {missing[0]!r} among {', '.join(header)[:200]}")
+            places = [header.index(name) for name in names]
+            read = []
+            for number, row in enumerate(itertools.islice(rows, Columns.maximum_rows), start=2):
+                if any(row):
+                    read.append(_numbers(row, places, number))
+    except (OSError, UnicodeError, ValueError, csv.Error) as error:
+        raise ValueError(f"{path}: cannot be read: {cause_of(error)}") from None
+    if not read:
+        raise ValueError(f"{path}: there are no rows under the header")
+    return dict(zip(names, np.array(read).T, strict=True))
+
+
+def _numbers(row: Sequence[str], places: Sequence[int], number: int) -> list[float]:
+    try:
+        found = [float(row[place]) for place in places]
+    except (ValueError, IndexError):
+        found = [math.nan]
+    if not all(map(math.isfinite, found)):
+        raise ValueError(f"row {number} does not hold numbers: {quoted(','.join(row))}")
+    return found

@@ -1,0 +1,445 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The cells of a table: CSV, gzipped or not, or from a pipe; Excel; Parquet; MATLAB.
+
+pandas splits text; it is imported when a table is read.
+"""
+
+import atexit
+import codecs
+import contextlib
+import csv
+import functools
+import gzip
+import importlib
+import io
+import itertools
+import math
+import shutil
+import stat
+import sys
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.whole_file import cause_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+STANDARD_INPUT = Path("-")
+_COPIED = 1 << 20
+
+
+@functools.cache
+def _copy(path: Path, most: float) -> Path:
+    """Copy a pipe to a file that goes with the process."""
+    folder = tempfile.mkdtemp(prefix="valve_friction_")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    target = Path(folder, "pipe")
+    source = sys.stdin.buffer if path == STANDARD_INPUT else path.open("rb")
+    size = 0
+    with target.open("wb") as whole, source:
+        while piece := source.read(_COPIED):
+            size += len(piece)
+            if size > most * 1e6:
+                raise ValueError(
+                    f"{path}: more than {most:g} MB: raise maximum_megabytes "
+                    "(--maximum-megabytes), or cut it"
+                )
+            whole.write(piece)
+    return target
+
+
+def readable(path: Path, most: float) -> Path:
+    """Return a file with the content of `path`, standard input and pipes among them.
+
+    The copy of a pipe holds at most `most` MB; ValueError where that is not enough.
+    """
+    try:
+        is_pipe = path == STANDARD_INPUT or stat.S_ISFIFO(path.stat().st_mode)
+        return _copy(path, most) if is_pipe else path
+    except OSError:
+        return path  # whoever opens it says why that fails
+
+
+_LONGEST_LINE = 1 << 20
+"""Most bytes of a line. Chosen: far beyond any table, and little memory."""
+
+_PIECE = 1 << 16
+"""Bytes that are read at a time."""
+
+BLOCK = 1 << 16
+"""Rows that are converted at a time. Chosen: some megabytes of text."""
+
+PROGRESS: ContextVar[Callable[[float], None] | None] = ContextVar("progress", default=None)
+"""Is told the share of a text that was read, block by block."""
+
+LOOKED_AT = 300
+"""Rows that are looked at before a table is read. Chosen: more than any preamble of an export."""
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+_FALLBACK = "cp1252"
+"""Encoding of bytes that are not UTF-8: what Windows writes in Western Europe and America."""
+
+
+class _Bounded(io.RawIOBase):
+    """The bytes of a file, unpacked where it is gzipped; refuses too many, and endless lines."""
+
+    def __init__(self, path: Path, most: float) -> None:
+        self._most = most
+        self._left = most * 1e6
+        self._line = self._quoted = 0
+        self._file = path.open("rb")
+        self._size = max(path.stat().st_size, 1)
+        is_packed = self._file.read(2) == b"\x1f\x8b"
+        self._file.seek(0)
+        self._stream = cast(IO[bytes], self._file)
+        if is_packed:
+            self._stream = cast(IO[bytes], gzip.GzipFile(fileobj=self._file))
+
+    def readable(self) -> bool:
+        """Return True, as io asks."""
+        return True
+
+    def close(self) -> None:
+        """Close the file."""
+        if not self.closed:
+            self._stream.close()
+            self._file.close()
+        super().close()
+
+    @property
+    def share(self) -> float:
+        """Share of the file that was read."""
+        return self._file.tell() / self._size
+
+    def readinto(self, room: Any, /) -> int:
+        """Read the next bytes."""
+        piece = self._stream.read(len(memoryview(room)))
+        self._left -= len(piece)
+        if self._left < 0:
+            raise ValueError(
+                f"more than {self._most:g} MB, unpacked: raise maximum_megabytes "
+                "(--maximum-megabytes), or cut the file"
+            )
+        end = max(piece.rfind(b"\n"), piece.rfind(b"\r"))
+        self._line = len(piece) - end - 1 + (self._line if end < 0 else 0)
+        if self._line > _LONGEST_LINE:
+            raise ValueError(f"a line has more than {_LONGEST_LINE} bytes: it is no CSV file")
+        self._require_quotes(piece)
+        memoryview(room)[: len(piece)] = piece
+        return len(piece)
+
+    def _require_quotes(self, piece: bytes) -> None:
+        """Refuse a quote without its end, behind which all else would be one cell."""
+        is_open = self._quoted > 0
+        if count := piece.count(b'"'):
+            is_open ^= bool(count % 2)
+            self._quoted = len(piece) - piece.rfind(b'"') if is_open else 0
+        elif is_open:
+            self._quoted += len(piece)
+        if self._quoted > _LONGEST_LINE:
+            raise ValueError(f"a quote has no end within {_LONGEST_LINE} bytes")
+
+
+def _encoding(start: bytes) -> str:
+    for mark, encoding in _MARKS:
+        if start.startswith(mark):
+            return encoding
+    if len(start) > 1 and 0 in start[:2]:  # UTF-16 without its mark: every other byte is zero
+        return "utf-16-be" if start[0] == 0 else "utf-16-le"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(start)
+    except UnicodeDecodeError:
+        return _FALLBACK
+    return "utf-8"
+
+
+Cells = tuple[NDArray[np.int64], "pd.DataFrame"]
+"""Row numbers, as a spreadsheet counts, and their cells: text, or the types of a typed file."""
+
+
+@dataclass(frozen=True, eq=False)
+class RawTable:
+    """The cells of a file, before anything is known of them.
+
+    Attributes
+    ----------
+    path : Path
+        The file, as messages name it.
+    head : tuple of str
+        The first lines of a text; empty for a file of cells.
+    cells : sequence of sequences of str
+        The first rows of a file of cells.
+    encoding : str
+        Of a text.
+    """
+
+    path: Path
+    form: Columns
+    place: Path
+    head: tuple[str, ...] = ()
+    cells: Sequence[Sequence[str]] = ()
+    encoding: str = ""
+    are_headers_first: bool = False
+
+    @property
+    def is_text(self) -> bool:
+        """True for a text, whose marks are to be found."""
+        return not self.cells
+
+    def rows(self, delimiter: str) -> list[tuple[int, list[str]]]:
+        """Return the first rows, split by `delimiter`; with each the number of lines up to it."""
+        if not self.is_text:
+            return list(enumerate(map(list, self.cells), start=1))
+        if delimiter == " ":
+            return [(number, line.split()) for number, line in enumerate(self.head, start=1)]
+        reader = csv.reader(
+            (line.replace("\0", "") for line in self.head),
+            delimiter=delimiter,
+            skipinitialspace=True,
+        )
+        with contextlib.suppress(csv.Error):
+            return [(reader.line_num, row) for row in reader]
+        return [(n, line.split(delimiter)) for n, line in enumerate(self.head, start=1)]
+
+    def blocks(
+        self, places: Sequence[int], delimiter: str, first: int, above: int
+    ) -> Iterator[Cells]:
+        """Yield columns from row `first` on, as a spreadsheet counts, block by block.
+
+        `above` is the number of lines above that row. The columns of a block are called by their
+        places. Raises ValueError, with the file and the
+        cause, if it cannot be read to its end.
+        """
+        with _explained(self.path, self.is_text):
+            if self.is_text:
+                yield from self._text_blocks(places, delimiter, first, above)
+            else:
+                yield from self._cell_blocks(places, first)
+
+    def _text_blocks(
+        self, places: Sequence[int], delimiter: str, first: int, above: int
+    ) -> Iterator[Cells]:
+        import pandas as pd  # noqa: PLC0415 - slow to import
+
+        wanted = sorted({0, *places})
+        is_strict = bool(self.form.encoding)
+        told = PROGRESS.get()
+        with _text(self.place, self.form, self.encoding) as text:
+            for _ in range(above):
+                text.readline()
+            quoted = any('"' in line for line in self.head[above:])
+            reader = pd.read_csv(
+                text,
+                sep=r"\s+" if delimiter == " " else delimiter,
+                header=None,
+                names=range(max(wanted) + 1),
+                usecols=wanted,
+                dtype=str,
+                na_filter=False,
+                skip_blank_lines=False,
+                skipinitialspace=True,
+                quoting=csv.QUOTE_MINIMAL if quoted else csv.QUOTE_NONE,
+                encoding_errors="strict" if is_strict else "replace",
+                chunksize=BLOCK,
+                engine="c",
+                index_col=False,
+            )
+            begin = first
+            for block in reader:
+                numbers = np.arange(begin, begin + len(block), dtype=np.int64)
+                begin += len(block)
+                kept = numbers > self.form.skip_rows
+                if self.form.comment:
+                    kept &= ~block[0].fillna("").str.startswith(self.form.comment).to_numpy()
+                yield numbers[kept], block.loc[kept]
+                if told is not None:
+                    told(cast(Any, text.buffer).raw.share)
+
+    def _cell_blocks(self, places: Sequence[int], first: int) -> Iterator[Cells]:
+        begin = 1 + self.are_headers_first
+        for block in _frames(self.place, self.form, places):
+            numbers = np.arange(begin, begin + len(block), dtype=np.int64)
+            begin += len(block)
+            kept = numbers >= first
+            yield numbers[kept], block.loc[kept]
+
+
+_OF_TEXT = (OSError, EOFError, ValueError, csv.Error, zlib.error)
+
+
+@contextlib.contextmanager
+def _explained(path: Path, is_text: bool) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:
+        if is_text and not isinstance(error, _OF_TEXT):
+            raise
+        cause = " ".join(cause_of(error).split())[:200] or type(error).__name__
+        if cause.endswith("and found 0"):  # pandas' words for a block of blank lines
+            cause = f"{BLOCK} blank rows follow each other: cut them off"
+        if isinstance(error, UnicodeError):
+            cause = f"{error}: name its encoding (--encoding)"
+        kind = "CSV" if is_text else "a table"
+        raise ValueError(f"{path}: cannot be read as {kind}: {cause}") from None
+
+
+def _text(path: Path, form: Columns, encoding: str) -> io.TextIOWrapper:
+    stream = io.BufferedReader(_Bounded(path, form.maximum_megabytes), _PIECE)
+    return io.TextIOWrapper(stream, encoding, "strict" if form.encoding else "replace")
+
+
+_ZIP, _PARQUET, _OLD_EXCEL, _MATLAB = b"PK\x03\x04", b"PAR1", b"\xd0\xcf\x11\xe0", b"MATL"
+_KINDS = {_ZIP: "excel", _PARQUET: "parquet", _OLD_EXCEL: "old", _MATLAB: "matlab"}
+
+
+def _kind(path: Path) -> str:
+    """Return what a file is, by its first bytes; empty for a text."""
+    with path.open("rb") as stream:
+        return _KINDS.get(stream.read(4), "")
+
+
+def open_raw(path: Path, form: Columns) -> RawTable:
+    """Open a file, and read its first rows.
+
+    Raises ValueError, with the file and the cause, if it cannot be read, or is empty.
+    """
+    place = readable(path, form.maximum_megabytes)
+    try:
+        kind = _kind(place)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read as CSV: {cause_of(error)}") from None
+    with _explained(path, not kind):
+        if kind:
+            table = _looked_at(path, form, place, kind)
+        else:
+            with io.BufferedReader(_Bounded(place, form.maximum_megabytes), _PIECE) as stream:
+                encoding = form.encoding or _encoding(stream.peek(_PIECE)[:_PIECE])
+            with _text(place, form, encoding) as text:
+                head = tuple(itertools.islice(text, LOOKED_AT))
+            table = RawTable(path, form, place, head, encoding=encoding)
+    if not any(line.strip() for line in table.head) and not any(map(any, table.cells)):
+        raise ValueError(f"{path}: the file is empty")
+    return table
+
+
+def _looked_at(path: Path, form: Columns, place: Path, kind: str) -> RawTable:
+    if kind == "old":
+        raise ValueError("a workbook of Excel before 2007: save it as .xlsx or CSV")
+    block = next(_frames(place, form, None), None)
+    if block is None:
+        return RawTable(path, form, place)
+    rows = [[_shown(cell) for cell in row] for row in block.head(LOOKED_AT).itertuples(index=False)]
+    is_typed = kind != "excel"
+    if is_typed:
+        rows.insert(0, [str(name) for name in block.columns])
+    return RawTable(path, form, place, cells=rows, are_headers_first=is_typed)
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise ValueError(
+            "Excel and Parquet need libraries that are not installed: pip install openpyxl "
+            "pyarrow (the extra `tables`), or export the table as CSV"
+        ) from None
+
+
+def _shown(cell: object) -> str:
+    """Return a cell as a CSV file would hold it."""
+    if isinstance(cell, datetime):  # pandas' time stamps too, to the nanosecond; NaT is none
+        return cell.isoformat(sep=" ") if cell == cell else ""  # noqa: PLR0124
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return ""
+    return repr(float(cell)) if isinstance(cell, (float, np.floating)) else str(cell)
+
+
+def _frames(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
+    """Yield the columns of a file of cells, all without `places`, called by their places."""
+    kind = _kind(path)
+    read = {"excel": _excel, "parquet": _parquet, "matlab": _matlab}[kind]
+    for frame in read(path, form, places):
+        yield frame if places is None else frame.set_axis(list(places), axis="columns")
+
+
+def _excel(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
+    import pandas as pd  # noqa: PLC0415 - slow to import
+
+    openpyxl = _library("openpyxl")
+    with zipfile.ZipFile(path) as packed:
+        size = sum(each.file_size for each in packed.infolist()) / 1e6
+    if size > form.maximum_megabytes:
+        raise ValueError(
+            f"{size:.4g} MB, unpacked: raise maximum_megabytes (--maximum-megabytes), or cut it"
+        )
+    with path.open("rb") as stream:  # a name without .xlsx would be refused
+        book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
+        if form.sheet and form.sheet not in book.sheetnames:
+            raise ValueError(f"no sheet {form.sheet!r} among {', '.join(book.sheetnames)}")
+        sheet = book[form.sheet] if form.sheet else book.worksheets[0]
+        rows = sheet.iter_rows(values_only=True)
+        while block := list(itertools.islice(rows, BLOCK if places else LOOKED_AT)):
+            wide = max(map(len, block))
+            chosen = range(wide) if places is None else places
+            yield pd.DataFrame(
+                {
+                    place: [_shown(row[place]) if place < len(row) else "" for row in block]
+                    for place in chosen
+                }
+            )
+
+
+def _parquet(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
+    table = _library("pyarrow.parquet").ParquetFile(path)
+    size = table.metadata.num_rows
+    del form
+    names = table.schema_arrow.names
+    wanted = names if places is None else [names[place] for place in places]
+    for batch in table.iter_batches(min(BLOCK, max(size, 1)), columns=wanted):
+        yield batch.to_pandas(integer_object_nulls=True, ignore_metadata=True)[wanted]
+
+
+def _matlab(path: Path, form: Columns, places: Sequence[int] | None) -> Iterator["pd.DataFrame"]:
+    import pandas as pd  # noqa: PLC0415 - slow to import
+    from scipy.io import loadmat  # noqa: PLC0415
+
+    if path.stat().st_size / 1e6 > form.maximum_megabytes:
+        raise ValueError("it is larger than maximum_megabytes (--maximum-megabytes)")
+    try:
+        found = loadmat(path, squeeze_me=True)
+    except NotImplementedError:
+        raise ValueError("a MAT-file of version 7.3: save it with -v7, or by writetable") from None
+    vectors = {
+        name: np.asarray(values, np.float64)
+        for name, values in found.items()
+        if isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "fiu"
+    }
+    longest = max((each.size for each in vectors.values()), default=0)
+    frame = pd.DataFrame({name: v for name, v in vectors.items() if v.size == longest})
+    yield frame if places is None else frame.iloc[:, list(places)]

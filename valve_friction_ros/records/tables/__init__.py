@@ -1,1 +1,0 @@
-"""Tables of text and numbers: CSV, Excel and Parquet, read row by row."""

@@ -1,0 +1,322 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Times as tables write them: numbers since some beginning, dates in many forms, times of day."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.records.units import NANOSECONDS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NO_TIME = np.iinfo(np.int64).min
+"""Stands for a text that is no time; what NaT is in nanoseconds."""
+
+_MONTHS = {
+    "januar": "Jan", "jän": "Jan", "februar": "Feb", "märz": "Mar", "mär": "Mar", "mrz": "Mar",
+    "april": "Apr", "mai": "May", "juni": "Jun", "juli": "Jul", "august": "Aug",
+    "september": "Sep", "oktober": "Oct", "okt": "Oct", "november": "Nov", "dezember": "Dec",
+    "dez": "Dec",
+}  # fmt: skip
+"""German months, beside those that begin as the English ones do."""
+
+_OFFSETS = {"UTC": "+0000", "GMT": "+0000", "CET": "+0100", "MEZ": "+0100", "CEST": "+0200",
+            "MESZ": "+0200"}  # fmt: skip
+"""Zones by names that mean one offset only; American ones do not (CST, EST, IST)."""
+
+_JAVA = re.compile(
+    r"^[A-Z][a-z]{2} ([A-Z][a-z]{2}) (\d{1,2}) (\d\d:\d\d:\d\d) ([A-Z]{3,4}) (\d{4})$"
+)
+_DATE = (
+    r"(?:(?P<iso>\d{4})(?P<s1>[-/.])\d{1,2}(?P=s1)\d{1,2}"
+    r"|(?P<compact>\d{8})"
+    r"|(?P<first>\d{1,2})(?P<s2>[-/.])(?P<second>\d{1,2})(?P=s2)(?P<year>\d{4}|\d{2})"
+    r"|\d{1,2}(?P<s3>[-. ]{1,2})(?P<month>[A-Za-zäÄ]{3,9})(?P<s4>[-. ]{1,2})(?P<year3>\d{4}|\d{2}))"
+)
+_CLOCK = (
+    r"(?P<hour>\d{1,2})(?P<colon>:?)\d\d"
+    r"(?:(?P=colon)(?P<seconds>\d\d)(?:(?P<mark>[.,:])(?P<fraction>\d{1,9}))?)?"
+    r"(?P<gap>\s*)(?P<half>[AaPp]\.?[Mm]\.?)?"
+    r"(?P<gap2>\s*)(?P<zone>[Zz]|[+\-]\d\d:?\d\d|[+\-]\d\d|UTC|GMT|CET|MEZ|CEST|MESZ)?"
+)
+_STAMP = re.compile(rf"{_DATE}(?P<join>[Tt]|,?\s+){_CLOCK}")
+_DAY = re.compile(_DATE)
+_OF_DAY = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?\s*(?:[AaPp][Mm])?")
+_DURATION = re.compile(r"(?:\d+ days? )?\d{1,3}:\d\d:\d\d(?:[.,]\d+)?")
+
+
+_HOURS_ONLY = re.compile(r":\d\d(?:\.\d+)?[+\-]\d\d$")
+
+
+def is_date(text: str) -> bool:
+    """Return whether a text is a date and a time in a form that is known."""
+    text = _JAVA.sub(r"\2-\1-\5 \3 \4", text.strip())
+    return len(text) < 100 and _STAMP.fullmatch(text) is not None
+
+
+def is_day(text: str) -> bool:
+    """Return whether a text is a date without a time."""
+    return len(text) < 40 and _DAY.fullmatch(text.strip()) is not None
+
+
+def is_time_of_day(text: str) -> bool:
+    """Return whether a text is a time without a date, or a duration."""
+    text = text.strip()
+    return len(text) < 40 and bool(_OF_DAY.fullmatch(text) or _DURATION.fullmatch(text))
+
+
+@dataclass(frozen=True)
+class TimeForm:
+    """How times are written.
+
+    Attributes
+    ----------
+    formats : tuple of str
+        Forms of dates (strptime), the most frequent first; none for numbers and durations.
+    zone : str
+        Zone of dates that name none, and of numbers that count days.
+    unit : str
+        Of numbers.
+    origin : int
+        What numbers begin at, ns since 1970.
+    has_zone : bool
+        Whether the dates name their zone.
+    """
+
+    formats: tuple[str, ...] = ()
+    zone: str = ""
+    unit: str = ""
+    origin: int = 0
+    has_zone: bool = False
+
+    @property
+    def is_date(self) -> bool:
+        """True for dates."""
+        return bool(self.formats)
+
+
+@dataclass(frozen=True)
+class DateForms:
+    """What the dates of a column can be: formats with the day first, with the month first."""
+
+    day_first: tuple[str, ...]
+    month_first: tuple[str, ...]
+    has_zone: bool
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """True if the texts do not show whether the day or the month comes first."""
+        return bool(self.day_first) and bool(self.month_first)
+
+
+def date_forms(texts: Sequence[str]) -> DateForms | None:
+    """Find the forms that fit all texts; None if one is no date with a time."""
+    day: dict[str, None] = {}
+    month: dict[str, None] = {}
+    has_zone = True
+    day_possible = month_possible = True
+    for raw in texts:
+        text = _normal(raw)
+        found = _STAMP.fullmatch(text)
+        if found is None:
+            return None
+        has_zone &= found["zone"] is not None
+        day[_format(found, "%d", "%m")] = None
+        if found["first"] is None:
+            month_possible = False
+            continue
+        if found["s2"] == ".":
+            month_possible = False
+        day_possible &= int(found["second"]) <= 12
+        month_possible &= int(found["first"]) <= 12
+        is_american = found["half"] and found["s2"] == "/" and len(found["first"]) == 1
+        if is_american and not found["second"].startswith("0") and len(found["second"]) == 1:
+            day_possible = False  # 7/1/2026 2:00 PM; where the day is first, one is 1/07
+        month[_format(found, "%m", "%d")] = None
+    return DateForms(
+        _with_and_without_fraction(day) if day_possible else (),
+        _with_and_without_fraction(month) if month_possible else (),
+        has_zone,
+    )
+
+
+def _with_and_without_fraction(forms: Iterable[str]) -> tuple[str, ...]:
+    """Add the forms of whole seconds, whose fraction some programs leave out, and the reverse."""
+    known = dict.fromkeys(forms)
+    for form in list(known):
+        known[re.sub(r"[.,:]%f", "", form) if "%f" in form else form.replace("%S", "%S.%f")] = None
+    return tuple(known)
+
+
+def _format(found: re.Match[str], first: str, second: str) -> str:
+    """Return the form of a date that was found, for strptime."""
+    if found["iso"]:
+        date = f"%Y{found['s1']}%m{found['s1']}%d"
+    elif found["compact"]:
+        date = "%Y%m%d"
+    elif found["first"]:
+        year = "%Y" if len(found["year"]) == 4 else "%y"
+        date = f"{first}{found['s2']}{second}{found['s2']}{year}"
+    else:
+        year = "%Y" if len(found["year3"]) == 4 else "%y"
+        date = f"%d{found['s3']}%b{found['s4']}{year}"
+    clock = ("%I" if found["half"] else "%H") + found["colon"] + "%M"
+    if found["seconds"]:
+        clock += found["colon"] + "%S"
+    if found["fraction"]:
+        clock += found["mark"] + "%f"
+    clock += found["gap"] + ("%p" if found["half"] else "")
+    return date + found["join"] + clock + found["gap2"] + ("%z" if found["zone"] else "")
+
+
+def _normal(text: str) -> str:
+    """Return a date in words that strptime knows: English months, offsets."""
+    text = _JAVA.sub(r"\2-\1-\5 \3 \4", text.strip())
+    if text.isascii() and not any(map(str.isalpha, text)):
+        return text
+    for name, offset in _OFFSETS.items():
+        if text.upper().endswith(f" {name}"):
+            text = text[: -len(name)] + offset
+    return re.sub(
+        r"[A-Za-zäÄ]{3,9}",
+        lambda word: _MONTHS.get(word[0].casefold(), word[0][:3].title()),
+        re.sub(r"([AaPp])\.?([Mm])\.?", r"\1\2", text),
+    )
+
+
+def _ns(times: "pd.DatetimeIndex | pd.TimedeltaIndex") -> NDArray[np.int64]:
+    return np.asarray(times.as_unit("ns").asi8, np.int64)
+
+
+class WrittenTimes:
+    """Reads the times of a column in their order, ns.
+
+    A local time that comes twice, when clocks are put back, is the second where the times would
+    otherwise go back. What is no time is `NO_TIME`.
+    """
+
+    def __init__(self, form: TimeForm) -> None:
+        self._form = form
+        self._is_summer = True
+        self._before = NO_TIME
+
+    def __call__(self, cells: "pd.Series[Any]", numbers: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Convert the cells of a block; `numbers` are those that are written as such."""
+        import pandas as pd  # noqa: PLC0415 - slow to import
+
+        if self._form.unit:
+            size = NANOSECONDS[self._form.unit]
+            with np.errstate(over="ignore"):
+                scaled = numbers * size + self._form.origin
+            known = np.isfinite(scaled) & (np.abs(scaled) < 9e18)
+            whole = np.rint(np.where(known, scaled, 0)).astype(np.int64)
+            whole = np.where(known, whole, NO_TIME)
+            return self._localized(pd.DatetimeIndex(whole)) if self._form.zone else whole
+        if pd.api.types.is_datetime64_any_dtype(cells.dtype):
+            times = pd.DatetimeIndex(cells)
+            if times.tz is not None:
+                return _ns(times.tz_convert("UTC").tz_localize(None))
+            return self._localized(times.as_unit("ns"))
+        texts = cells.fillna("").str.strip()
+        if not self._form.formats:
+            return self._durations(texts)
+        times = self._dates(texts)
+        return _ns(times) if self._form.has_zone else self._localized(times)
+
+    def _durations(self, texts: "pd.Series[str]") -> NDArray[np.int64]:
+        import pandas as pd  # noqa: PLC0415 - slow to import
+
+        plain = texts.str.replace(",", ".", regex=False)
+        short = plain.str.count(":") == 1
+        plain = plain.where(~short, "00:" + plain) if short.any() else plain
+        return _ns(pd.TimedeltaIndex(pd.to_timedelta(plain, errors="coerce")))
+
+    def _dates(self, texts: "pd.Series[str]") -> "pd.DatetimeIndex":
+        import pandas as pd  # noqa: PLC0415 - slow to import
+
+        is_utc = self._form.has_zone
+        sample = "".join(texts.iloc[:1])
+        if any(map(str.isalpha, sample.replace("T", "").replace("Z", ""))):
+            texts = texts.map(_normal)
+        if is_utc and _HOURS_ONLY.search(sample):
+            texts = texts + "00"
+        first, *others = self._form.formats
+        found = pd.to_datetime(texts, format=first, errors="coerce", utc=is_utc)
+        for form in others:
+            left = texts[found.isna()]
+            if not len(left):
+                break
+            found = found.fillna(pd.to_datetime(left, format=form, errors="coerce", utc=is_utc))
+        times = pd.DatetimeIndex(found).as_unit("ns")
+        return times.tz_localize(None) if is_utc else times
+
+    def _localized(self, times: "pd.DatetimeIndex") -> NDArray[np.int64]:
+        """Return local times as UTC."""
+        naive = _ns(times)
+        if not self._form.zone:
+            return naive
+        known = naive != NO_TIME
+        if not known.any():
+            return naive
+        local = times[known]
+        summer = np.ones(len(local), np.bool_)
+        as_summer, as_winter = (
+            _ns(local.tz_localize(self._form.zone, ambiguous=each, nonexistent="NaT"))
+            for each in (summer, ~summer)
+        )
+        before = np.concatenate([[self._before], as_summer[:-1]])
+        comes_twice = as_summer != as_winter
+        is_back = comes_twice & (as_summer < before)
+        is_summer = self._is_summer & (np.cumsum(is_back) == 0)
+        self._is_summer = bool(is_summer[-1]) or not comes_twice[-1]
+        self._before = int(as_summer[-1])
+        utc = naive.copy()
+        utc[known] = np.where(is_summer, as_summer, as_winter)
+        return utc
+
+
+_LEAST_YEAR, _MOST_YEAR = 1990, 2060
+_EPOCHS: tuple[tuple[str, float], ...] = (
+    ("s", 0.0),
+    ("ms", 0.0),
+    ("us", 0.0),
+    ("ns", 0.0),
+    ("d", -25_569.0),  # spreadsheets: days since 1899-12-30
+    ("microdays", -25_569e6),  # WinCC: millionths of them
+    ("d", -719_529.0),  # MATLAB: days since the year 0
+    ("s", -2_082_844_800.0),  # LabVIEW: seconds since 1904
+)
+"""What numbers of a clock count: their unit, and in it the time from their beginning to 1970."""
+
+_FINEST, _COARSEST = 1e-5, 30.0
+"""Sampling periods, s, of a clock whose unit is not stated. Chosen: beyond any of a record."""
+
+
+def clock_of(first: float, step: float) -> tuple[str, int] | None:
+    """Find the clock of which `first` is a date of our time, and `step` a sampling period.
+
+    Return its unit and the time that it begins at, ns since 1970; None for a time that begins with
+    the record.
+    """
+    for unit, since in _EPOCHS:
+        size = NANOSECONDS[unit] / 1e9
+        seconds = (first + since) * size
+        if not _COARSEST >= step * size >= _FINEST or not 0 < seconds < 4e9:
+            continue
+        if _LEAST_YEAR <= datetime.fromtimestamp(seconds, timezone.utc).year <= _MOST_YEAR:
+            return unit, round(since * NANOSECONDS[unit])
+    return None

@@ -1,1 +1,0 @@
-"""The paper's numbers beside those found here."""

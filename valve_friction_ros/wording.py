@@ -1,0 +1,752 @@
+# Copyright 2026 The valve_friction_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The sentences of the product: what is found is a `Code` and its numbers, and is worded here.
+
+Nothing decides by a sentence, stores one as state or looks into one: a `Statement` is compared,
+kept and restored by its code and its facts; `sentence` writes it for topics, pages, reports, logs.
+"""
+
+import math
+import string
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from enum import Enum, auto
+from typing import Any
+
+from valve_friction_ros.model.drive import Drive
+
+
+class Code(Enum):
+    """What a statement says."""
+
+    QUOTED = auto()
+    """Words from outside, or of a former version, as they are."""
+    # The diagnosis of the friction
+    COMPARED = auto()
+    COMPARED_AGAIN = auto()
+    FRICTION_BELOW_ZERO = auto()
+    MOVES_BELOW_ZERO = auto()
+    VANISHED = auto()
+    NOT_IDENTIFIABLE = auto()
+    NO_BASELINE = auto()
+    NOT_COMPARED = auto()
+    NOT_COMPARED_SPEED = auto()
+    NOT_COMPARED_LACKING = auto()
+    WAS_COMPARED = auto()
+    # What stands around it
+    MISFIT = auto()
+    DOUBTED = auto()
+    SCALED = auto()
+    DATED = auto()
+    DATED_EARLIER = auto()
+    AGED = auto()
+    STANDS_UNCOMPARED = auto()
+    STANDS_UNCERTAIN = auto()
+    FAILED = auto()
+    NO_ESTIMATE = auto()
+    NOTHING_IDENTIFIED = auto()
+    REFUSED = auto()
+    REFUSED_REPEATEDLY = auto()
+    MEASURED_EARLIER = auto()
+    # Parts
+    FRICTION = auto()
+    FRICTION_AT = auto()
+    FRICTION_SIZE = auto()
+    DEAD_BAND = auto()
+    DEAD_BAND_INTERVAL = auto()
+    BASELINE = auto()
+    BASELINE_COULOMB = auto()
+    BASELINE_SLIDING = auto()
+    BASELINE_REMARK = auto()
+    SLIDING_SIZE = auto()
+    ITS_BASELINE = auto()
+    FIRST_MOVES = auto()
+    BEFORE_CHANGE = auto()
+    BY_MOVES = auto()
+    CHANGED = auto()
+    AREA_AND_SCALE = auto()
+    SCALE = auto()
+    POSITION_SCALE = auto()
+    # The evidence of the moves
+    UNTIL_BEFORE = auto()
+    BASELINE_WITHOUT_SLIDING = auto()
+    BASELINE_AT_OTHER_SPEED = auto()
+    # Findings on the valve
+    COMMON_SCALE = auto()
+    SPRING_CHANGED = auto()
+    BALANCE_SHIFTED = auto()
+    BENCH_SET = auto()
+    DRIVE_ZERO = auto()
+    POSITION_ZERO = auto()
+    UNEVEN_PACKING = auto()
+    SLIP_GROWN = auto()
+    VISCOUS_CHANGED = auto()
+    ASYMMETRY_CHANGED = auto()
+    NOISE_GROWN = auto()
+    LAG_CHANGED = auto()
+    STOPS_MOVED_ALIKE = auto()
+    TRAVEL_LOST = auto()
+    STOP_MOVED_OUTWARD = auto()
+    STOOD_STILL = auto()
+    # The samples of a valve
+    BUFFER_CLEARED = auto()
+    CLEARED_ON_REQUEST = auto()
+    CLEARED_AS_SETTINGS = auto()
+    CLEARED_AS_RECORD_BEGINS = auto()
+    CLEARED_AS_STAMPS_GO_BACK = auto()
+    STAMPS_WENT_BACK = auto()
+    TIME_JUMPED = auto()
+    TIME_JUMPS = auto()
+    SAMPLE_DAMAGED = auto()
+    SAMPLE_NO_JOINT = auto()
+    SAMPLE_NOT_FINITE = auto()
+    SAMPLE_OUT_OF_RANGE = auto()
+    SAMPLE_REPEATED = auto()
+    SAMPLE_OVERTAKEN = auto()
+    SAMPLE_BACK = auto()
+    SENSOR_RANGE = auto()
+    ANY_VALVE_RANGE = auto()
+    DATA_FAULT = auto()
+    OUTSIDE_TRAVEL = auto()
+    STAMPS_APART = auto()
+    STAMPS_OFF_CLOCK = auto()
+    REJECTED = auto()
+    REJECTED_FOR = auto()
+    REJECTED_WITHOUT_JOINT = auto()
+    PRESSURE_OUT_OF_RANGE = auto()
+    POSITION_OUT_OF_RANGE = auto()
+    NONE_USABLE = auto()
+    LAST_USABLE = auto()
+    # The answer to the command
+    STEPS_IGNORED = auto()
+    ANSWER_LATE = auto()
+    ANSWER_SLOW = auto()
+    RESTS_AWAY = auto()
+    HUNTS = auto()
+    COMMANDS_UNUSABLE = auto()
+    # The life of the packing
+    PACKING_TRAVEL = auto()
+    PACKING_REVERSALS = auto()
+    LIMIT_REACHED = auto()
+    LIMIT_EXPECTED = auto()
+    LIMIT_NEAR = auto()
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What is said: a code, and the facts that it needs.
+
+    Attributes
+    ----------
+    code : Code
+        What is said.
+    facts : mapping of str to object
+        Numbers in SI units, times in ns since 1970 (UTC), names of parameters and of members of
+        enums, other statements, and tuples of these. A fact that is unknown is None.
+    """
+
+    code: Code
+    facts: Mapping[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as a mapping of plain values, which `from_dict` reads."""
+        return {"code": self.code.name, **{name: _plain(one) for name, one in self.facts.items()}}
+
+    @classmethod
+    def from_dict(cls, kept: Mapping[str, Any]) -> "Statement":
+        """Return the statement that was kept; raises ValueError for an unknown code."""
+        try:
+            code = Code[kept["code"]]
+        except KeyError as unknown:
+            raise ValueError(f"{unknown} is no code of a statement") from None
+        facts = {name: _restored(one) for name, one in kept.items() if name != "code"}
+        return cls(code, facts)
+
+    def __hash__(self) -> int:
+        """Return one of code and facts, as statements that are counted need it."""
+        return hash((self.code, frozenset(self.facts.items())))
+
+    def __str__(self) -> str:
+        """Return its sentence."""
+        return sentence(self)
+
+
+def said(code: Code, **facts: Any) -> Statement:
+    """Return a statement with these facts."""
+    return Statement(code, facts)
+
+
+def quoted(text: str) -> Statement:
+    """Return words from outside, or of a former version, as a statement."""
+    return said(Code.QUOTED, text=text)
+
+
+def _plain(fact: Any) -> Any:
+    if isinstance(fact, Statement):
+        return fact.to_dict()
+    return [_plain(one) for one in fact] if isinstance(fact, tuple | list) else fact
+
+
+def _restored(fact: Any) -> Any:
+    if isinstance(fact, dict):
+        return Statement.from_dict(fact)
+    return tuple(_restored(one) for one in fact) if isinstance(fact, list) else fact
+
+
+def sentence(statement: Statement) -> str:
+    """Write a statement, without a full stop."""
+    return _WRITER.vformat(_SENTENCES[statement.code], (), statement.facts)
+
+
+def headline(statement: Statement) -> str:
+    """Write what a statement finds without its figures, for a cell of a table."""
+    template = _HEADLINES.get(statement.code) or _SENTENCES[statement.code]
+    return _WRITER.vformat(template, (), statement.facts)
+
+
+# Numbers and times as people read them
+
+
+def two_digits(value: float) -> str:
+    """Write a size with two significant digits, from 100 on as a whole number; no exponent."""
+    return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
+
+
+def number_and_width(value: float, half_width: float) -> tuple[str, str]:
+    """Write a number and half the width of its interval, to four digits at most."""
+    if not math.isfinite(value):
+        return "–", ""
+    is_plain = value == 0 or 1e-4 <= abs(value) < 1e6
+    if not math.isfinite(half_width) or half_width <= 0:
+        digits = f"{value:.3g}" if abs(value) < 1000 or not is_plain else f"{value:.0f}"
+        return _minus(digits), ""
+    if not is_plain or not 1e-6 <= half_width < 1e6:
+        return _minus(f"{value:.4g}"), f"± {half_width:.2g}"
+    of_width = 1 - math.floor(math.log10(half_width))
+    of_value = 3 - math.floor(math.log10(abs(value))) if value else 3
+    places = min(max(0, min(of_width, of_value)), 7)
+    return _minus(f"{value:.{places}f}"), f"± {half_width:.{max(0, min(of_width, 7))}f}"
+
+
+def _minus(number: str) -> str:
+    return f"−{number[1:]}" if number.startswith("-") else number
+
+
+def percentage(share: float) -> str:
+    """Write a share in percent: two significant digits, whole percents from 100 % on."""
+    return f"{two_digits(100 * share)} %"
+
+
+def utc(stamp: float) -> datetime:
+    """Return the date of a stamp, ns since 1970 (UTC)."""
+    return datetime.fromtimestamp(stamp / 1e9, timezone.utc)
+
+
+def utc_day(stamp: float) -> str:
+    """Write the day of a stamp, ns since 1970, by ISO 8601, as UTC."""
+    return f"{utc(stamp):%Y-%m-%d}"
+
+
+def utc_minute(stamp: float) -> str:
+    """Write a stamp, ns since 1970, for people, to the minute: 2026-11-22 18:56 UTC."""
+    return f"{utc(stamp):%Y-%m-%d %H:%M} UTC"
+
+
+def utc_second(stamp: float) -> str:
+    """Write a stamp, ns since 1970, by ISO 8601, as UTC, to the second."""
+    return f"{utc(stamp):%Y-%m-%dT%H:%M:%SZ}"
+
+
+def member_words(member: Enum, table: str) -> str:
+    """Write a member of an enum by a table of words."""
+    return _member(member.name, table)
+
+
+def words(name: str) -> str:
+    """Write the name of a number in words."""
+    return name.replace("_", " ")
+
+
+def misfit_words(misfit: float, unit: str) -> str:
+    """Write a misfit of the stem, m, or of the force, N."""
+    return f"{1e6 * misfit:.3g} µm" if unit == "m" else f"{misfit:.3g} {unit}"
+
+
+_ABORTS = {
+    "POSITION": "the stem was at {0:.4g} m, beyond its limit of {1:.4g} m",
+    "PRESSURE": "the measured pressure was {0:.6g} Pa, beyond its limit of {1:.6g} Pa",
+    "SILENT_STEM": "no position of the stem came for {0}, and {1:g} s are allowed",
+    "SILENT_PRESSURE": "no pressure came for {0}, and {1:g} s are allowed",
+    "HELD_UP": "the player stood still for {0:.2g} s ({1:g} s are allowed)",
+    "ASKED": "somebody has stopped it",
+    "SHUTDOWN": "the player was ended",
+}
+
+
+def played_test_words(why: str, found: float, limit: float) -> str:
+    """Say why a test goes back, with what was found and its limit."""
+    if not why.startswith("SILENT"):
+        return _ABORTS[why].format(found, limit)
+    time = f"{found:.2g} s" if math.isfinite(found) else "all the time"
+    return _ABORTS[why].format(time, limit)
+
+
+_SUPPORTS = {
+    "POSITIVE": "somewhat",
+    "STRONG": "strongly",
+    "VERY_STRONG": "very strongly",
+}
+
+
+def evidence_ratio_words(
+    support: str,
+    log_ratio: float,
+    samples: float,
+    independent: float,
+    describes: tuple[bool, bool],
+) -> str:
+    """Say how strongly a record speaks for one of two models, and how far that may be believed."""
+    digits = abs(log_ratio) / math.log(10.0)
+    ratio = f"1e{digits:.0f}" if digits >= 4 else f"{10.0**digits:.2g}"
+    which = "first" if log_ratio > 0 else "second"
+    told = "the record hardly tells the two models apart"
+    if support != "HARDLY":
+        told = (
+            f"the record speaks {_SUPPORTS[support]} for the {which} model: it is {ratio} times as "
+            "probable"
+        )
+    count = (
+        f"its {samples:.0f} samples count as {independent:.0f}, as what a model leaves at one of "
+        "them is much as at the next"
+        if independent < 0.5 * samples
+        else f"its {samples:.0f} samples count"
+    )
+    wrong = {
+        (False, False): "; neither describes the valve to within noise, so this says which is "
+        "nearer, not which is true",
+        (True, False): "; the second does not describe the valve to within noise",
+        (False, True): "; the first does not describe the valve to within noise",
+    }.get(describes, "")
+    return f"{told}; {count}{wrong}"
+
+
+_LACKS = {
+    "RESULT": "there is no result since the start of its identifier",
+    "VALUE": "{of} is not identifiable",
+    "SIZE": "{of} is not above zero",
+    "INTERVAL": "{of} has no interval",
+    "PRECISION": "{of} is known to ±{share}, and a baseline needs ±{largest}",
+    "HEALTH": "the valve is in alarm, which another baseline may hide",
+}
+_LACKS_OF_MOVES = "friction by the moves in service"
+
+
+def lack_words(of: str, lack: str, share: float, largest: float) -> str:
+    """Say what is missing to a baseline; `lack` is the name of a `Lack`."""
+    name = _LACKS_OF_MOVES if of == "moves" else words(of)
+    known = {"share": share, "largest": largest}
+    shares = {key: "–" if math.isnan(one) else percentage(one) for key, one in known.items()}
+    return _LACKS[lack].format(of=name, **shares)
+
+
+_BETTER_RECORD = (
+    "Identify a record with more strokes, some fast and some slow.",
+    "Plan a stroke test from which friction will be known well enough: valve_friction plan-test.",
+)
+_LACK_REMEDIES = {
+    "RESULT": ("Identify the valve.",),
+    "VALUE": _BETTER_RECORD,
+    "SIZE": ("Check the direction of both signals, then identify again.",),
+    "INTERVAL": ("Identify by a method that gives intervals.",),
+    "PRECISION": _BETTER_RECORD,
+    "HEALTH": (
+        "Repair the valve, then identify it again.",
+        "If it is healthy, have baseline_in_alarm of its identifier set to true.",
+    ),
+}
+_LET_IT_WORK = "Or let the valve work on: its moves in service become a baseline in time."
+
+
+def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    """Say what may be done about all that is missing, given as what lacks it and its `Lack`."""
+    found = [one for of, lack in lacks if of != "moves" for one in _LACK_REMEDIES[lack]]
+    waits = [_LET_IT_WORK] if any(of == "moves" and lack != "SIZE" for of, lack in lacks) else []
+    return tuple(dict.fromkeys([*found, *waits]))
+
+
+def _member(name: str | None, table: str) -> str:
+    """Write a member of an enum; one that no longer exists, in a statement that was kept, too."""
+    return "" if name is None else _TABLES[table].get(name, words(name.lower()))
+
+
+def _ago(age: int) -> str:
+    """Write an age, ns, in whole units; a clock that has gone back since is named."""
+    seconds = age / 1e9
+    if seconds < 0:
+        return "at a time to come, by a clock that has gone back since"
+    units = (("days", 86400), ("h", 3600), ("min", 60))
+    unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
+    return f"{seconds // length:.0f} {unit} ago"
+
+
+_SMALL_SHARE = 0.05
+"""Share below which it is written in tenths of a percent."""
+
+_SIZES = {"%": 1e2, "mm": 1e3, "ms": 1e3, "mm/s": 1e3}
+"""Units for people that are not the SI units of the facts, by their number in one of these."""
+
+
+def _difference(change: tuple[float, float, float], unit: str) -> str:
+    """Write a difference with its interval."""
+    size, digits = _SIZES.get(unit, 1.0), ".2f" if unit == "mm" else ".3g"
+    value, low, high = (f"{size * one:+{digits}}" for one in change)
+    return f"{' '.join(filter(None, (value, unit)))} ({low} to {high})"
+
+
+def _ratio(change: tuple[float, float, float], digits: str, times: str = "") -> str:
+    """Write a ratio with its interval."""
+    value, low, high = (format(one, digits) for one in change)
+    return f"{value}{times} ({low} to {high})"
+
+
+def _in_unit(value: float, details: str) -> str:
+    digits, unit = details.split(" ")
+    return format(_SIZES[unit] * value, digits)
+
+
+def _listed(several: tuple[object, ...], pattern: str) -> str:
+    """Write several by a pattern, ``before|between|after``; nothing for none."""
+    before, between, after = pattern.split("|")
+    return f"{before}{between.join(map(str, several))}{after}" if several else ""
+
+
+_FORMATS: dict[str, Callable[[Any, str], str]] = {
+    "ago": lambda age, _: _ago(age),
+    "by": _difference,
+    "day": lambda time, _: utc_day(time),
+    "drive": lambda name, _: Drive[name].words,
+    "figures": lambda ratio, _: _ratio(ratio, ".2f"),
+    "headline": lambda one, _: headline(one),
+    "dated": lambda time, _: "" if time is None else f" (identified {utc_minute(time)})",
+    "in": _in_unit,
+    "misfit": lambda one, _: (
+        f"{1e6 * one[0]:.3g} µm" if one[1] == "m" else f"{one[0]:.3g} {one[1]}"
+    ),
+    "±": lambda half_width, _: f" ± {two_digits(half_width)}" if half_width else "",
+    "list": _listed,
+    "minute": lambda time, _: utc_minute(time),
+    "of": _member,
+    "or": lambda known, other: other if known is None else str(known),
+    "after": lambda known, mark: "" if known is None else f"{mark}{known}",
+    "quoted": lambda name, _: "" if name is None else f" '{name}'",
+    "rounded": lambda share, _: f"{100 * share:.{0 if share >= _SMALL_SHARE else 1}f} %",
+    "percent": lambda share, _: percentage(share),
+    "second": lambda time, _: utc_second(time),
+    "times": lambda change, _: _ratio(change, ".3g", " times"),
+    "two": lambda value, unit: two_digits(_SIZES.get(unit, 1.0) * value),
+    "words": lambda name, _: words(name),
+}
+"""How a fact is written: ``{fact:name details}``. ``{fact:?this|that}`` chooses by a fact, and
+``{fact:+...}`` is written only where the fact is known; all else is Python's own format."""
+
+
+class _Writer(string.Formatter):
+    """Fills the facts into a sentence."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        name, _, details = format_spec.partition(" ")
+        if format_spec.startswith("?"):
+            yes, _, no = format_spec[1:].partition("|")
+            return yes if value else no
+        if (form := _FORMATS.get(name)) is not None:
+            return form(value, details)
+        return "" if value is None else format(value, format_spec)
+
+
+_WRITER = _Writer()
+
+_TABLES: dict[str, Mapping[str, str]] = {
+    "state": {
+        "UNKNOWN": "",
+        "IMPOSSIBLE": "friction below zero",
+        "NORMAL": "friction normal",
+        "UNCLEAR": "friction cannot be told from its baseline",
+        "GROWN": "friction has grown",
+        "EXCESS": "excess friction",
+        "FALLEN": "friction has fallen",
+        "COLLAPSED": "friction collapsed, the packing may leak",
+    },
+    "fault": {
+        "REJECTED": "rejected",
+        "OUTSIDE_TRAVEL": "outside travel",
+        "SKEW": "skew",
+        "CLOCK": "clock",
+    },
+    "sample_fault": {
+        "DAMAGED": "damaged, ",
+        "NO_JOINT": "no joint, ",
+        "NOT_FINITE": "not finite, ",
+        "OUT_OF_RANGE": "out of range, ",
+        "REPEATED": "repeated, ",
+        "OVERTAKEN": "overtaken, ",
+        "BACK": "back, ",
+    },
+    "rejected": {
+        "DAMAGED": "they are damaged messages: check the publisher",
+        "NOT_FINITE": "not finite: check sensor, cable and driver",
+        "REPEATED": "they repeat a stamp: give each sample the time at which it was measured",
+        "OVERTAKEN": "they arrive out of order: look at the network between them",
+        "BACK": "their stamps go back: check for a second publisher, and the clock of the sensor",
+    },
+    "survey": {
+        "UNKNOWN": "",
+        "GOOD": ": good, by the limits of a first survey",
+        "WATCH": ": watch it, by the limits of a first survey",
+        "BAD": ": bad, by the limits of a first survey",
+    },
+    "end": {"lower_stop": "lower end", "upper_stop": "upper end"},
+    "sensor": {"BOTH": "zero and span", "EITHER": "zero or span", "SPAN": "span"},
+    "signal": {**{one.name: one.words for one in Drive}, "STEM": "stem position"},
+    "stops": {
+        "NONE": "",
+        "ONE": ", with which the move of the one stop that was met agrees",
+        "BOTH": ", as both travel stops have moved alike",
+    },
+    "cause": {
+        "FRICTION": "the pressure answers and friction holds the stem: check packing and guide",
+        "LATE": "the pressure itself answers late: check the positioner",
+        "SLOW": "the pressure itself is slow: check positioner, air supply and volume",
+        "SETTING": "the stem follows its pressure, which stops short: check calibration and gain "
+        "of the positioner, and the air supply",
+        "UNKNOWN": "pressure and stem do not tell whether positioner or valve is to blame",
+        "PRESSURE_ANSWERS": "the pressure answers: the stem is stuck, or its position sensor has "
+        "stopped: look at the stem",
+        "PRESSURE_SILENT": "nor does the pressure answer: it does not reach the actuator: check "
+        "the positioner, its command and the air supply",
+        "PRESSURE_ANSWERS_SOME": "the pressure answers some of them: the stem is stuck, its "
+        "position sensor has stopped, or the pressure does not always reach the actuator",
+        "STICTION": "it sticks and jumps while the pressure swings: stiction, and integral action: "
+        "check the packing first",
+        "NOT_FRICTION": "friction is not seen to be the cause: check gain and air supply of the "
+        "positioner",
+    },
+}
+"""Words for the members of enums and for names, by table."""
+
+_MORE_STROKES = (
+    "record more strokes, some fast and some slow, and state a timing_uncertainty if the clocks "
+    "and lags of both signals are known"
+)
+_SLIDING_SIZE = "{value:.6g}{half_width:±} N at {speed:in .3g mm/s} mm/s"
+_HEALTHY = "call ~/set_baseline while it is healthy"
+_SET_BASELINE = "call ~/set_baseline while the valve is healthy"
+
+_SENTENCES = {
+    Code.QUOTED: "{text}",
+    Code.COMPARED: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}",
+    Code.COMPARED_AGAIN: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}; "
+    "identify it again from a longer record with more strokes to be sure",
+    Code.FRICTION_BELOW_ZERO: "{of:words} is {value:.4g} ± {half_width:two} N, and friction is "
+    "above zero: check the direction of both signals",
+    Code.MOVES_BELOW_ZERO: "{moves}, sliding friction is {value:.4g} N, and friction is above "
+    "zero: check the direction of both signals",
+    Code.VANISHED: "friction collapsed, the packing may leak: {of:words} is too small to be "
+    "identified, at most {largest:.2g} N; its baseline is {healthy:.4g} N",
+    Code.NOT_IDENTIFIABLE: "{of:words} is not identifiable: {reason}",
+    Code.NO_BASELINE: "no baseline yet; {effect}{survey:of survey}",
+    Code.NOT_COMPARED: "no comparison with the baseline ({baseline}): {reasons:list |; |}; "
+    "{effect}",
+    Code.NOT_COMPARED_SPEED: "the stem slides at {speed:in .2g mm/s} mm/s, and at "
+    "{healthy:in .2g mm/s} mm/s in the baseline, with too little known of the friction between: "
+    "move it as in the baseline",
+    Code.NOT_COMPARED_LACKING: "the baseline has no {of:words}: set it anew",
+    Code.WAS_COMPARED: "{what} was {ratio:figures} times its baseline{time:dated}",
+    Code.MISFIT: "the Karnopp model does not describe this valve ({misfit:misfit} of misfit)",
+    Code.DOUBTED: "{doubt}; {of}",
+    Code.SCALED: "friction and spring constant have changed by one factor, which points to "
+    "{scale}: check them before any work on the packing; {of}",
+    Code.DATED: "{of}{time:dated}",
+    Code.DATED_EARLIER: "{of} (identified earlier, {time:minute})",
+    Code.AGED: "{of} (identified {age:ago}, before the restart)",
+    Code.STANDS_UNCOMPARED: "{alarm}; the latest record cannot be compared: {latest}",
+    Code.STANDS_UNCERTAIN: "{alarm}; the latest record does not surely end it: {latest}",
+    Code.FAILED: "{error}; before: {of}",
+    Code.NO_ESTIMATE: "no estimate: {reason}",
+    Code.NOTHING_IDENTIFIED: "nothing has been identified yet",
+    Code.REFUSED: "the latest identification was refused: {reason}; before: {of}",
+    Code.REFUSED_REPEATEDLY: "the latest {count} identifications were refused: {reason}",
+    Code.MEASURED_EARLIER: "{of} (measured {time:minute}; no record since shows it)",
+    Code.FRICTION: "{of:words}",
+    Code.FRICTION_AT: "{of:words} at {speed:in .2g mm/s} mm/s",
+    Code.FRICTION_SIZE: "{of:words} {value:.4g} ± {half_width:two} N",
+    Code.DEAD_BAND: "the stem ignores reversals smaller than {share:percent} of its travel",
+    Code.ITS_BASELINE: "its baseline",
+    Code.FIRST_MOVES: "what it was until {time:minute}, when the moves of this valve were first "
+    "combined ({has_baseline:?the baseline cannot be compared|no baseline}: " + _HEALTHY + ")",
+    Code.BEFORE_CHANGE: "what it was before it changed, between {earliest:minute} and "
+    "{latest:minute} (no baseline and no first moves to compare with: " + _HEALTHY + ")",
+    Code.DEAD_BAND_INTERVAL: "; the stem ignores reversals smaller than {share:in .3g %} ± "
+    "{half_width:two %} % of its travel",
+    Code.BASELINE: "{frictions:list |, |}",
+    Code.BASELINE_COULOMB: "coulomb friction {value:.6g}{half_width:±} N",
+    Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",
+    Code.SLIDING_SIZE: _SLIDING_SIZE,
+    Code.BASELINE_REMARK: "it is known to ±{share:percent}: only friction that has grown to "
+    "{least:.2g} times is sure to be declared; " + _MORE_STROKES,
+    Code.BY_MOVES: "by {moves} moves in service since {since:minute}{dead_band}",
+    Code.CHANGED: "{of}; it changed between {earliest:minute} and {latest:minute}",
+    Code.AREA_AND_SCALE: "the scale of the {drive:drive} sensor and the diaphragm area",
+    Code.SCALE: "the scale of the {drive:drive} sensor",
+    Code.POSITION_SCALE: "the position sensor's scale",
+    Code.UNTIL_BEFORE: "{of} (until {time:second}, before that identification)",
+    Code.BASELINE_WITHOUT_SLIDING: "not compared with the baseline, which has no sliding "
+    "friction, and moves in service determine no other: " + _SET_BASELINE,
+    Code.BASELINE_AT_OTHER_SPEED: "not compared with the baseline, which belongs to "
+    "{healthy:in .2g mm/s} mm/s, and the moves to {speed:in .2g mm/s} mm/s, beyond a factor of "
+    "{factor:g}: " + _SET_BASELINE,
+    Code.COMMON_SCALE: "spring constant and friction have changed alike, to {change:times} the "
+    "baseline: one common factor points to {scale} rather than to spring and packing at once: "
+    "check them",
+    Code.SPRING_CHANGED: "the spring constant has changed"
+    "{with_preload:?, and its preload with it}: {change:times} the baseline, now {value:.4g} N/m: "
+    "check the spring{causes:list , and | and |, which would look the same}",
+    Code.BALANCE_SHIFTED: "the balance of forces has shifted: spring preload {change:by N}, "
+    "{share:percent} of the spring's force over the travel: check {causes:list | or |}",
+    Code.BENCH_SET: "the bench set",
+    Code.DRIVE_ZERO: "the zero of the {drive:drive} sensor ({reading:+.3g} {unit} in its reading)",
+    Code.POSITION_ZERO: "the zero of the position sensor ({reading:in +.2g mm} mm in its reading)"
+    "{stops:of stops}",
+    Code.UNEVEN_PACKING: "packing whose friction is larger {upward:?up|down}ward",
+    Code.SLIP_GROWN: "the slip jump has grown: static above sliding friction {change:by N}, which "
+    "makes the stem jump by {share:percent} of its travel: check packing, stem and guides for "
+    "sticking",
+    Code.VISCOUS_CHANGED: "viscous friction has {grown:?grown|fallen} to {change:times} the "
+    "baseline: check packing and lubricant, and the air path of the actuator; a changed lag "
+    "between the signals would look much the same",
+    Code.ASYMMETRY_CHANGED: "viscous friction has become larger {upward:?up|down}ward: share "
+    "{change:by}: check stem and packing for wear on one side, and the air path for a throttle "
+    "that acts one way",
+    Code.NOISE_GROWN: "the noise of the {signal:of signal} has grown to {change:times} the "
+    "baseline: check the sensor, its cable, its supply and its mounting",
+    Code.LAG_CHANGED: "the stem has become {later:?later|earlier} against the {drive:drive}: "
+    "{change:by ms}: check filters and clocks of both sensors, and tubing and volume between "
+    "sensor and actuator; a changed viscous friction would look much the same",
+    Code.STOPS_MOVED_ALIKE: "both travel stops have moved alike, by {change:by mm}: the zero of "
+    "the position sensor or its coupling to the stem has moved: check its mounting",
+    Code.TRAVEL_LOST: "travel is lost at its {stop:of end}: the stem stops {change:by mm} from "
+    "where it went before: check for dirt or a part in the trim, a stop that was set, and the "
+    "{sensor:of sensor} of the position sensor",
+    Code.STOP_MOVED_OUTWARD: "the travel stop at its {stop:of end} has moved outward by "
+    "{change:by mm}: check seat and plug for wear, stop and coupling, and the {sensor:of sensor} "
+    "of the position sensor",
+    Code.STOOD_STILL: "the stem has stood still at {position:in .1f mm} mm since {since:minute} "
+    "while its {drive:drive} changed by {change:.3g} {unit}: more than {ratio:.2g} times the "
+    "friction of the baseline holds it, or a part in the trim or a lock does, or the position "
+    "sensor has stopped: look at the stem",
+    Code.BUFFER_CLEARED: "{because}: the buffer was cleared",
+    Code.CLEARED_ON_REQUEST: "on request",
+    Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",
+    Code.CLEARED_AS_RECORD_BEGINS: "a new record begins",
+    Code.CLEARED_AS_STAMPS_GO_BACK: "the buffer is cleared as stamps go back",
+    Code.STAMPS_WENT_BACK: "stamps of {signal} went back by {seconds:.3g} s",
+    Code.TIME_JUMPED: "ROS time jumped by {seconds:.3g} s",
+    Code.TIME_JUMPS: "ROS time jumps",
+    Code.SAMPLE_DAMAGED: "{signal} is damaged",
+    Code.SAMPLE_NO_JOINT: "{signal} without a position of the joint",
+    Code.SAMPLE_NOT_FINITE: "{signal} is not finite",
+    Code.SAMPLE_OUT_OF_RANGE: "{signal} outside {span}",
+    Code.SAMPLE_REPEATED: "{signal} repeats a stamp",
+    Code.SAMPLE_OVERTAKEN: "{signal} was overtaken on its way: its stamp is a little before the "
+    "last one",
+    Code.SAMPLE_BACK: "{signal} went back in time",
+    Code.SENSOR_RANGE: "the sensor's range {lowest:g} to {highest:g} Pa",
+    Code.ANY_VALVE_RANGE: "the range of any valve, {lowest:g} to {highest:g} m",
+    Code.DATA_FAULT: "{signal:or the stamps}: {cause:of sample_fault}{kind:of fault}",
+    Code.OUTSIDE_TRAVEL: "stem_state: {share:rounded} of its samples lie outside the travel, as at "
+    "{reading:.4g} m, and the travel is 0 to {travel:.4g} m: check unit (m), zero and travel"
+    "{question:after : }",
+    Code.STAMPS_APART: "stem_state is stamped {seconds:.3g} s {is_ahead:?later|earlier} than "
+    "actuator_pressure: synchronise the clocks of both sensors, and check delays on the way",
+    Code.STAMPS_OFF_CLOCK: "the stamps of {signal:or both inputs} are {seconds:.3g} s "
+    "{is_ahead:?ahead of|behind} the clock of this node: synchronise the clocks; for a recording "
+    "set use_sim_time and play it with --clock, or set clock_tolerance to 0",
+    Code.REJECTED: "{signal}: {share:rounded} of its samples are rejected{usable:after , }: {why}",
+    Code.REJECTED_FOR: "{cause:of rejected}",
+    Code.REJECTED_WITHOUT_JOINT: "they have no position of the joint{joint:quoted}: name it in the "
+    "messages, or set joint",
+    Code.PRESSURE_OUT_OF_RANGE: "{reading:.4g} Pa is outside the sensor's range {lowest:g} to "
+    "{highest:g} Pa: check sensor and unit (Pa), or correct pressure_minimum and pressure_maximum",
+    Code.POSITION_OUT_OF_RANGE: "{reading:.4g} m is outside the range of any valve, up to "
+    "{highest:g} m: check sensor and unit (m)",
+    Code.NONE_USABLE: "no sample was usable yet",
+    Code.LAST_USABLE: "the last usable one came {seconds:.0f} s ago",
+    Code.STEPS_IGNORED: "the stem ignored {number} of the latest {steps} steps of its command of "
+    "{least:percent} of the travel or more: {cause:of cause}",
+    Code.ANSWER_LATE: "the stem begins to move {median:.2g} s after its command (median of "
+    "{moves} moves, limit {limit:g} s): {cause:of cause}",
+    Code.ANSWER_SLOW: "the stem has moved by 86 % {median:.2g} s after its command (median of "
+    "{moves} moves, limit {limit:g} s): {cause:of cause}",
+    Code.RESTS_AWAY: "the stem rests {median:percent} of its travel away from its command (median "
+    "of {moves} moves, limit {limit:percent}): {cause:of cause}",
+    Code.HUNTS: "the stem hunts by {amplitude:percent} of its travel every {period:.2g} s at a "
+    "constant command: {cause:of cause}",
+    Code.COMMANDS_UNUSABLE: "no command of stem_command can be used: {problem}",
+    Code.PACKING_TRAVEL: "packing life: {used:.4g} m of travel of {limit:.6g} (travel_limit)"
+    "{state}: renew the packing, then call ~/reset_usage",
+    Code.PACKING_REVERSALS: "packing life: {used:.0f} reversals of {limit:.6g} (reversal_limit)"
+    "{state}: renew the packing, then call ~/reset_usage",
+    Code.LIMIT_REACHED: ": reached",
+    Code.LIMIT_EXPECTED: ", expected on {expected:day}",
+    Code.LIMIT_NEAR: ", near its limit (warned before)",
+}
+
+_HEADLINES = {
+    Code.COMPARED: "{state:of state}",
+    Code.COMPARED_AGAIN: "{state:of state}",
+    Code.VANISHED: "friction collapsed, the packing may leak",
+    Code.FRICTION_BELOW_ZERO: "friction below zero",
+    Code.MOVES_BELOW_ZERO: "friction below zero",
+    Code.NOT_IDENTIFIABLE: "{of:words} is not identifiable",
+    Code.NO_BASELINE: "no baseline yet",
+    Code.NOT_COMPARED: "no comparison with the baseline",
+    Code.WAS_COMPARED: "{what} was {ratio:figures} times its baseline",
+    Code.DOUBTED: "{doubt}",
+    Code.SCALED: "friction and spring constant have changed by one factor",
+    Code.DATED: "{of:headline}",
+    Code.AGED: "{of:headline}",
+    Code.STANDS_UNCOMPARED: "{alarm:headline}",
+    Code.STANDS_UNCERTAIN: "{alarm:headline}",
+    Code.FAILED: "{error}",
+    Code.NO_ESTIMATE: "no estimate",
+    Code.REFUSED: "the latest identification was refused",
+}
+
+
+_ADVICE = {
+    ("friction_high", "WARN"): "Plan new packing for the next stop.",
+    ("friction_high", "ERROR"): "Renew the packing at the next stop; keep the loop in manual where "
+    "it oscillates.",
+    ("friction_low", "WARN"): "Look for leakage at the packing on the next round.",
+    ("friction_low", "ERROR"): "Look for leakage at the packing now.",
+    ("stuck", ""): "Keep the loop in manual; stroke the valve locally, and check packing, trim and "
+    "actuator.",
+    ("whole_valve", ""): "Check the part that is named at the next opportunity.",
+    (
+        "data_quality",
+        "",
+    ): "Check the sensor and its connection; nobody watches the valve until then.",
+    ("positioner", ""): "Check the positioner and its air supply, and the tuning of the loop.",
+}
+
+
+def alarm_advice(kind: str, level: str) -> str:
+    """Return what to do about an alarm, by its name and the name of its level."""
+    return _ADVICE.get((kind, level)) or _ADVICE.get((kind, ""), "")
