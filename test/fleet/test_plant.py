@@ -21,6 +21,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
+from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -288,6 +289,9 @@ class TestDashboard:
                     tab.open("/alarms").get_by_text("Plan new packing").wait_for()
                     page = tab.open("/compare?a=/fv_101/identifier&b=/fv_102/identifier")
                     page.get_by_text("differs").first.wait_for()
+                    # Its numbers are read: what compiles kernels (60 MB) stays away.
+                    libraries = Path(f"/proc/{process.pid}/maps")
+                    assert not libraries.exists() or "llvmlite" not in libraries.read_text()
             finally:
                 process.terminate()
                 assert "Traceback" not in process.communicate(timeout=60)[1]

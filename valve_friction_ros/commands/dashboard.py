@@ -11,7 +11,6 @@
 
 import argparse
 import contextlib
-import os
 import sys
 from pathlib import Path
 
@@ -31,7 +30,6 @@ def _log(line: str) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve the pages until Ctrl-C or SIGTERM."""
-    os.environ["NUMBA_DISABLE_JIT"] = "1"  # nothing is computed that is compiled: 110 MB
     place = options.file
     if isinstance(place, Path) and not place.is_file():
         raise ValueError(f"{place}: there is no such file: `identify-folder --history` makes it")
