@@ -172,6 +172,17 @@ class TestNoEvidence:
         keep = np.abs((WHOLE[0] - START) / 1e9 - 54.0) > 0.5
         assert self.lost(arrivals(*(one[keep] for one in WHOLE)))
 
+    @pytest.mark.timeout(20)
+    def test_a_clock_that_is_set_ten_years_ahead_in_it(self):
+        """What lies between is no motion: cut into pieces of ten seconds it had 30 million."""
+        stamps, ahead = WHOLE[0].copy(), 3 * 10**17
+        stamps[stamps > START + 54e9] += ahead
+        found = taken(*parts(arrivals(stamps, *WHOLE[1:]), range(0, 2 * stamps.size, 37)))
+        assert all(one.end - one.begin < 4e9 for one in found)
+        begins = [(one.begin - ahead * (one.begin > START + ahead) - START) / 1e9 for one in found]
+        assert not any(52 < one < 56 for one in begins)
+        assert any(64 < one < 68 for one in begins)
+
     def test_stamps_that_go_back(self):
         stamps = WHOLE[0].copy()
         stamps[stamps > START + 54e9] -= 20_000_000_000

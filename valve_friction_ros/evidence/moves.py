@@ -248,6 +248,12 @@ class _Signals(NamedTuple):
     force: NDArray[np.float64]
     pauses: NDArray[np.float64]
 
+    def is_broken(self, begin: float, end: float) -> bool:
+        """Whether there is a gap in either signal between two times, s."""
+        if not self.pauses.size:
+            return False
+        return bool(np.any((self.pauses[:, 0] < end) & (self.pauses[:, 1] > begin)))
+
     def force_at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         force: NDArray[np.float64] = np.interp(time, self.force_time, self.force)
         return force
@@ -348,10 +354,15 @@ def _motions(both: _Signals, band: float) -> list[tuple[int, int]]:
 
 
 def _moves_of(both: _Signals, first: int, last: int, valve: Valve, band: float) -> list[Move]:
-    """Return the moves of one motion: cut where it turns, and where it lasts too long."""
-    found = []
+    """Return the moves of one motion: cut where it turns, and where it lasts too long.
+
+    One with a gap has none: years may lie in it, where a clock was set.
+    """
+    found: list[Move] = []
     margin = 2
     begin, end = max(first - margin, 0), min(last + margin, both.time.size - 1)
+    if both.is_broken(both.time[begin], both.time[end]):
+        return found
     for low, high in _one_way(both.position, begin, end, band):
         chunks = max(1, math.ceil((both.time[high] - both.time[low]) / _LONGEST_MOTION))
         cuts = np.linspace(low, high, chunks + 1).round().astype(int)
@@ -399,7 +410,7 @@ def _move(
     length = float(position[-1] - position[0])
     if time.size < 3 or abs(length) < _LEAST_DISTANCE * band:
         return None
-    if both.pauses.size and np.any((both.pauses[:, 0] < time[-1]) & (both.pauses[:, 1] > time[0])):
+    if both.is_broken(time[0], time[-1]):
         return None
     if time[0] < both.force_time[0] or time[-1] > both.force_time[-1]:
         return None
