@@ -133,7 +133,9 @@ def test_without_a_command_nothing_is_said(live):
     live.client.send((stamps, pressure), (stamps, position))
     live.client.wait_for_buffered(2 * stamps.size)
     status = live.client.next_status()
-    shown = [key for key in values_of(status) if not key.startswith(("evidence ", "baseline_lacks "))]
+    shown = [
+        key for key in values_of(status) if not key.startswith(("evidence ", "baseline_lacks "))
+    ]
     assert not [key for key in shown if "command" in key or "moves" in key]
     assert "command" not in status.message
 
