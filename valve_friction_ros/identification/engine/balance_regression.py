@@ -392,6 +392,18 @@ class Regression:
         )
         return np.asarray(np.interp(lags, WORK_LAGS, self.work.by_lag) - known)
 
+    def beyond_shift(self, lag: float) -> float:
+        """Return the deviation of the work, N, by what a lag is beside a shift of one signal.
+
+        A volume or a filter of the time τ also takes ω²·τ²/2 of a swing. Half of the bend of the
+        work over the lag, ∫F″·ẋ·dt, is that share of it.
+        """
+        if self.lag.is_known:
+            return 0.0
+        lags = lag + SECOND_ORDER * np.array([-1.0, 0.0, 1.0])
+        before, here, after = np.interp(lags, WORK_LAGS, self.work.by_lag)
+        return 0.5 * abs(float(before - 2.0 * here + after))
+
     def gradients(self, stribeck: float, solved: _Solved) -> dict[str, _Array]:
         """Return how each number depends on the coefficients.
 

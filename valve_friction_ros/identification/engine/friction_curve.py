@@ -197,7 +197,12 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
         values = [one[name] for one in posterior.near if name in one]
         spread = math.hypot(float(np.std(values or [0.0])), regression.definition(name, solved))
         if name == SLIDING:
-            spread = math.hypot(spread, regression.work.noise, posterior.work_scatter)
+            spread = math.hypot(
+                spread,
+                regression.work.noise,
+                posterior.work_scatter,
+                regression.beyond_shift(regression.later(solved)),
+            )
         numbers[name] = posterior.number(name, gradient, spread)
     return FrictionCurve(
         averages.length * float(averages.time[1] - averages.time[0]),

@@ -11,7 +11,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit,
 from valve_friction_ros.identification.engine.weights import stroke_cells
 from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
 from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
+from valve_friction_ros.identification.trust.verdict import WEAK_SHARE
 from valve_friction_ros.identification.units import SLIDING
 
 NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
@@ -43,8 +44,9 @@ _NOT_QUITE = 1.5
 What the model lacks may then be taken for a lag, which the work of the measured signals does not
 know; with noise alone the inflation is 1.0 to 1.3."""
 
-_FAR_BEYOND = 2.0
-"""Half widths beyond which a less probable explanation is named."""
+_FAR_BEYOND, _BEYOND = 2.0, 1.1
+"""Half widths beyond which a less probable explanation is named; and how far an interval reaches to
+a nearer one, over its distance: no more is known of where that is."""
 
 _ODDS = 6.0
 """Rise of the sum of squares (odds of 1 to 20) up to which a stem without viscous friction behind a
@@ -135,6 +137,14 @@ class Estimated:
     def has_rival(self) -> bool:
         """Whether that lies far beyond the interval."""
         return abs(self.rival - self.value) > _FAR_BEYOND * self.half_width
+
+    @property
+    def with_rival(self) -> "Estimated":
+        """The same; where it is weak anyway, its interval reaches beyond a rival that is near."""
+        apart = abs(self.rival - self.value)
+        if self.half_width <= WEAK_SHARE * abs(self.value) or self.has_rival:
+            return self
+        return replace(self, half_width=float(np.fmax(self.half_width, _BEYOND * apart)))
 
 
 def _vector(fit: PosteriorFit, number: ReportedNumber) -> NDArray[np.float64]:

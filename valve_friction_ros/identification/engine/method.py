@@ -332,6 +332,7 @@ def _of_simulation(
         if "mass" in numbers and prior.timing_uncertainty > 0:
             numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
         misfit = fit_misfit(fit, numbers)
+    numbers[SLIDING] = numbers[SLIDING].with_rival
     return _Outcome(
         parameters=fit_verdicts(fits, numbers, settings, misfit, profile),
         numbers=numbers,
@@ -411,6 +412,7 @@ def _of_force_balance(
 ) -> _Outcome:
     """Take the force balance of the sliding stem alone; `why` says why none was simulated."""
     numbers = {name: one for name, one in numbers.items() if name != SPEED_EXPONENT}
+    numbers[SLIDING] = numbers[SLIDING].with_rival
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
     return _Outcome(

@@ -38,6 +38,9 @@ In right fits of 13 records of a benchmark it is 0.2 to 1.04."""
 
 _LARGEST_CHANGE = 0.5
 _LEAST_COMMON = 0.01
+_UNSEEN = 1e-15
+"""Least curvature over the largest: what the record does not see at all is unknown, not certain."""
+
 _BLOCK = 512
 _MOVED = ("coulomb_friction", "viscous_friction", "spring_constant", "spring_preload", "slip_force")
 
@@ -181,8 +184,9 @@ class _Problem:
         self.lowest = np.minimum(np.array(lowest) * self.scale, 0.0)
 
     def stage(self) -> Stage:
-        inverse = np.linalg.pinv(self.curvature, rcond=1e-15, hermitian=True)
-        inverse /= np.outer(self.scale, self.scale)
+        values, vectors = np.linalg.eigh(self.curvature)
+        seen = np.maximum(values, _UNSEEN * max(float(values[-1]), 1.0))
+        inverse = (vectors / seen) @ vectors.T / np.outer(self.scale, self.scale)
         return Stage(
             self.at,
             self.jacobian @ inverse @ self.jacobian.T,

@@ -173,9 +173,16 @@ class _Search:
 
     def full(self, start: Coordinates, names: tuple[str, ...] = ()) -> PosteriorFit:
         """Fit with all imperfections, or with those that are named."""
-        names = names or self.all
+        names = names or self.free(start)
         near = self.fit(start, names, _MORE_STEPS)
         return self.fit(near.at, names, _MORE_STEPS, self.exact)
+
+    def free(self, at: Coordinates) -> tuple[str, ...]:
+        """Return all coordinates that are free; of friction that falls with speed v_s is one."""
+        if not at["stribeck_velocity"] > 0:
+            return self.all
+        others = tuple(name for name in self.all if name != "at_low_speed")
+        return (*others, "stribeck_velocity")
 
     @property
     def may_go_on(self) -> bool:
@@ -217,8 +224,7 @@ class _Search:
             return self.full(first.at)
         if not self.may_go_on:
             return None
-        others = tuple(name for name in self.all if name != "at_low_speed")
-        return self.fit(first.at, (*others, "stribeck_velocity"), 2 * _MORE_STEPS, self.exact)
+        return self.fit(first.at, self.free(first.at), 2 * _MORE_STEPS, self.exact)
 
     def falling(self, at: Coordinates) -> list[Coordinates]:
         """Let the friction fall with speed, from the static friction of the departures if known.

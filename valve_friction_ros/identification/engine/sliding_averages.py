@@ -10,7 +10,7 @@
 """Force and stem of a record averaged alike, and the work of the force over the distance."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +43,7 @@ SURE_MARGIN, CLOSE = 2.0, 0.5
 of a sliding stem, and that at which it is taken where there is no other, for the sliding friction
 alone."""
 
+_TINY = float(np.finfo(float).tiny)
 LARGEST_LAG = 0.15
 LAGS: _Array = np.linspace(-LARGEST_LAG, LARGEST_LAG, 301, dtype=np.float64)
 WORK_LAGS: _Array = LAGS[::10]
@@ -57,6 +58,22 @@ _STROKE_NOISE, _STROKE = 6.0, 0.03
 """Largest share of noise in the work; least stroke that is part of the distance, in deviations of
 the stem's noise and as a share of its range: a wandering sensor, or its last bit, moves no stem."""
 
+_SURE_STROKE = 3.0
+"""Length of a stroke over the least from which on it surely is one."""
+
+_END_NOISE = 3e-3
+"""Noise over the range that may be left at the ends of the strokes.
+
+Noise that lasts is alike in both halves of the samples, and lengthens each stroke by some
+deviations."""
+
+_FINEST_STEP, _SHARED, _MEDIAN = 4e-3, 4, 0.6745
+"""Time, s, over which the stem is averaged at least for that; samples that share what they average;
+and the median magnitude of standard normal numbers."""
+
+_COVERED = 0.7
+"""Least share of the distance that a stem has left after averaging, else it turns round within."""
+
 
 def averaged_twice(signal: _Array, length: int) -> _Array:
     """Average over `length` samples, twice, centred; the ends are held."""
@@ -69,11 +86,10 @@ def averaged_twice(signal: _Array, length: int) -> _Array:
     return signal
 
 
-def _strokes(seen: _Array, measured: _Array, least: float) -> tuple[float, int]:
-    """Return the distance of all strokes of at least that length, m, and their number.
+def _turns(seen: _Array, least: float) -> NDArray[np.intp]:
+    """Return the places where a stem ends strokes of at least that length, m, first and last too.
 
-    The strokes end where the one half of the samples, `seen`, turns round, and are as long as the
-    other half says: noise makes the extremes of a half, and not the other's values there.
+    One that nowhere moves so far has a single stroke.
     """
     turns = np.flatnonzero(np.diff(np.sign(np.diff(seen)))) + 1
     ends, way = [0], 0
@@ -92,8 +108,16 @@ def _strokes(seen: _Array, measured: _Array, least: float) -> tuple[float, int]:
             ends.append(far)
             far, way = turn, -way
     ends.append(far)
-    lengths = np.diff(measured[ends]) * np.sign(np.diff(seen[ends]))
-    return float(np.sum(lengths)), max(len(ends) - 1, 1)
+    return np.array(ends)
+
+
+def _lengths(seen: _Array, measured: _Array, turns: NDArray[np.intp]) -> _Array:
+    """Return the length of each stroke, m.
+
+    The strokes end where the one half of the samples, `seen`, turns round, and are as long as the
+    other half says: noise makes the extremes of a half, and not the other's values there.
+    """
+    return np.asarray(np.diff(measured[turns]) * np.sign(np.diff(seen[turns])))
 
 
 def _all_around(which: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
@@ -141,11 +165,19 @@ def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal,
     )
 
 
+class _Path(NamedTuple):
+    """Distance of all strokes, m, its deviation, and their number."""
+
+    distance: float
+    deviation: float
+    strokes: int
+
+
 class Averages(NamedTuple):
     """What the regression takes of a record at one averaging time; two halves where there are two.
 
     `taken` are the indices of the averages of a stem that surely slides; `is_free` says where it is
-    away from the stops and from both ends of the record.
+    away from the stops and from both ends of the record. `path` is that of the stem itself there.
     """
 
     time: _Array
@@ -158,6 +190,7 @@ class Averages(NamedTuple):
     speed: float
     noise: Mapping[str, float]
     is_sure: bool
+    path: _Path
 
     @property
     def mean_velocity(self) -> _Array:
@@ -183,7 +216,7 @@ def averages_of(
     velocity = [np.gradient(half, step) for half in position]
     mean = 0.5 * (velocity[0] + velocity[1])
     size = np.abs(mean)
-    speed = 2.0 * float(np.sum(size**2) / max(np.sum(size), np.finfo(float).tiny))
+    speed = 2.0 * float(np.sum(size**2) / max(np.sum(size), _TINY))
     per_average = [max(averaging_time / one.period, 1.0) for one in (force, stem)]
     noise = {
         "force": force.noise * math.sqrt(2.0 / (3.0 * per_average[0])),
@@ -206,6 +239,11 @@ def averages_of(
     ):
         return None
     averaged = [averaged_twice(half, length) for half in force.halves(time)]
+    path = _path([half[free] for half in position], averaged[0][free], stem.noise)
+    finer = _finest_path(force, stem, time, free, averaging_time)
+    if path.distance < _COVERED * finer.distance:
+        return None
+    path = max(path, finer)
     return Averages(
         time,
         averaged,
@@ -217,7 +255,69 @@ def averages_of(
         speed,
         noise,
         margin >= SURE_MARGIN,
+        path,
     )
+
+
+def _finest_path(
+    force: MeasuredSignal,
+    stem: MeasuredSignal,
+    time: _Array,
+    free: NDArray[np.bool_],
+    longest: float,
+) -> _Path:
+    """Return the distance where the stem is free, averaged until the ends of strokes are sure.
+
+    That is over the time `longest`, s, at most.
+    """
+    period = max(stem.period, _FINEST_STEP)
+    while True:
+        grid = np.arange(time[0], time[-1], period)
+        where = free[np.minimum(np.searchsorted(time, grid), time.size - 1)]
+        halves = [half[where] for half in stem.halves(grid)]
+        noise = max(_lasting_noise(half) for half in halves)
+        if noise <= _END_NOISE * float(np.ptp(halves[0])) or 2.0 * period > longest:
+            return _path(halves, force.halves(grid)[0][where], stem.noise)
+        period *= 2.0
+
+
+def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
+    """Return the distance of all strokes.
+
+    Short ones may be of a sensor that wanders: in these the force does no work.
+    """
+    even, odd = halves
+    least = max(_STROKE_NOISE * noise, _STROKE * float(np.ptp(even)))
+    turns = _turns(even, least)
+    lengths = _lengths(even, odd, turns)
+    whole = 0.5 * float(np.sum(lengths) + np.sum(_lengths(odd, even, _turns(odd, least))))
+    position = 0.5 * (even + odd)
+    moved = np.diff(position, prepend=position[0])
+    work = np.diff(np.cumsum(_off_line(force, position) * moved)[turns])
+    is_short = lengths < _SURE_STROKE * least
+    short, long = float(np.sum(lengths[is_short])), float(np.sum(lengths[~is_short]))
+    real, of_long = 1.0, float(np.sum(work[~is_short]))
+    if short > 0.0 and of_long > 0.0:
+        real = min(max(float(np.sum(work[is_short])) / short * long / of_long, 0.0), 1.0)
+    distance = max(whole - (1.0 - real) * short, _TINY)
+    return _Path(distance, math.sqrt(real * (1.0 - real)) * short, max(lengths.size, 1))
+
+
+def _off_line(force: _Array, position: _Array) -> _Array:
+    """Return a force less its straight line along the travel."""
+    away, force = position - np.mean(position), force - np.mean(force)
+    square = max(float(away @ away), _TINY)
+    return np.asarray(force - float(away @ force) / square * away)
+
+
+def _lasting_noise(position: _Array) -> float:
+    """Return the deviation of what is not motion in every fourth sample, which averages share.
+
+    That of fourth differences, to which even fast swings add little; those of white noise of the
+    deviation s have √70·s.
+    """
+    fourth = np.abs(np.diff(position[::_SHARED], _SHARED))
+    return float(np.median(fourth)) / (_MEDIAN * math.sqrt(70.0)) if fourth.size else 0.0
 
 
 class Work(NamedTuple):
@@ -225,7 +325,8 @@ class Work(NamedTuple):
 
     Averages lose the work of fast moves. `along` are the moves over the distance of all strokes;
     noise in them is not that of the force, so that it biases nothing. `noise`, N, is what chance
-    makes of the work, and half of what averaging over twice the time does. `speed` is the mean one
+    makes of the work, half of what averaging over twice the time does, and what is open of the
+    distance. `speed` is the mean one
     over the distance, m/s, by the product of two halves of the samples.
     """
 
@@ -246,39 +347,34 @@ class Work(NamedTuple):
         time = np.arange(averages.time[0], averages.time[-1], step)
         after = np.minimum(np.searchsorted(averages.time, time), averages.time.size - 1)
         is_free = averages.is_free[after]
-        even, odd = (half[averages.is_free] for half in averages.position)
-        least = max(_STROKE_NOISE * stem.noise, _STROKE * float(np.ptp(even)))
-        (distance, count), (other, _) = _strokes(even, odd, least), _strokes(odd, even, least)
-        distance = max(0.5 * (distance + other), np.finfo(float).tiny)
+        path = averages.path
         longest = averages.length * float(averages.time[1] - averages.time[0]) / step
         length = 2 * max(round(max(force.period, stem.period) / step), 1)
 
         whole = [np.interp(time, one.time, one.value) for one in (force, stem)]
         squares = _squares(stem, time, is_free, longest)
-        speed = squares / (step * distance)
+        speed = squares / (step * path.distance)
 
         def by(length: int) -> "Work":
             pressed, position = (averaged_twice(one, length) for one in whole)
-            along = np.gradient(position) * is_free / distance
+            along = np.gradient(position) * is_free / path.distance
             # Twice averaged noise is that of some samples at a time: as much as of each alone.
             noise = force.noise * math.sqrt(step / force.period * float(along @ along))
-            return cls(time, pressed, position, along, distance, count, noise, speed)
+            return cls(time, pressed, position, along, path.distance, path.strokes, noise, speed)
 
         work = by(length)
         while work.noise > _WORK_NOISE * abs(work.of_friction) and 2 * length <= longest:
             length *= 2
             work = by(length)
         hidden = work.of_friction - by(2 * length).of_friction
-        return work._replace(noise=math.hypot(work.noise, 0.5 * hidden)).seen_late()
+        of_path = path.deviation / path.distance * work.of_friction
+        return work._replace(noise=math.hypot(work.noise, 0.5 * hidden, of_path)).seen_late()
 
     @property
     def of_friction(self) -> float:
         """The work over the distance, N, but for a straight line of the force along the travel."""
         moving = self.along != 0.0
-        away = self.position - np.mean(self.position[moving])
-        force = self.force - np.mean(self.force[moving])
-        square = max(float(away[moving] @ away[moving]), np.finfo(float).tiny)
-        return float(self.along @ (force - float(away[moving] @ force[moving]) / square * away))
+        return float(self.along[moving] @ _off_line(self.force[moving], self.position[moving]))
 
     def seen_late(self) -> "Work":
         """Compute the work over the distance, N, if the stem is seen late by each of the lags."""
