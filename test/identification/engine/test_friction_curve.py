@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from valve_friction_ros.identification.engine import friction_curve
 from valve_friction_ros.identification.engine.balance_regression import LagPrior
@@ -26,7 +27,12 @@ from valve_friction_ros.identification.engine.friction_curve import (
     friction_curves,
 )
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
-from valve_friction_ros.identification.engine.sliding_averages import averaged_twice
+from valve_friction_ros.identification.engine.sliding_averages import (
+    _lengths,
+    _path,
+    _turns,
+    averaged_twice,
+)
 from valve_friction_ros.model import KarnoppParameters, StemState, Valve, advance, simulate
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 
@@ -163,6 +169,70 @@ def attenuated(record, valve, curve):
     columns = np.column_stack([np.sign(velocity), velocity, position, np.ones(position.size)])
     size = np.abs(columns).max(axis=0)
     return (np.linalg.lstsq(columns[slides] / size, force[slides], rcond=None)[0] / size)[1]
+
+
+class TestDistance:
+    RESTS = np.repeat([0.0, 2e-3, 0.0, 2e-3, 0.0, 2e-3, 0.0], 2500)
+    STEM = np.convolve(np.pad(RESTS, 50, mode="edge"), np.full(101, 1 / 101), "valid")
+    FRICTION = 100.0 * np.sign(np.gradient(STEM))
+
+    @pytest.mark.parametrize("seed", range(5))
+    def test_a_sensor_that_wanders_makes_no_strokes(self, seed):
+        """Over seconds of rest its excursions reach 5 % of the range, and would add a fifth."""
+        white = np.random.default_rng(seed).standard_normal(self.STEM.size)
+        share = np.exp(-0.01)
+        wander = 2e-5 * np.sqrt(1 - share**2) * lfilter([1.0], [1.0, -share], white)
+        pressed = np.where(self.FRICTION == 0.0, np.nan, self.FRICTION)
+        held = np.flatnonzero(np.isfinite(pressed))
+        last = held[np.maximum(np.searchsorted(held, np.arange(pressed.size), "right") - 1, 0)]
+        path = _path([self.STEM + wander] * 2, pressed[last], 0.0)
+        assert path.distance == pytest.approx(12e-3, rel=0.05)
+        lengths = _lengths(self.STEM + wander, self.STEM + wander, _turns(self.STEM + wander, 6e-5))
+        assert np.sum(lengths) > 1.15 * path.distance
+
+    @given(st.floats(0.04, 0.08), st.integers(1, 5))
+    def test_short_strokes_against_friction_are_strokes(self, share, count):
+        """Exact: with the force of friction in all of them, nothing is left out."""
+        places = [0.0, 1.0, *[1.0 - share, 1.0] * count, 0.0]
+        stem = 1e-2 * np.interp(np.linspace(0, len(places) - 1, 2000 * len(places)),
+                                np.arange(len(places)), places)  # fmt: skip
+        path = _path([stem, stem], 50.0 * np.sign(np.gradient(stem)), 0.0)
+        assert path.distance == pytest.approx(1e-2 * (2.0 + 2.0 * share * count), rel=0.03)
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_a_swing_faster_than_the_averages(self, seed):
+        """Strokes of a ninth of a second on a slow wave, as of a positioner that hunts."""
+        valve, packing = drawn(seed)
+        place = 0.5 + 0.3 * np.sin(0.7 * TIME) + 0.15 * np.sin(27.0 * TIME)
+        stem = valve.travel * place
+        velocity = np.gradient(stem, PERIOD)
+        friction = packing.coulomb_friction * np.sign(velocity)
+        friction += packing.viscous_friction * velocity
+        force = friction + packing.spring_constant * stem + packing.spring_preload
+        pressure = valve.pressure_reference + force / valve.diaphragm_area
+        record = StampedRecord(StampedSignal(TIME, pressure), StampedSignal(TIME, stem))
+        truth = np.sum(friction * velocity) / np.sum(np.abs(velocity))
+        for curve in friction_curves(record, valve, NO_LAG):
+            assert curve.averaging_time < 0.1
+            assert curve.numbers[SLIDING].value == pytest.approx(truth, rel=0.02)
+
+
+class TestRival:
+    ONE = Estimated(100.0, 20.0, Budget(10.0, 0.0, {}))
+
+    def test_a_near_one_is_in_the_interval(self):
+        assert replace(self.ONE, rival=70.0).with_rival.half_width == pytest.approx(33.0)
+        assert replace(self.ONE, rival=90.0).with_rival.half_width == 20.0
+        assert self.ONE.with_rival == self.ONE
+
+    def test_a_far_one_is_named_instead(self):
+        far = replace(self.ONE, rival=55.0)
+        assert far.has_rival
+        assert far.with_rival == far
+
+    def test_what_is_sharp_stays_sharp(self):
+        sharp = replace(self.ONE, half_width=4.0, rival=93.0)
+        assert sharp.with_rival == sharp
 
 
 class TestPoorMotion:

@@ -9,6 +9,7 @@
 
 """Parts of the fit with imperfections, each against what can be derived."""
 
+import math
 import re
 
 import numpy as np
@@ -19,7 +20,9 @@ from valve_friction_ros.identification.engine.broad_model import ABSENT, BroadMo
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.imperfections import TIMING
 from valve_friction_ros.identification.engine.intervals import Budget
+from valve_friction_ros.identification.engine.posterior_fit import fit
 from valve_friction_ros.identification.engine.remarks import sampling_remarks
+from valve_friction_ros.identification.engine.search import Prior, _Search
 from valve_friction_ros.identification.engine.sentences import main_doubt
 from valve_friction_ros.identification.engine.starts import lagging
 from valve_friction_ros.identification.engine.weights import inflation
@@ -135,6 +138,23 @@ def test_difference_of_the_halves_is_foreseen(model):
     even, odd = (model.record.position - model.readings(at)) * model.weights
     apart = 0.25 * float(np.sum((even - odd) ** 2))
     assert 0.2 * model.foreseen_difference < apart < 1.2 * model.foreseen_difference
+
+
+def test_what_the_record_does_not_see_is_unknown(model):
+    """Without a slip force no speed at which it falls shows: its variance is not 0."""
+    at = {**TRUE, "start_position": model.record.start, "stribeck_velocity": 1e-3}
+    names = ("coulomb_friction", "spring_constant", "spring_preload", "stribeck_velocity")
+    (stage,) = fit(model, at, names, {}, {}, 0).stages
+    assert math.sqrt(stage.covariance[3, 3]) > 1.0
+    assert math.sqrt(stage.covariance[0, 0]) < 0.1 * TRUE["coulomb_friction"]
+
+
+def test_a_friction_that_falls_with_speed_leaves_that_speed_free(model):
+    """Also where only a dead zone was to be added: a speed that is held would look certain."""
+    falling = {**TRUE, "slip_force": 50.0, "stribeck_velocity": 1e-3}
+    search = _Search(model.record, Prior(0.01, TRUE["mass"], {}))
+    assert "stribeck_velocity" in search.full({**search.base, **falling}).names
+    assert "stribeck_velocity" not in search.full({**search.base, **TRUE}).names
 
 
 def test_every_source_has_words():
