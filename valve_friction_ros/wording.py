@@ -96,6 +96,7 @@ class Code(Enum):
     TRAVEL_LOST = auto()
     STOP_MOVED_OUTWARD = auto()
     STOOD_STILL = auto()
+    HELD_IN_TEST = auto()
     # The samples of a valve
     BUFFER_CLEARED = auto()
     CLEARED_ON_REQUEST = auto()
@@ -651,6 +652,10 @@ _SENTENCES = {
     "while its {drive:drive} changed by {change:.3g} {unit}: more than {ratio:.2g} times the "
     "friction of the baseline holds it, or a part in the trim or a lock does, or the position "
     "sensor has stopped: look at the stem",
+    Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test while the force asked "
+    "it to move: static friction is at least {friction:.3g} N, {ratio:.2f} times the friction of "
+    "the baseline, or something blocks the stem: look at the stem, and repeat the test with more "
+    "force",
     Code.BUFFER_CLEARED: "{because}: the buffer was cleared",
     Code.CLEARED_ON_REQUEST: "on request",
     Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",

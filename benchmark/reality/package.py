@@ -24,7 +24,15 @@ import numpy as np
 
 from benchmark.reality.records import Nominal, Record
 from valve_friction_ros import read_recording
-from valve_friction_ros.health import Baseline, Level, StatusSignal, diagnose_valve
+from valve_friction_ros.health import (
+    Baseline,
+    FrictionLimits,
+    Level,
+    StatusSignal,
+    diagnose_valve,
+)
+from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.identification import (
     DEFAULT_METHOD,
     IdentificationSettings,
@@ -36,6 +44,7 @@ from valve_friction_ros.identification.engine import method as engine
 from valve_friction_ros.identification.engine.intervals import estimated
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.engine.search import _Search, search
+from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.streams import Arrivals, Kind, RecordBuffer
 
@@ -62,7 +71,8 @@ class Number:
 class Answer:
     """What the package says of a record: numbers, or why there are none.
 
-    `native` is its own result, and `fits` are the fits behind it.
+    `native` is its own result, `fits` are the fits behind it, and `held` are the numbers of a stem
+    that a refused record could not move.
     """
 
     numbers: Mapping[str, Number] = field(default_factory=dict)
@@ -70,6 +80,7 @@ class Answer:
     warnings: tuple[str, ...] = ()
     native: Result | None = None
     fits: Sequence[PosteriorFit] = ()
+    held: Mapping[str, Measured] = field(default_factory=dict)
 
 
 class Ends(NamedTuple):
@@ -135,7 +146,9 @@ def _answer(recording: Recording, valve: Valve, has_spring: bool, method: str) -
         try:
             result = method_named(method)(recording, valve, _settings(has_spring))
         except RefusalError as refusal:
-            return Answer(refusal=str(refusal), fits=tuple(fits))
+            is_still = isinstance(refusal, LittleMotionError)
+            held = held_numbers(recording, valve) if is_still else {}
+            return Answer(refusal=str(refusal), fits=tuple(fits), held=held)
     numbers = {
         name: Number(one.value, one.half_width, one.verdict.value)
         for name, one in result.parameters.items()
@@ -181,9 +194,13 @@ def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     for all else that is more than OK or another status signal than good; the values are the
     sentences.
     """
-    if answer.native is None:
-        return {}
     baseline = Baseline.of(healthy.native) if healthy.native and is_baseline(healthy) else None
+    if answer.native is None:
+        valve = None if healthy.native is None else healthy.native.valve
+        if baseline is None or valve is None:
+            return {}
+        held = held_finding(answer.held, baseline, valve, FrictionLimits())
+        return {} if held is None else {"high": _words(held)}
     friction, findings = diagnose_valve(answer.native, baseline)
     found = {}
     if friction.status_signal is not StatusSignal.GOOD or friction.level is not Level.OK:

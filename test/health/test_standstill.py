@@ -12,10 +12,29 @@
 import numpy as np
 import pytest
 
-from valve_friction_ros.health import Baseline, Standstill, StandstillCounter, standstill_finding
+from valve_friction_ros.health import (
+    Baseline,
+    FrictionLimits,
+    FrictionMonitor,
+    Level,
+    MonitorSettings,
+    RefusedRecordError,
+    Standstill,
+    StandstillCounter,
+    identify_snapshot,
+    standstill_finding,
+)
 from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SquareWave, Valve
-from valve_friction_ros.streams import Samples
+from valve_friction_ros.health.standstill import held_finding, held_numbers
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SquareWave,
+    Valve,
+    simulate,
+)
+from valve_friction_ros.streams import RecordBuffer, Samples, rows_arrived
 
 TRAVEL = 0.02
 VALVE = Valve(diaphragm_area=0.05, pressure_reference=0.0, travel=TRAVEL)
@@ -136,3 +155,57 @@ def test_a_healthy_simulated_valve_is_never_stuck(bench_record):
             seen += 1
             assert still.least_friction(BENCH_VALVE) <= LOW_FRICTION.static_friction + 1
     assert seen > 10
+
+
+class TestHeldInATest:
+    """A record that is refused as the stem did not move still bounds its friction."""
+
+    TIME = np.arange(0.0, 40.0, 0.05)
+    ASKED = 1e5 + 1.2e4 * np.sin(2 * np.pi * TIME / 40.0)
+
+    def recording(self, position):
+        return Recording(0.05, self.ASKED, np.full(self.TIME.size, position))
+
+    def test_half_of_the_swing_of_the_force_is_the_least_friction(self):
+        """24 kPa on 0.05 m² are 1200 N, means over two seconds miss 1.6 % of them."""
+        numbers = held_numbers(self.recording(0.009), VALVE)
+        assert numbers["held_position"].value == pytest.approx(0.009)
+        assert numbers["held_friction"].value == pytest.approx(600.0 * 0.984, rel=1e-3)
+
+    def test_a_stem_that_follows_bounds_nothing_that_is_not_true(self):
+        """Moved by sliding friction alone, it stands still only where that holds it."""
+        pressure = BENCH_VALVE.pressure_reference + 5e4 + 4e4 * np.sin(0.5 * self.TIME)
+        position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, 0.05).position
+        numbers = held_numbers(Recording(0.05, pressure, position), BENCH_VALVE)
+        held = numbers.get("held_friction", Measured(0.0, 0.0))
+        assert held.value < LOW_FRICTION.static_friction
+
+    @pytest.mark.parametrize(
+        ("healthy", "level"), [(500.0, None), (400.0, Level.WARN), (250.0, Level.ERROR)]
+    )
+    def test_the_limits_are_those_of_the_friction(self, healthy, level):
+        baseline = Baseline(coulomb_friction=healthy, half_width=0.0, numbers=REACH)
+        numbers = held_numbers(self.recording(0.009), VALVE)
+        found = held_finding(numbers, baseline, VALVE, FrictionLimits())
+        assert (found and found.level) == level
+        if found:
+            assert found.friction_ratio == pytest.approx(0.984 * 600.0 / healthy, rel=1e-3)
+
+    @pytest.mark.parametrize("place", [0.0002, 0.0178, 0.0195])
+    def test_at_an_end_the_stem_may_rest_on_a_stop(self, place):
+        numbers = held_numbers(self.recording(place), VALVE)
+        assert held_finding(numbers, HEALTHY, VALVE, FrictionLimits()) is None
+
+    def test_the_monitor_forgets_it_with_the_next_record(self):
+        monitor = FrictionMonitor(MonitorSettings(VALVE))
+        monitor.baseline = Baseline(coulomb_friction=250.0, half_width=5.0, numbers=REACH)
+        assert monitor.held is None
+        buffer = RecordBuffer(VALVE, 60.0)
+        still = self.recording(0.009)
+        buffer.add_arrivals(rows_arrived(np.column_stack((self.TIME, still.drive, still.position))))
+        with pytest.raises(RefusedRecordError, match="did not move") as refused:
+            identify_snapshot(buffer.snapshot(), monitor.settings)
+        monitor.learn(refused.value.numbers, 1)
+        assert "static friction is at least 591 N, 2.32 times" in monitor.held.message
+        monitor.learn({"drive_noise": Measured(1.0, 0.1)}, 2)
+        assert monitor.held is None

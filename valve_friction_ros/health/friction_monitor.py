@@ -30,6 +30,7 @@ from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
 from valve_friction_ros.health.standing_alarm import followed, limited, raised, standing
+from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.health.valve_changes import valve_changes
 from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
 from valve_friction_ros.health.valve_limits import ValveLimits
@@ -114,15 +115,17 @@ def identify_snapshot(snapshot: Snapshot, settings: MonitorSettings) -> Result:
     Raises RefusedRecordError with the cause, and with the cause of a recent clearing of the buffer.
     """
     valve, how = settings.valve, settings.identification
-    numbers: Mapping[str, Measured] = {}
+    numbers: dict[str, Measured] = {}
     thin, count = snapshot.thinned(MOST_SAMPLES)
     try:
         recording = thin.recording()
         try:
             result = method_named(settings.method)(recording, valve, how)
             return result if count == 1 else _of_means(result, count)
-        except RefusalError:
+        except RefusalError as refusal:
             numbers = numbers_of_refused(recording, valve, how)
+            if isinstance(refusal, LittleMotionError):
+                numbers |= held_numbers(recording, valve)
             raise
     except RefusalError as refusal:
         cleared = snapshot.cleared_because
@@ -247,6 +250,14 @@ class FrictionMonitor:
         """What has changed on the valve beside its friction (`KnownNumbers.findings`)."""
         settings = self._settings
         return self._known.findings(self.baseline, settings.valve, settings.valve_limits)
+
+    @property
+    def held(self) -> Finding | None:
+        """That the latest test could not move the stem, if it asked for more than the limits."""
+        baseline, settings = self.baseline, self._settings
+        if baseline is None:
+            return None
+        return held_finding(self._known.of_latest, baseline, settings.valve, settings.limits)
 
     def may_have_changed(self) -> bool:
         """Return whether, by the far ends of the intervals, something beside friction may differ.

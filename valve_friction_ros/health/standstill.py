@@ -10,6 +10,7 @@
 """A stem that stands still between its stops while the pressure asks it to move."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.health.baseline import Baseline
+from valve_friction_ros.health.diagnosis import FrictionLimits
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
+from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams import Samples
 from valve_friction_ros.wording import Code, said
@@ -28,6 +31,9 @@ _STILL = 0.005
 
 _BLOCK = 10_000_000_000
 """Time over which samples are averaged, ns: a stem that can move does so within it. Chosen."""
+
+_BLOCK_OF_TEST = 2_000_000_000
+"""The same in a record of a test, ns. Chosen: several times the lag of any sensor and actuator."""
 
 _STOP = 0.03
 """Share of the travel from an end within which a stem may rest on its stop. Chosen."""
@@ -90,22 +96,22 @@ def _mean_of(values: NDArray[np.float64]) -> _Mean:
     return _Mean(values.size, float(values.sum()), float(values @ values))
 
 
-def _means(samples: Samples) -> dict[int, _Mean]:
+def _means(samples: Samples, length: int) -> dict[int, _Mean]:
     """Return the sums of each block, in their order: some 20 times a second mostly of one."""
     stamps, values = samples
     if not stamps.size:
         return {}
-    first, last = int(stamps.min()) // _BLOCK, int(stamps.max()) // _BLOCK
+    first, last = int(stamps.min()) // length, int(stamps.max()) // length
     if first == last:
         return {first: _mean_of(values)}
-    blocks = stamps // _BLOCK
+    blocks = stamps // length
     return {block: _mean_of(values[blocks == block]) for block in np.unique(blocks).tolist()}
 
 
 class StandstillCounter:
     """Follows the samples of a valve; keeps the present standstill, and no samples.
 
-    A block of ten seconds is still where the stem's mean has stayed and its deviation is small. The
+    A block is still where the stem's mean has stayed and its deviation is small. The
     pressure of a block counts once the stem is still in a later one: so a stem has had the time to
     move, and a sensor to say so.
 
@@ -113,10 +119,12 @@ class StandstillCounter:
     ----------
     travel : float
         Distance between the stops, m.
+    block : int
+        Time over which samples are averaged, ns.
     """
 
-    def __init__(self, travel: float) -> None:
-        self._band = _STILL * travel
+    def __init__(self, travel: float, block: int = _BLOCK) -> None:
+        self._band, self._length = _STILL * travel, block
         self._pressures: dict[int, _Mean] = {}
         self._block: int | None = None
         self._positions = _Mean()
@@ -136,9 +144,9 @@ class StandstillCounter:
 
     def add(self, pressures: Samples, positions: Samples) -> None:
         """Take good samples: finite, within the range of their sensor; older ones begin anew."""
-        for block, mean in _means(pressures).items():
+        for block, mean in _means(pressures, self._length).items():
             self._pressures[block] = self._pressures.get(block, _Mean()).with_more(mean)
-        for block, mean in _means(positions).items():
+        for block, mean in _means(positions, self._length).items():
             if self._block is not None and block < self._block:
                 self._begin()
                 self._pressures.clear()
@@ -163,9 +171,58 @@ class StandstillCounter:
             return
         self._begin()
         if is_still:
-            self._since, self._place = block * _BLOCK, mean.value
+            self._since, self._place = block * self._length, mean.value
         for one in [one for one in self._pressures if one <= block]:
             del self._pressures[one]
+
+
+def held_numbers(recording: Recording, valve: Valve) -> dict[str, Measured]:
+    """Return the largest static friction that surely held the stem in a record, N, and where, m.
+
+    There is nothing where the stem nowhere rested. The numbers are ``held_friction`` and
+    ``held_position``.
+    """
+    if not math.isfinite(valve.travel):
+        return {}
+    counter, found = StandstillCounter(valve.travel, _BLOCK_OF_TEST), list[Standstill]()
+    stamps = np.round(recording.time * 1e9).astype(np.int64)
+    cuts = np.flatnonzero(np.diff(stamps // _BLOCK_OF_TEST)) + 1
+    for part in np.split(np.arange(stamps.size), cuts):
+        counter.add(
+            Samples(stamps[part], recording.drive[part]),
+            Samples(stamps[part], recording.position[part]),
+        )
+        found += filter(None, [counter.standstill])
+    if not found:
+        return {}
+    most = max(found, key=lambda one: one.least_friction(valve))
+    return {
+        "held_friction": Measured(most.least_friction(valve), 0.0),
+        "held_position": Measured(most.position, _STILL * valve.travel),
+    }
+
+
+def held_finding(
+    numbers: Mapping[str, Measured], baseline: Baseline, valve: Valve, limits: FrictionLimits
+) -> Finding | None:
+    """Find that a test met more friction than `limits` allow, by its `held_numbers`.
+
+    None without them, and where the stem may have rested on a stop.
+    """
+    least, place = (numbers.get(name) for name in ("held_friction", "held_position"))
+    if least is None or place is None or not _may_move(place.value, baseline, valve):
+        return None
+    ratio = least.value / _healthy_friction(baseline)
+    if not ratio > limits.warn_ratio:
+        return None
+    is_error = ratio > limits.error_ratio
+    return Finding(
+        Level.ERROR if is_error else Level.WARN,
+        StatusSignal.FAILURE if is_error else StatusSignal.MAINTENANCE_REQUIRED,
+        said(Code.HELD_IN_TEST, position=place.value, friction=least.value, ratio=ratio),
+        leads=True,
+        friction_ratio=ratio,
+    )
 
 
 def standstill_finding(
@@ -176,11 +233,7 @@ def standstill_finding(
     None unless it rests where the stem went when the baseline was set, away from the ends of that
     way: at an end it may rest on a stop under any pressure.
     """
-    numbers, margin = baseline.numbers, _STOP * valve.travel
-    low, high = numbers.get("lowest_position"), numbers.get("highest_position")
-    if low is None or high is None:
-        return None
-    if not low.value + margin < standstill.position < high.value - margin:
+    if not _may_move(standstill.position, baseline, valve):
         return None
     least, healthy = standstill.least_friction(valve), _healthy_friction(baseline)
     if not least > factor * healthy:
@@ -202,6 +255,15 @@ def standstill_finding(
         leads=True,
         friction_ratio=least / healthy,
     )
+
+
+def _may_move(position: float, baseline: Baseline, valve: Valve) -> bool:
+    """Return whether a stem rests where it went when the baseline was set, away from the ends."""
+    numbers, margin = baseline.numbers, _STOP * valve.travel
+    low, high = numbers.get("lowest_position"), numbers.get("highest_position")
+    if low is None or high is None:
+        return False
+    return low.value + margin < position < high.value - margin
 
 
 def _healthy_friction(baseline: Baseline) -> float:

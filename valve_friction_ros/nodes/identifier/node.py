@@ -301,7 +301,7 @@ class Identifier(ManagedNode):
         A refusal is kept only where its record has changed what is found on the valve.
         """
         self._inputs.take(is_all=True)
-        before, refused = self._monitor.findings, None
+        before, refused = self._found(), None
         if self._identification.has_nothing_new:
             self._schedule.stall()
             return
@@ -312,13 +312,17 @@ class Identifier(ManagedNode):
             self._schedule.skip(str(error))
             if isinstance(error, RefusalError):
                 self._monitor.skip(error)
-            if not isinstance(error, RefusedRecordError) or self._monitor.findings == before:
+            if not isinstance(error, RefusedRecordError) or self._found() == before:
                 return
             refused = error
         else:
             self._schedule.succeed()
         await self._history.keep(record, refused)
         self._publish_diagnostics()
+
+    def _found(self) -> tuple[Finding | None, ...]:
+        """Return what records have found on the valve beside an identified friction."""
+        return (*self._monitor.findings, self._monitor.held)
 
     async def _save(self) -> str:
         self._inputs.take(is_all=True)

@@ -50,13 +50,13 @@ class StandstillWatch:
         )
 
     def findings(self) -> Sequence[Finding]:
-        """Return that the stem is held, if it is."""
+        """Return that the stem is held, if it is, in service or in the latest test."""
         still, baseline = self._standstill(), self._monitor.baseline
-        if still is None or baseline is None:
-            return []
-        settings = self._monitor.settings
-        factor = settings.limits.error_ratio
-        found = standstill_finding(still, settings.valve, baseline, factor)
+        settings, found = self._monitor.settings, None
+        if still is not None and baseline is not None:
+            factor = settings.limits.error_ratio
+            found = standstill_finding(still, settings.valve, baseline, factor)
+        found = found or self._monitor.held
         return [] if found is None else [found]
 
     def values(self) -> Mapping[str, str]:
