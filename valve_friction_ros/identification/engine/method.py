@@ -337,7 +337,7 @@ def _of_simulation(
         parameters=fit_verdicts(fits, numbers, settings, misfit, profile),
         numbers=numbers,
         misfit=misfit,
-        sliding_speed=_sliding_speed(fit, curves, follows),
+        sliding_speed=_sliding_speed(fit, curves),
         findings=(
             f"fit {100 * misfit.fit:.2f} %: the most probable model's stem is "
             f"{stem_distance(misfit.rms, valve)}; {misfit.systematic * 1e6:.3g} µm of it is not "
@@ -390,14 +390,14 @@ def _with_departures(outcome: _Outcome, departed: Departed | None) -> _Outcome:
     )
 
 
-def _sliding_speed(fit: PosteriorFit, curves: Sequence[FrictionCurve], follows: bool) -> float:
+def _sliding_speed(fit: PosteriorFit, curves: Sequence[FrictionCurve]) -> float:
     """Return the mean speed of the simulated stem over the distance, m/s.
 
-    Averages of the measured stem lose some of the speed of its jumps. A simulated stem that misses
-    the record may be faster than that; then the measured one counts.
+    How fast a stem jumps, its simulation knows as little as its sensor, but another record of the
+    same sensor is seen alike: where both speeds differ, the measured one counts.
     """
     speed = mean_speed(fit.model.simulate(fit.at).velocity)
-    if follows or not curves:
+    if not curves:
         return speed
     measured_speed = curves[0].sliding_speed
     return speed if abs(speed - measured_speed) < _SAME_SPEED * measured_speed else measured_speed

@@ -390,10 +390,11 @@ def _squares(
 ) -> float:
     """Return the sum of the squares of all steps of a stem on a grid, m².
 
-    It is that of the products of both halves, averaged as little as their noise allows.
+    It is that of the products of both halves, averaged as little as their noise allows; over the
+    `longest` number of samples where there are no two halves, whose noise would not cancel.
     """
-    step, length = float(time[1] - time[0]), 1
-    halves = stem.halves(time)
+    step, halves = float(time[1] - time[0]), stem.halves(time)
+    length = max(int(longest), 1) if halves[0] is halves[1] else 1
     while True:
         even, odd = (np.gradient(averaged_twice(half, length)) for half in halves)
         total = float(np.sum(even * odd * is_free))
