@@ -65,3 +65,14 @@ def test_a_stem_that_waits_at_the_begin_may_have_come_from_either_side():
     place = 0.02 + np.minimum(force + 1.0, 0.0) * (np.arange(1000) >= 500) * 1e-3
     found = stem_reach(Recording(0.01, 1e3 * force, place), valve, 100.0)
     assert "upper_stop" not in found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_force_that_falls_and_grows_while_the_stem_rests_proves_no_stop(seed):
+    """Noise takes the stem across the limit of its end; that is no arrival with a small force."""
+    force = np.interp(TIME, [0, 8, 12, 16, 20, 24, 30], [-600, 400, 400, -300, 300, -400, -600])
+    place = np.interp(TIME, [0, 4, 8, 24, 30], [0.008, 0.008, 0.014, 0.014, 0.010])
+    noise = 40e-6 * np.random.default_rng(seed).standard_normal(TIME.size)
+    valve = replace(BENCH_VALVE, diaphragm_area=1.0, pressure_reference=0.0)
+    found = stem_reach(Recording(0.01, force, place + noise), valve, 50.0)
+    assert found.keys() == {"lowest_position", "highest_position"}

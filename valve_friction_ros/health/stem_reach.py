@@ -29,6 +29,9 @@ _NEAR = 2e-3
 _NOISE = 6.0
 """Deviations of the averaged stem's noise within which it is there, too."""
 
+_LEFT = 2.0
+"""Distance from the end, over that within which the stem is there, at which it has left it."""
+
 _SURELY = 2.0
 """Growth of the force over F_s − F_c: a stem that has jumped too far waits for twice as much."""
 
@@ -83,7 +86,7 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
     ):
         farthest = float(np.max(side * position))
         found[end] = Measured(side * farthest, near)
-        held = _held(side * position >= farthest - near, side * force, least)
+        held = _held(farthest - side * position, near, side * force, least)
         if held.any():
             low, middle, high = np.quantile(position[held], (0.025, 0.5, 0.975)).tolist()
             found[stop] = Measured(middle, max(high - low, 0.5 * near))
@@ -145,14 +148,23 @@ def _slip_of_rests(
 
 
 def _held(
-    at_end: NDArray[np.bool_], force: NDArray[np.float64], least: NDArray[np.float64]
+    below_end: NDArray[np.float64],
+    near: float,
+    force: NDArray[np.float64],
+    least: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """Return the visits of an end in which the force grows by more than `least` after arrival.
 
-    Nothing is known of the arrival of a visit with which the record begins.
+    A visit lasts until the stem is twice as far `below_end` as it was on arrival: noise ends none,
+    so that a force which falls and grows again while the stem rests proves no stop. Nothing is
+    known of the arrival of a visit with which the record begins.
     """
-    held = np.zeros(at_end.size, dtype=np.bool_)
-    for begin, end in runs_of(at_end):
-        if begin > 0 and np.max(force[begin:end]) - force[begin] > least[begin]:
+    held = np.zeros(below_end.size, dtype=np.bool_)
+    for first, last in runs_of(below_end < _LEFT * near):
+        (there,) = np.nonzero(below_end[first:last] <= near)
+        if first == 0 or there.size == 0:
+            continue
+        begin, end = first + int(there[0]), first + int(there[-1]) + 1
+        if np.max(force[begin:end]) - force[begin] > least[begin]:
             held[begin:end] = True
     return held
