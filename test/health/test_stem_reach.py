@@ -17,6 +17,7 @@ import pytest
 
 from valve_friction_ros.health.stem_reach import stem_reach
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, Recording, SineWave, simulate
+from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 
 STICKY = replace(HIGH_FRICTION, static_friction=2 * HIGH_FRICTION.coulomb_friction)
 SLIP = STICKY.static_friction - STICKY.coulomb_friction
@@ -67,12 +68,28 @@ def test_a_stem_that_waits_at_the_begin_may_have_come_from_either_side():
     assert "upper_stop" not in found
 
 
+FORCE = np.interp(TIME, [0, 8, 12, 16, 20, 24, 30], [-600, 400, 400, -300, 300, -400, -600])
+PLACE = np.interp(TIME, [0, 4, 8, 24, 30], [0.008, 0.008, 0.014, 0.014, 0.010])
+UNIT = replace(BENCH_VALVE, diaphragm_area=1.0, pressure_reference=0.0)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_force_that_falls_and_grows_while_the_stem_rests_proves_no_stop(seed):
     """Noise takes the stem across the limit of its end; that is no arrival with a small force."""
-    force = np.interp(TIME, [0, 8, 12, 16, 20, 24, 30], [-600, 400, 400, -300, 300, -400, -600])
-    place = np.interp(TIME, [0, 4, 8, 24, 30], [0.008, 0.008, 0.014, 0.014, 0.010])
     noise = 40e-6 * np.random.default_rng(seed).standard_normal(TIME.size)
-    valve = replace(BENCH_VALVE, diaphragm_area=1.0, pressure_reference=0.0)
-    found = stem_reach(Recording(0.01, force, place + noise), valve, 50.0)
+    found = stem_reach(Recording(0.01, FORCE, PLACE + noise), UNIT, 50.0)
+    assert found.keys() == {"lowest_position", "highest_position"}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_bit_of_a_converter_proves_none_either(seed):
+    """Stamps that jitter hide it from the samples on the grid: they lie between two codes."""
+    random = np.random.default_rng(seed)
+    own = TIME + 3e-3 * random.uniform(-1.0, 1.0, TIME.size)
+    wander = np.convolve(random.standard_normal(TIME.size), np.full(100, 0.1), "same")
+    seen = np.interp(own, TIME, PLACE) + 1e-5 * wander
+    seen = 50e-6 * np.round(seen / 50e-6 + 0.5)
+    stamped = StampedRecord(StampedSignal(TIME, FORCE), StampedSignal(own, seen))
+    record = Recording(0.01, FORCE, np.interp(TIME, own, seen), stamped=stamped)
+    found = stem_reach(record, UNIT, 50.0)
     assert found.keys() == {"lowest_position", "highest_position"}

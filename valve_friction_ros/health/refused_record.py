@@ -67,7 +67,7 @@ def numbers_of_refused(
         require_within_travel(recording, valve)
         numbers |= sensor_noises(recording)
         require_motion(recording)
-        require_two_directions(recording, settings.published_window)
+        require_two_directions(recording, settings.published_window, valve.travel)
         require_travel(recording, valve)
         require_related_signals(recording)
         numbers |= stem_reach(recording, valve, math.nan)

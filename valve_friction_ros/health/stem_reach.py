@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import runs_of, sensor_noise
+from valve_friction_ros.signals import quantisation_step, runs_of, sensor_noise
 
 _MEAN = 0.1
 """Time, s, over which the stem is averaged."""
@@ -74,7 +74,9 @@ def stem_reach(recording: Recording, valve: Valve, slip_force: float) -> dict[st
         scipy.ndimage.uniform_filter1d(recording.drive, mean, mode="nearest")
     )
     noise = sensor_noise(recording.position) / math.sqrt(mean)
-    near = max(_NEAR * float(np.ptp(position)), _NOISE * noise)
+    sent = recording.position if recording.stamped is None else recording.stamped.position.value
+    step = quantisation_step(sent)  # on the grid of the record it may be interpolated away
+    near = max(_NEAR * float(np.ptp(position)), _NOISE * noise, step)
     least: NDArray[np.float64] = np.full(position.size, _SURELY * slip_force)
     if math.isnan(slip_force):
         least = _unknown_growth(position, force, recording.sample_period, near)

@@ -9,6 +9,8 @@
 
 """What a record must hold: each limit from both sides, and what a refusal says."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -123,6 +125,14 @@ def test_a_fiftieth_of_the_way_goes_back(window, sign):
     assert text.endswith(
         " mm down): friction and spring cannot be separated; record at least one stroke each way"
     )
+
+
+def test_a_way_back_that_may_be_elastic_is_none():
+    """A fourteenth of the way goes back: 0.3 % of the travel of 1 m are 3 mm, of 10 m 30 mm."""
+    there_and_back = record(triangle(0.28, 0.02))
+    require_two_directions(there_and_back, 1, 1.0)
+    assert "down)" in refusal(require_two_directions, there_and_back, 1, 10.0)
+    require_two_directions(there_and_back, 1, math.inf)
 
 
 @pytest.mark.parametrize(

@@ -444,7 +444,7 @@ def require_moving_stem(
         window = int(np.clip(len(record) // _WINDOWS, _SHORTEST_WINDOW, window))
     require_enough_samples(record, window)
     require_motion(record)
-    require_two_directions(record, window)
+    require_two_directions(record, window, valve.travel)
     require_within_travel(record, valve)
     require_changing_drive(record)
 

@@ -14,6 +14,7 @@ Where a limit is given with "simulated records", it lies between two sets of rec
 high, graphite and stribeck), which all determine the friction, and records that do not.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,11 @@ _LEAST_SHARE_OF_DIRECTION = 0.02
 """Way in the rarer direction over the whole way.
 
 Zero for one direction; 0.41 and more in simulated records. Chosen: one short stroke back counts."""
+
+_ELASTIC = 3e-3
+"""Way over the travel that a stem may go elastically, before its packing slides.
+
+Chosen: packings give by some 50 µm; 60 µm are 0.3 % of a small travel."""
 
 _LEAST_TRAVEL = 0.01
 """Range of the position over the travel.
@@ -155,17 +161,20 @@ def _distances(position: NDArray[np.float64], deadband: float) -> tuple[float, f
     return up, down
 
 
-def require_two_directions(recording: Recording, window: int) -> None:
+def require_two_directions(recording: Recording, window: int, travel: float = math.inf) -> None:
     """Refuse a stem that moves in one direction only, or hardly in the other.
 
-    The position is averaged over `window` samples first; turns within its noise do not count.
+    The position is averaged over `window` samples first; turns within its noise do not count. Nor
+    does a way that a packing may give elastically before it slides, by the `travel` of the valve,
+    m.
     """
     require_enough_samples(recording, window)
     means = len(recording) // window
     position = recording.position[: means * window].reshape(means, window).mean(axis=1)
     noise = measured(recording).white_noise / np.sqrt(window)
     up, down = _distances(position, _MOTION_OVER_NOISE * noise)
-    if min(up, down) < _LEAST_SHARE_OF_DIRECTION * (up + down):
+    elastic = _ELASTIC * travel if math.isfinite(travel) else 0.0
+    if min(up, down) < max(_LEAST_SHARE_OF_DIRECTION * (up + down), elastic):
         way = "up" if up > down else "down"
         raise LittleMotionError(
             f"the stem moved {way} only ({up * 1e3:.3g} mm up, {down * 1e3:.3g} mm down): "
