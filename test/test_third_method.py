@@ -123,7 +123,7 @@ def test_it_is_drawn(result, tmp_path):
     assert panels["width"].get_ylabel() == "half width [N]"
     assert [text.get_text() for text in panels["signature"].get_legend().get_texts()] == ["balance"]
     (note,) = panels["width"].texts
-    assert note.get_text() == "$F_c$ = 44.5 ± 2 N: identified"
+    assert note.get_text() == "$F_c$ = 44.5 ± 2.0 N: identified"
     save_picture(figure, tmp_path / "width.png")
 
 

@@ -237,6 +237,12 @@ def number_and_width(value: float, half_width: float) -> tuple[str, str]:
     return _minus(f"{value:.{places}f}"), f"± {half_width:.{max(0, min(of_width, 7))}f}"
 
 
+def with_width(value: float, half_width: float) -> str:
+    """Write a number with half the width of its interval: 152.7 ± 1.2; as given without one."""
+    number, width = number_and_width(value, half_width)
+    return f"{number} {width}" if width else _minus(f"{value:.6g}")
+
+
 def _minus(number: str) -> str:
     return f"−{number[1:]}" if number.startswith("-") else number
 
@@ -441,7 +447,7 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
     "misfit": lambda one, _: (
         f"{1e6 * one[0]:.3g} µm" if one[1] == "m" else f"{one[0]:.3g} {one[1]}"
     ),
-    "±": lambda half_width, _: f" ± {two_digits(half_width)}" if half_width else "",
+    "±": lambda one, _: with_width(one[0], one[1] or 0.0),
     "list": _listed,
     "minute": lambda time, _: utc_minute(time),
     "of": _member,
@@ -460,7 +466,13 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
 
 
 class _Writer(string.Formatter):
-    """Fills the facts into a sentence."""
+    """Fills the facts into a sentence; ``{value,half_width:±}`` takes two of them together."""
+
+    def get_value(self, key: int | str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        names = str(key).split(",")
+        if len(names) == 1:
+            return super().get_value(key, args, kwargs)
+        return tuple(kwargs[name] for name in names)
 
     def format_field(self, value: Any, format_spec: str) -> str:
         name, _, details = format_spec.partition(" ")
@@ -546,7 +558,7 @@ _MORE_STROKES = (
     "record more strokes, some fast and some slow, and state a timing_uncertainty if the clocks "
     "and lags of both signals are known"
 )
-_SLIDING_SIZE = "{value:.6g}{half_width:±} N at {speed:in .3g mm/s} mm/s"
+_SLIDING_SIZE = "{value,half_width:±} N at {speed:in .3g mm/s} mm/s"
 _HEALTHY = "call ~/set_baseline while it is healthy"
 _SET_BASELINE = "call ~/set_baseline while the valve is healthy"
 
@@ -555,7 +567,7 @@ _SENTENCES = {
     Code.COMPARED: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}",
     Code.COMPARED_AGAIN: "{state:of state}: {what} is {ratio:figures} times {healthy}; {effect}; "
     "identify it again from a longer record with more strokes to be sure",
-    Code.FRICTION_BELOW_ZERO: "{of:words} is {value:.4g} ± {half_width:two} N, and friction is "
+    Code.FRICTION_BELOW_ZERO: "{of:words} is {value,half_width:±} N, and friction is "
     "above zero: check the direction of both signals",
     Code.MOVES_BELOW_ZERO: "{moves}, sliding friction is {value:.4g} N, and friction is above "
     "zero: check the direction of both signals",
@@ -587,7 +599,7 @@ _SENTENCES = {
     Code.MEASURED_EARLIER: "{of} (measured {time:minute}; no record since shows it)",
     Code.FRICTION: "{of:words}",
     Code.FRICTION_AT: "{of:words} at {speed:in .2g mm/s} mm/s",
-    Code.FRICTION_SIZE: "{of:words} {value:.4g} ± {half_width:two} N",
+    Code.FRICTION_SIZE: "{of:words} {value,half_width:±} N",
     Code.DEAD_BAND: "the stem ignores reversals smaller than {share:percent} of its travel",
     Code.ITS_BASELINE: "its baseline",
     Code.FIRST_MOVES: "what it was until {time:minute}, when the moves of this valve were first "
@@ -597,7 +609,7 @@ _SENTENCES = {
     Code.DEAD_BAND_INTERVAL: "; the stem ignores reversals smaller than {share:in .3g %} ± "
     "{half_width:two %} % of its travel",
     Code.BASELINE: "{frictions:list |, |}",
-    Code.BASELINE_COULOMB: "coulomb friction {value:.6g}{half_width:±} N",
+    Code.BASELINE_COULOMB: "coulomb friction {value,half_width:±} N",
     Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",
     Code.SLIDING_SIZE: _SLIDING_SIZE,
     Code.BASELINE_REMARK: "it is known to ±{share:percent}: only friction that has grown to "

@@ -77,7 +77,7 @@ class TestTable:
         assert "2026-09-22 14:13:20 – refused OK too little travel: move the valve" in lines
         assert "2026-09-21 14:13:20 80 3 weak OK friction normal: so" in lines
         (drift,) = (line for line in lines if "drifts" in line)
-        assert drift.startswith("trend: coulomb friction drifts by +3 ± 0.")
+        assert drift.startswith("trend: coulomb friction drifts by +3.00 ± 0.")
         assert drift.endswith("N a month, over 20 days")
         (limit,) = (line for line in lines if "expected on" in line)
         assert limit.startswith("trend: warn_ratio (176.2 N) expected on 2027-06-1")
@@ -135,7 +135,7 @@ class TestBaselines:
         words = " ".join(run(path=changed)[1].split())
         rows = [f"2026-{row}" for row in words.split("2026-")[1:]]
         assert ["baseline" in row for row in rows] == [False, True, False, True, True]
-        old, new = "coulomb friction 141 ± 1 N", "coulomb friction 600 ± 8 N"
+        old, new = "coulomb friction 141.0 ± 1.0 N", "coulomb friction 600.0 ± 8.0 N"
         assert rows[1].startswith("2026-09-22 14:13:20 baseline ERROR set_baseline: ")
         assert rows[1].strip().endswith(f"{new}; before: {old}")
         assert rows[3].startswith("2026-09-24 14:13:20 baseline OK restore_baseline: ")

@@ -180,7 +180,7 @@ def test_the_verdict_comes_first_and_is_that_of_json(reported, quick_csv):
     assert page.lead.endswith(": plan work on the packing for the next stop.")
     told = page.table("friction")
     assert told["diagnosis"] == (diagnosis["message"],)
-    assert told["friction of the healthy valve (baseline)"] == ("coulomb friction 100 ± 2 N",)
+    assert told["friction of the healthy valve (baseline)"] == ("coulomb friction 100.0 ± 2.0 N",)
 
 
 def test_without_a_baseline(reported, quick_csv):

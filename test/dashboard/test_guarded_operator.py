@@ -10,9 +10,21 @@
 """Services are called for those alone who may operate at that moment."""
 
 import asyncio
+import time
 
 from valve_friction_ros.dashboard import Answer, ServiceRequest
+from valve_friction_ros.dashboard.alarm_list import Asked, request_of
 from valve_friction_ros.dashboard.context import GuardedOperator
+from valve_friction_ros.dashboard.history_cache import HistoryCache
+from valve_friction_ros.dashboard.kept_valves import HistoryOperator
+from valve_friction_ros.health import AlarmAction, AlarmKind, Condition, Level, StatusSignal
+from valve_friction_ros.history import (
+    AlarmFilter,
+    HistoryFile,
+    KeptValve,
+    alarm_events,
+    follow_alarms,
+)
 
 
 class Visit:
@@ -58,3 +70,32 @@ def test_without_accounts_nobody_is_logged():
     visit = Visit("", True)
     assert visit.press().success
     assert visit.logged == []
+
+
+def test_an_alarm_is_answered_in_the_file_under_the_name_of_the_account(tmp_path):
+    """The record has who, when and what; a valve that the file does not keep is called."""
+    file, valve = HistoryFile(tmp_path / "history.sqlite"), KeptValve("/fv_1/identifier", "FV-1")
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    begin = time.time_ns()
+    follow_alarms(file, valve, {AlarmKind.FRICTION_HIGH: shown}, begin)
+    cache, visit = HistoryCache(file.path), Visit("anna", False)
+    cache.refresh()
+    guarded = GuardedOperator(HistoryOperator(cache, visit), visit, visit.logged.append)
+    request = request_of(Asked(AlarmAction.ACKNOWLEDGE, "bo", "on Monday"), "friction_high")
+
+    assert not asyncio.run(guarded.call(valve.name, request)).success
+    assert len(alarm_events(file, AlarmFilter())) == 1
+    visit.may = True
+    answer = asyncio.run(guarded.call(valve.name, request))
+    assert answer == (True, "friction high: acknowledged")
+    newest = alarm_events(file, AlarmFilter())[0].event
+    assert (newest.action, newest.who, newest.text) == (
+        AlarmAction.ACKNOWLEDGE,
+        "anna",
+        "on Monday",
+    )
+    assert begin <= newest.time <= time.time_ns()
+    assert visit.logged == ["anna calls /fv_1/identifier/acknowledge"]
+    assert visit.called == []
+    asyncio.run(guarded.call("/fv_2/identifier", request))
+    assert [node for node, _ in visit.called] == ["/fv_2/identifier"]

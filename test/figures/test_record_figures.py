@@ -447,7 +447,7 @@ class TestLaw:
         *_, sliding = drawn(**LINEAR)
         assert sliding.x == [-5.0, 5.0]
         assert (sliding.y, sliding.half_width) == ([-70.0, 70.0], [2.0, 2.0])
-        assert sliding.label == "sliding friction 70 ± 2 N"
+        assert sliding.label == "sliding friction 70.0 ± 2.0 N"
 
     def test_a_record_without_a_curve_has_no_panel(self):
         assert friction_drawing(Drawing(), {FRICTION_CURVE: {}}, {}, MODEL, NAN).panels == ()

@@ -243,8 +243,8 @@ class TestDashboard:
         assert [str(q.name) for q in one.view.baseline] == ["coulomb_friction", "sliding_friction"]
 
     def test_its_alarms_are_raised_at_their_record_and_are_answered(self, shown):
-        place, valves, kept = shown
-        operator = HistoryOperator(place)
+        _, valves, kept = shown
+        operator = HistoryOperator(kept)
 
         def ask(service, **more):
             values = {"alarm_kind": "friction_high", "alarm_who": "Anna", "alarm_text": "",

@@ -54,7 +54,7 @@ def test_it_is_told_on_one_line():
     sliding = SlidingFriction(205.5, 3.25, 9.5e-3)
     assert str(Baseline(152.7)) == "coulomb friction 152.7 N"
     assert str(Baseline(152.7, 2.0, sliding)) == (
-        "coulomb friction 152.7 ± 2 N, sliding friction 205.5 ± 3.2 N at 9.5 mm/s"
+        "coulomb friction 152.7 ± 2.0 N, sliding friction 205.5 ± 3.2 N at 9.5 mm/s"
     )
     assert str(Baseline(sliding=sliding)) == "sliding friction 205.5 ± 3.2 N at 9.5 mm/s"
 

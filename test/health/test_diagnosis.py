@@ -277,13 +277,13 @@ class TestUnknownFriction:
         sliding = friction(205.5, 3.0, "sliding_friction")
         result = with_values(coulomb_friction=unknown(), sliding_friction=sliding)
         found = diagnose(result, BENCH_VALVE)
-        assert found.message == "no baseline yet; sliding friction 205.5 ± 3 N"
+        assert found.message == "no baseline yet; sliding friction 205.5 ± 3.0 N"
         found = diagnose(result, BENCH_VALVE, BASELINE)
         assert (found.level, found.ratio) == (Level.OK, None)
         assert found.message == (
             "no comparison with the baseline (coulomb friction 128 N): coulomb friction is not "
             "identifiable: the record does not determine it; the baseline has no sliding friction: "
-            "set it anew; sliding friction 205.5 ± 3 N"
+            "set it anew; sliding friction 205.5 ± 3.0 N"
         )
 
     @pytest.mark.parametrize("baseline", [None, BASELINE])
@@ -293,7 +293,7 @@ class TestUnknownFriction:
         assert (found.level, found.status_signal) == (Level.WARN, StatusSignal.CHECK_FUNCTION)
         assert found.ratio is None
         assert found.message == (
-            "coulomb friction is -20 ± 3 N, and friction is above zero: check the direction of "
+            "coulomb friction is −20.0 ± 3.0 N, and friction is above zero: check the direction of "
             "both signals"
         )
 
@@ -387,7 +387,7 @@ class TestSlidingFriction:
     def test_below_zero_it_is_a_fault_of_the_signals(self, slid):
         found = diagnose(slid(-200.0), BENCH_VALVE, Baseline(sliding=self.SLIDING))
         assert found.status_signal is StatusSignal.CHECK_FUNCTION
-        assert found.message.startswith("sliding friction is -200 ± 4 N, and friction is above")
+        assert found.message.startswith("sliding friction is −200.0 ± 4.0 N, and friction is above")
 
 
 class TestModelDoubt:
@@ -485,7 +485,7 @@ class TestWords:
         )
         assert found.message == (
             "friction normal: coulomb friction is 1.02 (1.00 to 1.04) times its baseline; "
-            "coulomb friction 20.39 ± 0.4 N"
+            "coulomb friction 20.39 ± 0.40 N"
         )
 
 

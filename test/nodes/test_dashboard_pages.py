@@ -21,8 +21,8 @@ from live_nodes import NAMESPACE, SECOND, START, buffered
 from local_server import free_port
 from records import quick_record
 
-from valve_friction_ros.health import AlarmKind, Condition, Level, StatusSignal
-from valve_friction_ros.history import HistoryFile, KeptValve, follow_alarms
+from valve_friction_ros.health import AlarmKind, AlarmState, Condition, Level, StatusSignal
+from valve_friction_ros.history import HistoryFile, KeptValve, follow_alarms, read_alarms
 from valve_friction_ros.model import HIGH_FRICTION
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed")
@@ -454,6 +454,22 @@ def test_of_many_alarms_those_near_the_view_are_drawn(plant, tab):
         page.mouse.wheel(0, 20_000)
         page.wait_for_function(f"document.querySelectorAll('tbody tr').length > {count}")
     page.get_by_text("more below").wait_for(state="detached")
+
+
+def test_an_alarm_of_a_valve_without_alarm_services_is_answered(plant, tab):
+    """An identifier beside twenty others offers none; it follows the file of the history."""
+    history = HistoryFile(plant.folder / "valve_friction_ros" / "history.sqlite")
+    node = "/crowd/fv_1/identifier"
+    shown = Condition(Level.ERROR, StatusSignal.FAILURE, "excess friction")
+    valve = KeptValve(node, "CROWD-1")
+    follow_alarms(history, valve, {AlarmKind.FRICTION_HIGH: shown}, time.time_ns())
+    page = tab.open("/alarms?area=/crowd")
+    row = page.locator("tr", has_text="friction high")
+    row.get_by_role("button", name="Acknowledge").click()
+    page.get_by_label("Your name").fill("A. Operator")
+    page.get_by_role("button", name="Confirm").click()
+    row.get_by_text("acknowledged by A. Operator").wait_for()
+    assert read_alarms(history, node)[AlarmKind.FRICTION_HIGH].state is AlarmState.ACKNOWLEDGED
 
 
 def test_what_cannot_be_called_says_so(tab):

@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     history = KeptValves(place, plant)
     history.valve("")  # refuses what is no history
     visitors = server.guarded(access, _log)
-    operator = GuardedOperator(HistoryOperator(place), visitors, _log)
+    operator = GuardedOperator(HistoryOperator(history), visitors, _log)
     context = DashboardContext(
         shown, plant, history, operator, NoSignals(), visitors, is_live=False
     )

@@ -43,14 +43,13 @@ from valve_friction_ros.identification import (
     parameter_columns,
     parameter_mapping,
     plain,
-    two_digits,
 )
 from valve_friction_ros.outside_text import harmless, printable
 from valve_friction_ros.records.whole_file import write_whole
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.streams import DAY, nanoseconds, utc, utc_day, utc_second
 from valve_friction_ros.usage import BINS, Usage, UsedDay, ValveUsage
-from valve_friction_ros.wording import Code, headline, member_words, percentage
+from valve_friction_ros.wording import Code, headline, member_words, percentage, with_width
 
 
 def _valve_table(valve: KeptValve, *columns: str) -> Table:
@@ -389,8 +388,8 @@ def _trend_lines(trend: Trend | None) -> list[str]:
     if not trend.is_significant:
         return [f"trend: no significant drift of {trend.what} over {days}"]
     lines = [
-        f"trend: {trend.what} drifts by {trend.drift:+.3g} ± {two_digits(trend.half_width)} N "
-        f"a month, over {days}"
+        f"trend: {trend.what} drifts by {'+' * (trend.drift > 0)}"
+        f"{with_width(trend.drift, trend.half_width)} N a month, over {days}"
     ]
     if trend.crossing is not None:
         expected, earliest, latest = (

@@ -18,10 +18,11 @@ from statistics import fmean, median
 from typing import TYPE_CHECKING, NamedTuple
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import AlarmKind, AlarmRequest
+from valve_friction_ros.health import Alarm, AlarmKind, AlarmRequest
 from valve_friction_ros.history import (
     AlarmFilter,
     HistoryError,
+    HistoryFile,
     HistoryServer,
     KeptAlarmEvent,
     KeptValve,
@@ -220,10 +221,22 @@ class HistoryCache:
 
         Raises HistoryError if there is none, or it cannot be written.
         """
+        return database.request_many(self._written_file(), alarms, request, time.time_ns())
+
+    def answer_valve(
+        self, valve: KeptValve, kind: AlarmKind | None, request: AlarmRequest
+    ) -> tuple[Alarm, ...]:
+        """Make a request on one alarm of a valve in the file, or on all; return them as they are.
+
+        Raises AlarmError if that is not possible now, and HistoryError as `answer` does.
+        """
+        steps = database.request_alarms(self._written_file(), valve, kind, request, time.time_ns())
+        return tuple(one.alarm for one in steps.events)
+
+    def _written_file(self) -> HistoryFile:
         if self._file is None or isinstance(self._file.place, HistoryServer):
             raise HistoryError("the history is no file of this machine: ask each identifier")
-        file = database.HistoryFile(self._file.place)
-        return database.request_many(file, alarms, request, time.time_ns())
+        return HistoryFile(self._file.place)
 
     def spark(self, node: str) -> Sparkline | None:
         """Return the picture of a valve's ratios, if there are some."""

@@ -9,6 +9,7 @@
 
 """A dashboard of what a history keeps, where no identifier is heard: nothing here needs ROS."""
 
+import asyncio
 import json
 import time
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from functools import partial
 
 from valve_friction_ros import history as database
 from valve_friction_ros.dashboard.alarm_list import action_of
-from valve_friction_ros.dashboard.context import Answer, ServiceRequest
+from valve_friction_ros.dashboard.context import Answer, Operator, ServiceRequest
 from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.dashboard.live_state import Plant, Status, Unread
 from valve_friction_ros.dashboard.live_strip import LiveStrip
@@ -146,46 +147,47 @@ def _same(status: Status) -> Status:
 
 
 class HistoryOperator:
-    """Carries out in the history what is asked of its alarms; there is nothing else to ask.
+    """Answers alarms in the file of the history, which their identifiers follow.
+
+    An identifier that shares its process with many valves offers no services for that.
 
     Parameters
     ----------
-    place : Path or HistoryServer
+    history : HistoryCache
         The history.
+    services : Operator or None
+        Calls the services of identifiers: for all else, and for the alarms of valves that the file
+        does not keep. None: no identifier is heard.
     """
 
-    def __init__(self, place: Place) -> None:
-        self._place = place
+    def __init__(self, history: HistoryCache, services: Operator | None = None) -> None:
+        self._history, self._services = history, services
 
     async def call(self, node: str, request: ServiceRequest) -> Answer:
-        """Make a request on an alarm of a valve, or on all of them."""
-        action = action_of(request)
-        if action is None:
-            return Answer(False, "no identifier is asked: this dashboard shows a history alone")
-        if isinstance(self._place, database.HistoryServer):
+        """Make a request on an alarm of a valve, or on all of them; or call another service."""
+        action, history = action_of(request), self._history
+        kept = next((one for one in history.valves if one.name == node), None)
+        if action is None or kept is None or not history.is_file:
+            if self._services is not None:
+                return await self._services.call(node, request)
+            if action is None:
+                return Answer(False, "no identifier is asked: this dashboard shows a history alone")
+            if kept is None:
+                return Answer(False, f"{node}: the history has no such valve")
             return Answer(False, "the history is on a server: ask the identifier of the valve")
-        values = request.values
-        kind = values["alarm_kind"]
-        hours = values["alarm_hours"]
+        kind, hours = request.values["alarm_kind"], request.values["alarm_hours"]
         try:
             asked = AlarmRequest(
                 action,
-                str(values["alarm_who"]),
-                str(values["alarm_text"]),
+                str(request.values["alarm_who"]),
+                str(request.values["alarm_text"]),
                 3600 * float(hours) if isinstance(hours, (int, float)) else 0.0,
             )
-            steps = database.request_alarms(
-                database.HistoryFile(self._place),
-                next(one for one in database.History(self._place).valves() if one.name == node),
-                None if kind == "all" else AlarmKind(kind),
-                asked,
-                time.time_ns(),
-            )
+            of = None if kind == "all" else AlarmKind(kind)
+            alarms = await asyncio.to_thread(history.answer_valve, kept, of, asked)
         except (AlarmError, HistoryError) as error:
             return Answer(False, str(error))
-        except StopIteration:
-            return Answer(False, f"{node}: the history has no such valve")
-        return Answer(True, "; ".join(str(one.alarm) for one in steps.events))
+        return Answer(True, "; ".join(map(str, alarms)))
 
 
 class NoSignals:

@@ -29,10 +29,10 @@ from valve_friction_ros.identification import (
     Parameter,
     Result,
     StemComparison,
-    two_digits,
 )
 from valve_friction_ros.model import Recording
 from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.wording import with_width
 
 _TITLE_WIDTH, _NOTE_WIDTH = 95, 130
 """Characters of a line of the title and of the notes, which fill the width of the figure."""
@@ -272,8 +272,7 @@ def _told(parameter: Parameter) -> str:
     symbol = SYMBOLS.get(parameter.name, parameter.name)
     if math.isnan(parameter.value):
         return f"${symbol}$ {parameter.verdict.value}"
-    interval = f" ± {two_digits(parameter.half_width)}" if parameter.half_width > 0 else ""
-    value = f"{number(parameter.value)}{interval} {parameter.unit}"
+    value = f"{with_width(parameter.value, parameter.half_width)} {parameter.unit}"
     return f"${symbol}$ = {value}: {parameter.verdict.value}"
 
 

@@ -162,7 +162,7 @@ class Baseline:
     >>> import valve_friction_ros as vf
     >>> healthy = vf.Baseline(coulomb_friction=150.0, half_width=2.0)
     >>> print(healthy)
-    coulomb friction 150 ± 2 N
+    coulomb friction 150.0 ± 2.0 N
     """
 
     coulomb_friction: float | None = None

@@ -22,7 +22,7 @@ from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.wording import two_digits
+from valve_friction_ros.wording import with_width
 
 FRICTION_CURVE = "friction_curve"
 """Name of the evidence that holds friction over speed, SI units (`FrictionCurve`)."""
@@ -79,7 +79,7 @@ def friction_drawing(
                 [-1e3 * sliding_speed, 1e3 * sliding_speed],
                 [-sliding.value, sliding.value],
                 "D",
-                f"sliding friction {sliding.value:.4g} ± {two_digits(sliding.half_width)} N",
+                f"sliding friction {with_width(sliding.value, sliding.half_width)} N",
                 [sliding.half_width] * 2,
             )
         )

@@ -41,7 +41,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord, began
 from valve_friction_ros.reports.page import Column, PageTable, Verbatim
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import percentage, with_width
 
 _WORDS = {
     "mass": "moving mass m",
@@ -164,7 +164,7 @@ def friction_table(record: IdentifiedRecord) -> PageTable:
                 )
             )
         rows += [
-            ("excess friction", f"{excess:+.4g} N ± {two_digits(width)} N"),
+            ("excess friction", f"{'+' * (excess > 0)}{with_width(excess, width)} N"),
             (
                 "friction over baseline",
                 f"{ratio.what}: {ratio.value:.2f}, "
@@ -307,7 +307,7 @@ def valve_table(record: IdentifiedRecord) -> PageTable | None:
 
 
 def _size(one: Measured) -> str:
-    return f"{one.value:.5g} ± {two_digits(one.half_width)}"
+    return with_width(one.value, one.half_width)
 
 
 def _change(change: Measured, is_ratio: bool) -> str:

@@ -38,12 +38,12 @@ from valve_friction_ros.health import (
     valve_numbers,
 )
 from valve_friction_ros.history import ValveHistory
-from valve_friction_ros.identification import SLIDING, Parameter, Result, Verdict, two_digits
+from valve_friction_ros.identification import SLIDING, Parameter, Result, Verdict
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.reports.page import Colour, Conclusion
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import LimitState, ValveUsage
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import percentage, with_width
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,9 +316,7 @@ def _friction(record: IdentifiedRecord) -> Parameter:
 def _found(record: IdentifiedRecord) -> _Finding:
     friction, diagnosis = _friction(record), record.diagnosis
     if diagnosis.ratio is None:
-        size = f"{friction.value:.4g}"
-        if friction.verdict is not Verdict.FIXED:
-            size += f" ± {two_digits(friction.half_width)}"
+        size = with_width(friction.value, friction.half_width)
         advice = "set a baseline, the friction of the healthy valve"
         if record.baseline is not None:
             advice = "move the valve as its baseline was taken, and identify it again"

@@ -25,6 +25,7 @@ from valve_friction_ros.dashboard import DashboardOptions, Plant
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
 from valve_friction_ros.dashboard.context import INSTALL, DashboardContext, GuardedOperator
 from valve_friction_ros.dashboard.history_cache import HistoryCache
+from valve_friction_ros.dashboard.kept_valves import HistoryOperator
 from valve_friction_ros.dashboard.live_state import Sources
 from valve_friction_ros.history import server_from
 from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
@@ -184,11 +185,12 @@ def _serve(node: Dashboard, limited: contextlib.ExitStack) -> int:
     except (*WRONG_REQUESTS, OSError) as error:
         stop.is_followed = True
         return cannot_start(error)
+    history = HistoryCache(options.history)
     context = DashboardContext(
         options,
         node.plant,
-        HistoryCache(options.history),
-        GuardedOperator(node.calls, visitors, log),
+        history,
+        GuardedOperator(HistoryOperator(history, node.calls), visitors, log),
         node.signals,
         visitors,
     )
