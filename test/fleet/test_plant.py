@@ -232,13 +232,14 @@ class TestDashboard:
         return heard["FV-101"]
 
     def test_it_shows_the_trend_and_when_the_limit_is_crossed(self, shown):
-        """The truth: 10 N a month; 2 x (150 N and 24 N of viscous friction) on 2026-12-15."""
+        """The truth: F_c grows by 10 N a month, from 150 N on 2025-07-03 to twice that."""
         one = self.view(shown[1])
         assert (state_of(one), one.view.signal.value) == ("warn", "M")
         assert one.view.ratio.value == pytest.approx(1 + 4 * GROWTH, rel=0.05)
         drift = one.view.drift
         assert abs(drift.value - 10.0) < drift.half_width < 5.0
-        assert drift.expected.earliest < "2026-12-15" < drift.expected.latest
+        assert drift.of == "coulomb friction"
+        assert drift.expected.earliest < "2026-10-03" < drift.expected.latest
         assert one.view.parameter("spring_constant").value == pytest.approx(2.05e5, rel=0.01)
         assert [str(q.name) for q in one.view.baseline] == ["coulomb_friction", "sliding_friction"]
 
