@@ -241,7 +241,7 @@ class TestDashboard:
         assert drift.of == "coulomb friction"
         assert drift.expected.earliest < "2026-10-03" < drift.expected.latest
         assert one.view.parameter("spring_constant").value == pytest.approx(2.05e5, rel=0.01)
-        assert [str(q.name) for q in one.view.baseline] == ["coulomb_friction", "sliding_friction"]
+        assert [str(q.name) for q in one.view.baseline] == ["coulomb_friction"]
 
     def test_its_alarms_are_raised_at_their_record_and_are_answered(self, shown):
         _, valves, kept = shown

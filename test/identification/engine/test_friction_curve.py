@@ -221,7 +221,9 @@ class TestRival:
     ONE = Estimated(100.0, 20.0, Budget(10.0, 0.0, {}))
 
     def test_a_near_one_is_in_the_interval(self):
-        assert replace(self.ONE, rival=70.0).with_rival.half_width == pytest.approx(33.0)
+        wide = replace(self.ONE, rival=70.0).with_rival
+        assert wide.half_width == pytest.approx(33.0)
+        assert wide.own_half_width == pytest.approx(self.ONE.own_half_width, rel=0.03)
         assert replace(self.ONE, rival=90.0).with_rival.half_width == 20.0
         assert self.ONE.with_rival == self.ONE
 

@@ -140,11 +140,19 @@ class Estimated:
 
     @property
     def with_rival(self) -> "Estimated":
-        """The same; where it is weak anyway, its interval reaches beyond a rival that is near."""
-        apart = abs(self.rival - self.value)
+        """The same; where it is weak anyway, its interval reaches beyond a rival that is near.
+
+        The sensor is that of any other record of the valve, which is then wrong alike.
+        """
+        reach = _BEYOND * abs(self.rival - self.value)
         if self.half_width <= WEAK_SHARE * abs(self.value) or self.has_rival:
             return self
-        return replace(self, half_width=float(np.fmax(self.half_width, _BEYOND * apart)))
+        if not reach > self.half_width:
+            return self
+        more = math.sqrt(reach**2 - self.half_width**2) / NORMAL_QUANTILE
+        timing, shared = (math.hypot(one, more) for one in (self.budget.timing, self.budget.shared))
+        budget = replace(self.budget, timing=timing, shared=shared)
+        return replace(self, half_width=reach, budget=budget)
 
 
 def _vector(fit: PosteriorFit, number: ReportedNumber) -> NDArray[np.float64]:
