@@ -504,7 +504,7 @@ def _unknown_parameters(plan: StrokePlan) -> Iterator[str]:
         share = plan.likely.relative(name)
         if share <= _UNKNOWN_REL_HALF_WIDTH:
             continue
-        why = f"is known to ±{percentage(share)} only" if math.isfinite(share) else "is not told"
+        why = f"is known to ±{percentage(share)} only" if math.isfinite(share) else "stays unknown"
         remedy = "allow more time, speed or travel"
         if name == "viscous_friction":
             remedy = "its delay F_v/k cannot be told from a lag of the signals: state a smaller "
