@@ -196,10 +196,9 @@ def alarms(answer: Answer, healthy: Answer) -> dict[str, str]:
     """
     baseline = Baseline.of(healthy.native) if healthy.native and is_baseline(healthy) else None
     if answer.native is None:
-        valve = None if healthy.native is None else healthy.native.valve
-        if baseline is None or valve is None:
+        if baseline is None or healthy.native is None:
             return {}
-        held = held_finding(answer.held, baseline, valve, FrictionLimits())
+        held = held_finding(answer.held, baseline, healthy.native.valve, FrictionLimits())
         return {} if held is None else {"high": _words(held)}
     friction, findings = diagnose_valve(answer.native, baseline)
     found = {}

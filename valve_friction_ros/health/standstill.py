@@ -111,9 +111,9 @@ def _means(samples: Samples, length: int) -> dict[int, _Mean]:
 class StandstillCounter:
     """Follows the samples of a valve; keeps the present standstill, and no samples.
 
-    A block is still where the stem's mean has stayed and its deviation is small. The
-    pressure of a block counts once the stem is still in a later one: so a stem has had the time to
-    move, and a sensor to say so.
+    A block is still where the stem's mean has stayed and its deviation is small. The pressure of a
+    block counts once the stem is still in a later one: so a stem has had the time to move, and a
+    sensor to say so.
 
     Parameters
     ----------

@@ -35,7 +35,11 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     away_from_stops,
     force_and_stem,
 )
-from valve_friction_ros.identification.trust.uncertainty import NORMAL_QUANTILE, half_width
+from valve_friction_ros.identification.trust.uncertainty import (
+    MEDIAN_MAGNITUDE,
+    NORMAL_QUANTILE,
+    half_width,
+)
 from valve_friction_ros.model.stamped import StampedRecord
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import runs_of
@@ -81,10 +85,9 @@ both are known to that share of a length and a sample."""
 
 _FEWEST_OF_LINE = 3
 _OUTLIER = 4.0
-_MEDIAN = 0.6745
 _CENTRAL = 0.8
-"""Deviations beyond which a departure loses weight; median of a standard normal magnitude; and the
-share of the departures whose scatter widens the interval."""
+"""Deviations beyond which a departure loses weight; and the share of the departures whose scatter
+widens the interval."""
 
 _CONTRADICTED = 3.0
 """Standard deviations beyond which the departures contradict the spring of the sliding stem."""
@@ -333,7 +336,7 @@ def _estimated(
     estimate, covariance = expected, np.eye(expected.size)
     for _ in range(_ROUNDS):
         deviating = left / np.sqrt(variance)
-        inflated = max(float(np.median(deviating)) / _MEDIAN, 1.0)
+        inflated = max(float(np.median(deviating)) / MEDIAN_MAGNITUDE, 1.0)
         weight = np.minimum(1.0, _OUTLIER * inflated / np.maximum(deviating, 1e-12)) ** 2
         rows = weight / (variance * inflated**2)
         information = columns.T @ (rows[:, None] * columns) + np.diag(precision)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import stamped_noise, without_repeats
@@ -67,9 +68,9 @@ _END_NOISE = 3e-3
 Noise that lasts is alike in both halves of the samples, and lengthens each stroke by some
 deviations."""
 
-_FINEST_STEP, _SHARED, _MEDIAN = 4e-3, 4, 0.6745
-"""Time, s, over which the stem is averaged at least for that; samples that share what they average;
-and the median magnitude of standard normal numbers."""
+_FINEST_STEP, _SHARED = 4e-3, 4
+"""Time, s, over which the stem is averaged at least for that; and samples that share what they
+average."""
 
 _COVERED = 0.7
 """Least share of the distance that a stem has left after averaging, else it turns round within."""
@@ -317,7 +318,7 @@ def _lasting_noise(position: _Array) -> float:
     deviation s have √70·s.
     """
     fourth = np.abs(np.diff(position[::_SHARED], _SHARED))
-    return float(np.median(fourth)) / (_MEDIAN * math.sqrt(70.0)) if fourth.size else 0.0
+    return float(np.median(fourth)) / (MEDIAN_MAGNITUDE * math.sqrt(70.0)) if fourth.size else 0.0
 
 
 class Work(NamedTuple):
@@ -326,15 +327,14 @@ class Work(NamedTuple):
     Averages lose the work of fast moves. `along` are the moves over the distance of all strokes;
     noise in them is not that of the force, so that it biases nothing. `noise`, N, is what chance
     makes of the work, half of what averaging over twice the time does, and what is open of the
-    distance. `speed` is the mean one
-    over the distance, m/s, by the product of two halves of the samples.
+    distance. `speed` is the mean one over the distance, m/s, by the product of two halves of the
+    samples.
     """
 
     time: _Array
     force: _Array
     position: _Array
     along: _Array
-    distance: float
     strokes: int
     noise: float
     speed: float
@@ -360,7 +360,7 @@ class Work(NamedTuple):
             along = np.gradient(position) * is_free / path.distance
             # Twice averaged noise is that of some samples at a time: as much as of each alone.
             noise = force.noise * math.sqrt(step / force.period * float(along @ along))
-            return cls(time, pressed, position, along, path.distance, path.strokes, noise, speed)
+            return cls(time, pressed, position, along, path.strokes, noise, speed)
 
         work = by(length)
         while work.noise > _WORK_NOISE * abs(work.of_friction) and 2 * length <= longest:

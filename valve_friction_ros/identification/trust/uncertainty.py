@@ -24,6 +24,9 @@ CONFIDENCE = 0.95
 NORMAL_QUANTILE = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 """Half width over the standard deviation of a normal error: 1.96."""
 
+MEDIAN_MAGNITUDE = 0.6745
+"""Median magnitude of a normal error over its standard deviation."""
+
 _LEAST_FREEDOM = 0.05
 """Degrees of freedom below which nothing is known: the interval is 10²⁰ standard errors wide."""
 
