@@ -74,6 +74,9 @@ _FAR = 0.5
 """Share of that work by which a fit may differ from it before it is doubted, however well it
 follows the stem: a lag alone makes up for less."""
 
+ROUNDING = "rounding"
+"""Source of doubt of a number: the step of the converter of the force."""
+
 _FINEST = {SLIDING: FINEST_SLIDING, "spring_constant": 2e-4}
 _FINEST_OTHER = 5e-4
 """No interval is narrower than this share of its value, however quiet the record is."""
@@ -90,7 +93,7 @@ class Budget:
     timing : float
         Lag between the signals.
     sources : mapping of str to float
-        Of each imperfection whose prior counts, timing among them.
+        Of each imperfection whose prior counts, timing among them, and of the force's converter.
     shared : float
         Part of the timing that the record says nothing of: another record of the same sensors is
         wrong the same way.
@@ -132,6 +135,16 @@ class Estimated:
     def own_half_width(self) -> float:
         """The other part: both add in squares."""
         return math.sqrt(max(self.half_width**2 - self.shared_half_width**2, 0.0))
+
+    @property
+    def rounding(self) -> float:
+        """Part of the half width that comes from the converter of the force."""
+        return NORMAL_QUANTILE * self.budget.sources.get(ROUNDING, 0.0)
+
+    @property
+    def but_rounding(self) -> float:
+        """The other part: both add in squares."""
+        return math.sqrt(max(self.half_width**2 - self.rounding**2, 0.0))
 
     @property
     def has_rival(self) -> bool:

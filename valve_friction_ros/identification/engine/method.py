@@ -272,9 +272,13 @@ def _comparable(sliding: Estimated, exponent: Estimated | None) -> dict[str, flo
 
 
 def _dissipates(balanced: Mapping[str, Estimated]) -> bool:
-    """Whether friction surely takes work from the force, as it does where both are of one valve."""
-    sliding = balanced.get(SLIDING)
-    return sliding is not None and sliding.half_width < _CLEARLY * sliding.value
+    """Whether friction surely takes work from the force, as it does where both are of one valve.
+
+    A force that its converter rounds coarsely may be that valve's.
+    """
+    if (sliding := balanced.get(SLIDING)) is None:
+        return False
+    return sliding.value > max(sliding.rounding, sliding.but_rounding / _CLEARLY)
 
 
 class _Outcome(NamedTuple):

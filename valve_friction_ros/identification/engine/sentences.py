@@ -12,7 +12,7 @@
 import math
 
 from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING
-from valve_friction_ros.identification.engine.intervals import Budget
+from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.wording import percentage
@@ -37,7 +37,12 @@ _LEAST = {
 }
 """Least size of an imperfection that is worth a sentence, in its own unit."""
 
-_START = "where the stem was at first"
+_OTHERS = {
+    "start_position": "where the stem was at first",
+    ROUNDING: "the force within a step of its converter",
+}
+"""Words of the sources of doubt that are no imperfections."""
+
 _SHARE = 0.2
 """Share of the variance from which on a source is named."""
 
@@ -91,7 +96,7 @@ def main_doubt(budget: Budget, width: str) -> str:
     """
     total = sum(source**2 for source in budget.sources.values()) + budget.record**2
     named = [
-        _START if name == "start_position" else IMPERFECTIONS[name].words
+        _OTHERS[name] if name in _OTHERS else IMPERFECTIONS[name].words
         for name, source in sorted(budget.sources.items(), key=lambda item: -item[1])
         if source**2 > _SHARE * total
     ]

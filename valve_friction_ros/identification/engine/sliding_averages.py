@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import stamped_noise, without_repeats
+from valve_friction_ros.signals import quantisation_step, stamped_noise, without_repeats
 
 _Array = NDArray[np.float64]
 
@@ -71,6 +71,9 @@ deviations."""
 _FINEST_STEP, _SHARED = 4e-3, 4
 """Time, s, over which the stem is averaged at least for that; and samples that share what they
 average."""
+
+_STUCK = 5
+"""Equal samples from which on noise does not carry a signal across the steps of its converter."""
 
 _COVERED = 0.7
 """Least share of the distance that a stem has left after averaging, else it turns round within."""
@@ -327,8 +330,8 @@ class Work(NamedTuple):
     Averages lose the work of fast moves. `along` are the moves over the distance of all strokes;
     noise in them is not that of the force, so that it biases nothing. `noise`, N, is what chance
     makes of the work, half of what averaging over twice the time does, and what is open of the
-    distance. `speed` is the mean one over the distance, m/s, by the product of two halves of the
-    samples.
+    distance; `rounding`, N, what the converter of the force does. `speed` is the mean one over the
+    distance, m/s, by the product of two halves of the samples.
     """
 
     time: _Array
@@ -337,6 +340,7 @@ class Work(NamedTuple):
     along: _Array
     strokes: int
     noise: float
+    rounding: float
     speed: float
     by_lag: _Array = WORK_LAGS
 
@@ -360,7 +364,8 @@ class Work(NamedTuple):
             along = np.gradient(position) * is_free / path.distance
             # Twice averaged noise is that of some samples at a time: as much as of each alone.
             noise = force.noise * math.sqrt(step / force.period * float(along @ along))
-            return cls(time, pressed, position, along, path.strokes, noise, speed)
+            rounding = _rounding(force, time, along)
+            return cls(time, pressed, position, along, path.strokes, noise, rounding, speed)
 
         work = by(length)
         while work.noise > _WORK_NOISE * abs(work.of_friction) and 2 * length <= longest:
@@ -383,6 +388,25 @@ class Work(NamedTuple):
             for lag in WORK_LAGS
         ]
         return self._replace(by_lag=np.array(seen))
+
+
+def _rounding(force: MeasuredSignal, time: _Array, along: _Array) -> float:
+    """Return the deviation, N, that the converter of the force makes of its work over the distance.
+
+    A force that stays within one step of the converter is off by the same part of the step
+    throughout, which no averaging removes; likewise whenever it comes back there the same way.
+    """
+    step = quantisation_step(force.value)
+    if step == 0.0:
+        return 0.0
+    level = np.unique(force.value, return_inverse=True)[1]
+    begins = np.flatnonzero(np.diff(level, prepend=-1))
+    lengths = np.diff(begins, append=level.size)
+    stuck = np.repeat(lengths >= _STUCK, lengths)
+    sample = np.clip(np.searchsorted(force.time, time, side="right") - 1, 0, level.size - 1)
+    weight = along * stuck[sample]
+    shares = np.bincount(2 * level[sample] + (along > 0), weight)
+    return step / math.sqrt(12.0) * float(np.linalg.norm(shares))
 
 
 def _squares(

@@ -180,7 +180,7 @@ def curve_misfit(curve: FrictionCurve, sliding: Estimated) -> Misfit:
     As for a simulation, the model is doubted only where the sliding friction stays uncertain.
     """
     systematic = curve.misfit * math.sqrt(max(1.0 - 1.0 / curve.inflation, 0.0))
-    describes = sliding.half_width <= _TWO * USABLE * abs(sliding.value)
+    describes = sliding.but_rounding <= _TWO * USABLE * abs(sliding.value)
     tolerated = systematic if describes else 0.5 * systematic
     return Misfit(curve.fit, curve.misfit, systematic, tolerated, "N")
 
