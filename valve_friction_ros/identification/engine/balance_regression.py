@@ -63,7 +63,7 @@ _CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "dri
 """Terms of the force that are not friction."""
 
 _OUTLIER = 5.0
-_LEAST_MISFIT = 3e-4
+_LEAST_MISFIT = 5e-3
 """Deviations beyond which an average is left out, and the share of the friction to which no force
 balance is trusted further."""
 
