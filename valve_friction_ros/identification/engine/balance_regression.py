@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.engine.imperfections import (
     IMPERFECTIONS,
     MASS_PER_AREA,
+    sensor_span,
     zero_drift,
 )
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
@@ -190,7 +191,7 @@ class Regression:
             "spring_constant": (averages.position, math.inf),
             "curvature": ([one**2 - 1.0 / 3.0 for one in places], shares["curvature"] * stiff),
             "cubic": ([one * (one * one - 0.6) for one in places], shares["cubic"] * stiff),
-            "drift": ([age, age], zero_drift(span, minutes)),
+            "drift": ([age, age], zero_drift(sensor_span(force), minutes)),
             "along_travel": (
                 [side * one for one in places],
                 shares["along_travel"] * self.friction,

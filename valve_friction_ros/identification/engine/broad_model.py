@@ -31,7 +31,11 @@ from valve_friction_ros.identification.engine.driven_stem import (
     read_stem,
 )
 from valve_friction_ros.identification.engine.fitted_record import FittedRecord
-from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, TIMING
+from valve_friction_ros.identification.engine.imperfections import (
+    IMPERFECTIONS,
+    TIMING,
+    sensor_span,
+)
 from valve_friction_ros.identification.engine.weights import reading_weights
 
 ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
@@ -110,7 +114,7 @@ class BroadModel:
             record.period,
             record.travel,
             slow.range,
-            float(np.ptp(record.force)),
+            sensor_span(record.force),
             force,
             slow.place,
             slow.age,

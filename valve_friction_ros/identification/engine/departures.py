@@ -26,7 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.engine.balance_regression import LagPrior
-from valve_friction_ros.identification.engine.imperfections import IMPERFECTIONS, zero_drift
+from valve_friction_ros.identification.engine.imperfections import (
+    IMPERFECTIONS,
+    sensor_span,
+    zero_drift,
+)
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
 from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
@@ -193,7 +197,7 @@ def _departures(
                 rows.append(row)
     found = np.array(rows).reshape(-1, 6)
     minutes = float(force.time[-1] - force.time[0]) / 60.0
-    drift = zero_drift(float(np.ptp(force.value)), minutes)
+    drift = zero_drift(sensor_span(force.value), minutes)
     side, applied, rate, place, error, fall = found[away_from_stops(found[:, 3], valve)].T
     return _Departures(side, applied, rate, place, error, fall, drift)
 

@@ -37,7 +37,7 @@ class Course(NamedTuple):
     travel : float
         Of the valve, m.
     stroke, span : float
-        Range of the measured positions, m, and of the force, N.
+        Range of the measured positions, m, and of the sensor of the force, N.
     force : ndarray of float, shape (g,)
         Actuator force, N.
     place, age : ndarray of float, shape (g,)

@@ -19,6 +19,9 @@ from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class Profile(Enum):
     """What is known beforehand of a valve and its instruments.
@@ -114,9 +117,17 @@ _OF_THE_MODEL = (*TIMING, "mass", "slip_force", "stribeck_velocity")
 def zero_drift(span: float, minutes: float) -> float:
     """Return the deviation of what the zero of a force drifts by from the middle of a record on, N.
 
-    `span` is the range of the force, N; with 1 it is a share of that.
+    `span` is the range of its sensor, N (`sensor_span`); with 1 it is a share of that.
     """
     return IMPERFECTIONS["drift"].deviation * span * max(minutes, _LEAST_MINUTES)
+
+
+def sensor_span(force: NDArray[np.float64]) -> float:
+    """Return the range, N, that the sensor of a force has at least, whose zero drifts with it.
+
+    In a partial stroke the force, N, above that of the reference pressure hardly changes.
+    """
+    return max(float(np.ptp(force)), float(np.max(np.abs(force))))
 
 
 def deviations(

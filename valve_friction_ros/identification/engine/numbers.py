@@ -17,7 +17,7 @@ import numpy as np
 
 from valve_friction_ros.identification.engine.broad_model import BroadModel
 from valve_friction_ros.identification.engine.coordinates import Coordinates
-from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.imperfections import TIMING, sensor_span
 from valve_friction_ros.identification.trust.sliding import mean_over_distance, mean_speed
 
 RECTANGLE = 1.0 / math.sqrt(3.0)
@@ -97,7 +97,7 @@ def reported_numbers(
     middle = 0.5 * (slow.lowest + slow.highest)
     seat = -2.0 * middle / slow.range
     bow = RECTANGLE * curve * spring * slow.range * max(abs(seat**2 - 1 / 3), 2 / 3)
-    drift = RECTANGLE * abs(at["drift"]) * float(np.ptp(model.record.force))
+    drift = RECTANGLE * abs(at["drift"]) * sensor_span(model.record.force)
     preload = math.hypot(bow, stiffness * abs(middle), drift, asymmetry * dry)
     static_gradient = {"coulomb_friction": 1.0, "slip_force": 1.0}
     numbers = {
