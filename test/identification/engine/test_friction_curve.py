@@ -9,6 +9,7 @@
 
 """Friction over speed without a simulation: what it recovers, and what it may not say."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from valve_friction_ros.identification.engine.friction_curve import (
     curve_numbers,
     friction_curves,
 )
+from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
 from valve_friction_ros.identification.engine.sliding_averages import (
     _lengths,
@@ -33,7 +35,7 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     _turns,
     averaged_twice,
 )
-from valve_friction_ros.model import KarnoppParameters, StemState, Valve, advance, simulate
+from valve_friction_ros.model import Drive, KarnoppParameters, StemState, Valve, advance, simulate
 from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
 
 PERIOD = 1e-3
@@ -411,16 +413,19 @@ class TestCheckOfASimulation:
     @pytest.mark.parametrize(
         ("simulated", "balanced", "follows", "slip_force", "expected"),
         [
-            ((100.0, 2.0), (104.0, 3.0), True, 0.0, (100.0, 2.0)),
+            ((100.0, 4.0), (109.0, 3.0), True, 0.0, (100.0, 5.0)),
             ((100.0, 9.0), (104.0, 3.0), True, 0.0, (104.0, 5.0)),
             ((100.0, 2.0), (104.0, 3.0), False, 0.0, (104.0, 5.0)),
-            ((100.0, 9.0), (104.0, 3.0), True, 40.0, (100.0, 9.0)),
+            ((100.0, 4.0), (109.0, 3.0), True, 40.0, (100.0, 5.0)),
             ((100.0, 9.0), (104.0, 3.0), False, 40.0, (104.0, 13.0)),
         ],
         ids=["sharper", "blunter", "misfit", "slips", "slips, misfit"],
     )
     def test_what_the_friction_is_made_of(self, simulated, balanced, follows, slip_force, expected):
-        """The half widths are 3 and 4, and 0.3 of the slip force: 5, 12 and 13."""
+        """The half widths are 3 and 4, and 0.3 of the slip force: 5, 12 and 13.
+
+        A simulated one is also widened by a third of what both differ, 3 of 9.
+        """
         found = checked_by_curve(
             {"coulomb_friction": number(*simulated)},
             {"coulomb_friction": number(*balanced)},
@@ -440,3 +445,42 @@ class TestCheckOfASimulation:
         ours = {SLIDING: number(100.0, 9.0)}
         impossible = {SLIDING: number(-5.0, 200.0)}
         assert checked_by_curve(ours, impossible, False) == ours
+
+
+class TestConverterOfTheForce:
+    """A force that stays within one step of its converter throughout each stroke."""
+
+    STEP, FRICTION = 10.0, 8.0
+
+    def balanced(self, noise: float):
+        """Regress a machine without a spring that goes to and fro, at ±8 N of friction."""
+        time = np.arange(0.0, 40.0, 0.005)
+        position = 0.01 * np.sin(0.5 * math.pi * time)
+        force = self.FRICTION * np.sign(np.cos(0.5 * math.pi * time))
+        force = force + noise * np.random.default_rng(0).standard_normal(time.size)
+        force[0] = 0.0
+        seen = self.STEP * np.rint(force / self.STEP)
+        record = StampedRecord(
+            StampedSignal(time, seen), StampedSignal(time, position), Drive.FORCE
+        )
+        return curve_numbers(friction_curves(record, Valve(), fixed={"spring_constant": 0.0}))
+
+    def test_what_is_hidden_within_a_step_is_in_the_interval(self):
+        """Each direction is off by a part of the step, evenly: by 1/√24 of it are both together."""
+        one = self.balanced(noise=0.0)[SLIDING]
+        assert one.value == pytest.approx(self.STEP, rel=0.02)
+        assert one.rounding == pytest.approx(1.96 * self.STEP / math.sqrt(24.0), rel=0.05)
+        assert abs(one.value - self.FRICTION) < one.half_width < 0.5 * self.STEP
+
+    def test_noise_that_carries_the_force_across_steps_lifts_it(self):
+        one = self.balanced(noise=self.STEP)[SLIDING]
+        assert abs(one.value - self.FRICTION) < one.half_width
+        assert one.rounding < 0.02 * self.STEP
+
+
+def test_the_zero_drifts_with_the_range_of_the_sensor_whatever_the_stroke():
+    """A tenth of the travel at 9 kN: the sensor is the same as that of a full stroke."""
+    full, partial = np.array([1000.0, 9000.0]), np.array([8200.0, 9000.0])
+    assert sensor_span(full) == sensor_span(partial) == sensor_span(-partial) == 9000.0
+    assert sensor_span(np.array([-500.0, 500.0])) == 1000.0
+    assert zero_drift(sensor_span(partial), minutes=2.0) == pytest.approx(18.0)

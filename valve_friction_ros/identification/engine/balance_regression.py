@@ -64,9 +64,10 @@ _CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "dri
 """Terms of the force that are not friction."""
 
 _OUTLIER = 5.0
-_LEAST_MISFIT = 5e-3
+_LEAST_MISFIT, _LEAST_OF_MACHINE = 5e-3, 3e-4
 """Deviations beyond which an average is left out, and the share of the friction to which no force
-balance is trusted further."""
+balance is trusted further: less than that of a packing is taken for a stiffer spring, or a friction
+that changes; without a spring there is nothing to take it for."""
 
 _CHANCE, _OVERLAP, _LEAST_SHARED = 3.0, 3.0, 1e-9
 """Deviations of chance that the share of the information must exceed which both halves have in
@@ -291,6 +292,12 @@ class Regression:
             lag, estimate, covariance, residual, weight, columns, precision, expected, scale
         )
 
+    @property
+    def least_variance(self) -> float:
+        """Variance of an average to which the balance is trusted, N²."""
+        share = _LEAST_MISFIT if self.spring > 0.0 else _LEAST_OF_MACHINE
+        return float(share * self.friction) ** 2
+
     def noise_variance(self, solved: _Solved) -> float:
         """Variance of an average that the sensors explain, N²."""
         noise, values = self.averages.noise, self.values(solved)
@@ -322,8 +329,7 @@ class Regression:
             total, misfit = np.abs(solved.residual[0] + solved.residual[1]), solved.misfit
             usual = 1.35 * _OUTLIER * misfit + 1e-9 * self.friction
             weight = (total <= usual).astype(np.float64)
-            floor = (_LEAST_MISFIT * self.friction) ** 2
-            variance = max(misfit**2, 0.5 * self.noise_variance(solved), floor)
+            variance = max(misfit**2, 0.5 * self.noise_variance(solved), self.least_variance)
             lag = self.later(solved)
         return solved._replace(weight=weight), variance
 
@@ -357,8 +363,7 @@ class Regression:
             mean = 0.5 * (solved.residual[0] + solved.residual[1]) * solved.weight
             count = max(float(np.sum(solved.weight)), 1.0)
             lasting = float(np.sum(solved.weight * solved.residual[0] * solved.residual[1])) / count
-            floor = (_LEAST_MISFIT * self.friction) ** 2
-            variance = self.noise_variance(solved) + max(lasting, floor)
+            variance = self.noise_variance(solved) + max(lasting, self.least_variance)
             power = float(mean @ mean) / count
             inflated = max(power / variance, 1.0) * inflation(
                 mean / math.sqrt(max(power, np.finfo(float).tiny)),

@@ -81,8 +81,8 @@ like a lag may then be none, as in a packing that creeps before it slides. And h
 is at least then, over the likeliest."""
 
 _PULL = 1.0 / 3.0
-"""Share of the difference from the force balance that widens the interval of a simulated spring:
-what only its transients know is known no better."""
+"""Share of the difference from the force balance that widens the interval of a simulated number:
+what only the transients know is known no better."""
 
 _ROUNDED = {SLIDING: 1.0, "spring_preload": 1.0, "coulomb_friction": 2.0, "static_friction": 2.0}
 """Numbers that a converter of the force rounds, over what it does to its work: that at one speed,
@@ -287,10 +287,10 @@ def checked_by_curve(
     Where the simulated stem `follows` the record to within noise, a number comes from the one that
     knows it better; spring, preload and sliding friction from the simulation where both exclude
     each other, as reversals and rests tell it a lag from a viscous friction; a part of their
-    difference then widens the intervals of spring and preload. Where the stem does not follow, they
-    come from the force balance. What both divide between dry and viscous friction is uncertain by
-    what they differ, and F_c also by a `slip_force`, N, of which no one knows at which speed it is
-    gone.
+    difference then widens the intervals of all but the sliding friction. Where the stem does not
+    follow, they come from the force balance. What both divide between dry and viscous friction is
+    uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at which
+    speed it is gone.
     """
     result = dict(simulated)
     for name in ("coulomb_friction", "viscous_friction"):
@@ -298,8 +298,11 @@ def checked_by_curve(
         if ours is None or theirs is None:
             continue
         open_ = _OPEN_SLIP * slip_force if name == "coulomb_friction" else 0.0
-        width = math.hypot(theirs.half_width, ours.value - theirs.value, open_)
-        if not (follows and ours.half_width < max(width, theirs.half_width)):
+        apart = abs(ours.value - theirs.value)
+        width = math.hypot(theirs.half_width, apart, open_)
+        if follows and ours.half_width < width:
+            result[name] = replace(ours, half_width=math.hypot(ours.half_width, _PULL * apart))
+        else:
             result[name] = replace(theirs, half_width=width, rival=ours.rival)
     for name in (SLIDING, "spring_constant", "spring_preload"):
         ours, theirs = simulated.get(name), balanced.get(name)
