@@ -53,9 +53,7 @@ def pytest_configure(config):
     cached one in the last digit.
     """
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
-        words = (
-            "from valve_friction_ros.identification.preparation import compile_methods as c; c()"
-        )
+        words = "from valve_friction_ros.identification.methods import compile_methods as c; c()"
         subprocess.run([sys.executable, "-c", words], check=True, cwd=config.rootpath)
 
 

@@ -21,7 +21,7 @@ from benchmark.exports.truth import Truth
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.records.columns import Columns
-from valve_friction_ros.records.table_recording import read_table
+from valve_friction_ros.records.recordings import read_table
 
 _OPTION = re.compile(r"--([a-z][a-z-]+)")
 

@@ -21,7 +21,7 @@ from extension.meanings import meanings, require_all
 __all__ = ["declared_keys", "entries", "is_explained", "keys_as_markdown", "pattern_of"]
 
 _WRITERS = {
-    "identifier/node.py": ("_data_values",),
+    "identifier/node.py": ("values", "_data_values"),
     "identifier/status.py": (
         "estimate_status",
         "friction_status",
@@ -39,13 +39,10 @@ _WRITERS = {
     "identifier/usage_watch.py": ("values",),
     "identifier/response_watch.py": ("values", "_deviation_values", "_move_values"),
     "identifier/standstill_watch.py": ("values",),
-    "identifier/whole_valve.py": ("values",),
     "identifier/alarm_board.py": ("values",),
     "identifier/alarm_recorder.py": ("values",),
     "identifier/alerts.py": ("_mark",),
     "identifier/history_writer.py": ("values",),
-    "identifier/history_sending.py": ("values",),
-    "identifier/schedule.py": ("values",),
     "identifier/valve_inputs.py": ("values",),
     "plumbing/readiness.py": ("values",),
 }
@@ -93,9 +90,9 @@ def declared_keys() -> set[str]:
     found: set[str] = set()
     for file, functions in _WRITERS.items():
         tree = ast.parse((nodes / file).read_text(encoding="utf-8"))
-        written = {each.name: each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)}
+        written = [each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)]
         for name in functions:
-            found |= set(_keys(written[name]))
+            found |= {key for each in written if each.name == name for key in _keys(each)}
     return found
 
 

@@ -27,8 +27,8 @@ from valve_friction_ros.identification import (
     published_estimate,
     sweep_thresholds,
 )
+from valve_friction_ros.identification.published.identify import choose_threshold
 from valve_friction_ros.identification.published.regression import force_balance_regression
-from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.model import (
     Excitation,
     IsaSteps,

@@ -45,7 +45,7 @@ from valve_friction_ros.identification.friction_drawing import (
     IMPERFECTIONS_FOUND,
     friction_drawing,
 )
-from valve_friction_ros.identification.published.sweep_drawing import chosen_region
+from valve_friction_ros.identification.published.estimate import chosen_region
 from valve_friction_ros.model import (
     BENCH_VALVE,
     Drive,

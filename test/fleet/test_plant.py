@@ -34,7 +34,7 @@ from valve_friction_ros.dashboard import Plant, ServiceRequest
 from valve_friction_ros.dashboard.context import ValveFiles
 from valve_friction_ros.dashboard.kept_valves import HistoryOperator, KeptValves
 from valve_friction_ros.dashboard.plant_rows import state_of
-from valve_friction_ros.fleet.filing import kept_valve
+from valve_friction_ros.fleet.job import kept_valve
 from valve_friction_ros.fleet.plant import read_plant, tags_in
 from valve_friction_ros.history import AlarmFilter, HistoryFile
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, SineWave, simulate

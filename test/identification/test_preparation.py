@@ -17,7 +17,7 @@ import gc
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from valve_friction_ros.identification import METHODS, IdentificationSettings
-from valve_friction_ros.identification.preparation import compile_methods
+from valve_friction_ros.identification.methods import compile_methods
 from valve_friction_ros.model import *
 
 def compiled():

@@ -20,11 +20,11 @@ LOOP, MIDDLEWARE, CLEAN_UP = "loop", "middleware", "clean-up"
 
 if __name__ == "__main__":
     from valve_friction_ros.nodes.identifier import node
-    from valve_friction_ros.nodes.plumbing import deadman
+    from valve_friction_ros.nodes.plumbing import running
 
-    deadman.arm.__defaults__ = (2.0,)
-    deadman._ANSWER = 2.0
-    deadman._SILENCE = deadman._AGAIN = 0.5
+    running.arm.__defaults__ = (2.0,)
+    running._ANSWER = 2.0
+    running._SILENCE = running._AGAIN = 0.5
     lock = ctypes.PyDLL(None).pthread_mutex_lock  # holds Python's lock, as rclpy does
     mutex = ctypes.create_string_buffer(64)
 

@@ -22,7 +22,7 @@ LIMIT = 2.0
 if __name__ == "__main__":
     from valve_friction_ros.nodes import identifiers
     from valve_friction_ros.nodes.identifier.node import Identifier
-    from valve_friction_ros.nodes.plumbing import watchdog
+    from valve_friction_ros.nodes.plumbing import running
 
     poll = Identifier.poll
 
@@ -32,5 +32,5 @@ if __name__ == "__main__":
         poll(self)
 
     Identifier.poll = poll_when_free
-    watchdog.LOOP_LIMIT = LIMIT
+    running.LOOP_LIMIT = LIMIT
     sys.exit(identifiers.main())

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from valve_friction_ros.nodes.identifier.alarm_folder import remove_oldest
+from valve_friction_ros.nodes.identifier.alarm_recorder import remove_oldest
 
 NAMES = [
     f"alarm_fv_101_20260101T{hour:02d}0000Z_{level}"

@@ -18,7 +18,7 @@ from service import VALVE as BUILT
 
 from valve_friction_ros.evidence import Move
 from valve_friction_ros.history import HistoryFile, read_change, read_moves, read_reference
-from valve_friction_ros.nodes.identifier.move_ledger import MoveLedger
+from valve_friction_ros.nodes.identifier.evidence_watch import MoveLedger
 
 HOUR, YEAR = 3600 * SECOND, 365 * 86_400 * SECOND
 PERIOD = 12 * SECOND

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
-from valve_friction_ros.nodes.dashboard.raw_statuses import status_of, statuses_in
+from valve_friction_ros.nodes.dashboard.node import status_of, statuses_in
 
 # CDR ends a text with a zero byte, so none is inside; ROS sends UTF-8.
 TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=("Cs",)), max_size=20)

@@ -17,7 +17,7 @@ import pytest
 
 from valve_friction_ros.history import HistoryError
 from valve_friction_ros.nodes.identifier import workers
-from valve_friction_ros.nodes.identifier.waiting_changes import WaitingChanges
+from valve_friction_ros.nodes.identifier.history_writer import WaitingChanges
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from valve_friction_ros.dashboard.live_state import Sources
-from valve_friction_ros.nodes.dashboard import watched_signals
-from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
+from valve_friction_ros.nodes.dashboard import node
+from valve_friction_ros.nodes.dashboard.node import WatchedSignals
 
 
 class Node:
@@ -42,7 +42,7 @@ class Subscription:
 
 @pytest.fixture(autouse=True)
 def subscriptions(monkeypatch):
-    monkeypatch.setattr(watched_signals, "PolledSubscription", Subscription)
+    monkeypatch.setattr(node, "PolledSubscription", Subscription)
 
 
 @pytest.mark.parametrize("topics", [("no topic", "/stem"), ("/pressure", "no topic")])

@@ -20,9 +20,9 @@ import pytest
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.model import BENCH_VALVE, Drive, Valve
 from valve_friction_ros.records.columns import Columns
+from valve_friction_ros.records.recordings import holds_a_force, read_table
 from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.records.table import read_columns
-from valve_friction_ros.records.table_recording import holds_a_force, read_table
 
 HEADER = "time_s,position_m,pressure_pa"
 TIME = np.arange(40) / 1000

@@ -10,15 +10,18 @@
 """Many recordings identified by many processes into one file; no ROS."""
 
 from valve_friction_ros.fleet.cluster import Cluster, cluster_at, in_cluster
-from valve_friction_ros.fleet.filing import (
+from valve_friction_ros.fleet.job import (
     FILING,
     Filed,
     Filing,
+    Job,
+    Options,
     baseline_kept,
     file_results,
     filed_before,
+    identify_job,
+    identify_job_elsewhere,
 )
-from valve_friction_ros.fleet.job import Job, Options, identify_job, identify_job_elsewhere
 from valve_friction_ros.fleet.plant import read_plant, valves_of
 from valve_friction_ros.fleet.processes import DeadWorker, in_processes, usable_cores
 from valve_friction_ros.fleet.recordings import (

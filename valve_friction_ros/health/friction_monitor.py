@@ -21,6 +21,7 @@ from valve_friction_ros.health.diagnosis import (
     EarlierEstimate,
     FrictionLimits,
     FrictionState,
+    Side,
     StandingAlarm,
     diagnose,
     diagnose_again,
@@ -29,7 +30,6 @@ from valve_friction_ros.health.known_numbers import KnownNumbers
 from valve_friction_ros.health.levels import Finding, Level, StatusSignal
 from valve_friction_ros.health.measured import Measured
 from valve_friction_ros.health.refused_record import RefusedRecordError, numbers_of_refused
-from valve_friction_ros.health.standing_alarm import followed, limited, raised, standing
 from valve_friction_ros.health.standstill import held_finding, held_numbers
 from valve_friction_ros.health.valve_changes import valve_changes
 from valve_friction_ros.health.valve_diagnosis import diagnose_numbers
@@ -48,6 +48,78 @@ from valve_friction_ros.model.checks import require_positive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.streams.record_buffer import RecordBuffer, Snapshot
 from valve_friction_ros.wording import Code, Statement, said
+
+_LESSER = {Side.HIGH: FrictionState.GROWN, Side.LOW: FrictionState.FALLEN}
+"""What is left of an alarm that a record has surely ended as an ERROR, and not as a WARN."""
+
+
+def raised(diagnosis: Diagnosis, time: int) -> StandingAlarm | None:
+    """Return the alarm on the friction that a record, identified at a time, ns, raises, if any."""
+    if diagnosis.state.side is None:
+        return None
+    dated = said(Code.DATED, of=diagnosis.statement, time=time)
+    return StandingAlarm(diagnosis.level, diagnosis.status_signal, diagnosis.state, dated, time)
+
+
+def followed(
+    alarm: StandingAlarm, latest: Diagnosis, limits: FrictionLimits
+) -> StandingAlarm | None:
+    """Return what the next record leaves of an alarm.
+
+    Parameters
+    ----------
+    alarm : StandingAlarm
+        An alarm of an earlier record.
+    latest : Diagnosis
+        What the next record says by itself.
+    limits : FrictionLimits
+        Bounds of the friction.
+
+    Returns
+    -------
+    StandingAlarm or None
+        The same, where that record leaves its level possible; a lesser one where it surely ends the
+        ERROR and not the WARN; None where it surely ends both, or is an alarm as severe by itself.
+    """
+    side = alarm.state.side
+    if side is None:
+        return None
+    left = min(alarm.level, latest.possible(side, limits))
+    if left is Level.OK or (latest.state.side is side and latest.state.level >= left):
+        return None
+    return limited(alarm, left)
+
+
+def limited(alarm: StandingAlarm, level: Level) -> StandingAlarm:
+    """Return an alarm of a level, WARN or more, at most."""
+    if alarm.level <= level or alarm.state.side is None:
+        return alarm
+    signal, state = StatusSignal.MAINTENANCE_REQUIRED, _LESSER[alarm.state.side]
+    return replace(alarm, level=level, status_signal=signal, state=state)
+
+
+def standing(alarm: StandingAlarm | None, latest: Diagnosis) -> Diagnosis:
+    """Return what is said of a valve whose latest record has not ended an alarm.
+
+    It is the alarm with its date, and what the latest record says, whose ratio it has.
+    """
+    if alarm is None:
+        return latest
+    code = Code.STANDS_UNCOMPARED if latest.ratio is None else Code.STANDS_UNCERTAIN
+    is_worse = latest.level > alarm.level
+    level, signal = (
+        (latest.level, latest.status_signal) if is_worse else (alarm.level, alarm.status_signal)
+    )
+    return Diagnosis(
+        level,
+        signal,
+        said(code, alarm=alarm.statement, latest=latest.statement),
+        latest.ratio,
+        alarm.state,
+        alarm=alarm,
+        latest=latest,
+    )
+
 
 MOST_SAMPLES = 65_536
 """Samples of a signal that are identified at most; of more, means are. Chosen: the usual window of

@@ -58,11 +58,11 @@ if TYPE_CHECKING:
         ValveSignature,
         valve_signature,
     )
-    from valve_friction_ros.identification.steps.step_detection import find_steps
     from valve_friction_ros.identification.steps.step_response import (
         Bracket,
         StepMetrics,
         StepTest,
+        find_steps,
         step_test,
     )
     from valve_friction_ros.identification.steps.validation import Validation, validate

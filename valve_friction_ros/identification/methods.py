@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Protocol
 
+import numpy as np
+
 from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.method import identify_bench, identify_plant
 from valve_friction_ros.identification.published import method as published
@@ -23,8 +25,29 @@ from valve_friction_ros.identification.settings import (
     current_name,
 )
 from valve_friction_ros.identification.signature import force_balance as signature
-from valve_friction_ros.model.recording import Recording
+from valve_friction_ros.model import (
+    BENCH_VALVE,
+    LOW_FRICTION,
+    Recording,
+    SineWave,
+    compile_kernels,
+    simulate,
+)
 from valve_friction_ros.model.valve import Valve
+
+
+def compile_methods() -> None:
+    """Compile all kernels, or load their compiled forms, by identifying six simulated seconds.
+
+    Takes a second, and up to a minute the first time on a machine.
+    """
+    compile_kernels()
+    period, count = 0.01, 600
+    pressure = SineWave(period=3.0).sample(period * np.arange(count))
+    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, period).position
+    random = np.random.default_rng(0)
+    noisy = position + 1e-6 * random.standard_normal(count)
+    identify(Recording(period, pressure + 5.0 * random.standard_normal(count), noisy), BENCH_VALVE)
 
 
 class Method(Protocol):

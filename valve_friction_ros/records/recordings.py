@@ -9,17 +9,226 @@
 
 """Recorded files of any kind, read by one function."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.refusal import RefusalError
+from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.records.bags.storage import bag_libraries, is_bag
 from valve_friction_ros.records.bags.topics import TopicChoice
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.stretch import Stretch
-from valve_friction_ros.records.table_recording import holds_a_force, read_table
+from valve_friction_ros.records.table import OpenTable, ReadSignal, left_out, require_good
 from valve_friction_ros.records.table_rows import readable
+from valve_friction_ros.records.units import (
+    FORCE_UNITS,
+    POSITION_UNITS,
+    PRESSURE,
+    PRESSURE_UNITS,
+    SHARES,
+    span,
+)
+from valve_friction_ros.streams.samples import Samples, uniform_recording
+
+
+def _share(read: ReadSignal) -> NDArray[np.float64]:
+    low, high = SHARES[read.signal.unit]
+    return (read.values - low) / (high - low)
+
+
+def _position(path: Path, read: ReadSignal, form: Columns, valve: Valve) -> NDArray[np.float64]:
+    """Return the position in m, rising the way in which the pressure pushes the stem."""
+    is_share = read.signal.unit in SHARES
+    if (is_share or form.inverted_position) and not math.isfinite(valve.travel):
+        needs = f"a position in {read.signal.unit}" if is_share else "an inverted position"
+        raise ValueError(
+            f"{path}: {needs} is a share of the travel: name the travel in the valve file"
+        )
+    if is_share and read.signal.unit != "percent":
+        position = _share(read) * valve.travel
+    elif is_share:
+        position = read.values * valve.travel / 100
+    else:
+        position = POSITION_UNITS[read.signal.unit].to_si(read.values)
+    return valve.travel - position if form.inverted_position else position
+
+
+def _pressure(path: Path, read: ReadSignal, valve: Valve, form: Columns) -> NDArray[np.float64]:
+    """Return a pressure in Pa; refuse one outside the sensor's range."""
+    unit = read.signal.unit
+    if unit in SHARES:
+        low, high = (
+            span(form.pressure_range, PRESSURE)
+            if form.pressure_range
+            else (valve.pressure_minimum, valve.pressure_maximum)
+        )
+        if not math.isfinite(high - low):
+            raise ValueError(
+                f"{path}: a pressure in {unit} is a share of the transmitter's range: name it "
+                "(--pressure-range '0..2.5 bar', or pressure_minimum and pressure_maximum of the "
+                "valve file)"
+            )
+        pressure = low + _share(read) * (high - low)
+    else:
+        pressure = PRESSURE_UNITS[unit].to_si(read.values)
+    _require_readable(path, read, valve, pressure)
+    return pressure
+
+
+def _require_readable(
+    path: Path, read: ReadSignal, valve: Valve, pressure: NDArray[np.float64]
+) -> None:
+    readable = valve.sensor_reads(pressure)
+    if not readable.all():
+        sample = int(np.argmin(readable))
+        raise ValueError(
+            f"{path}: {read.place(sample)}: {read.values[sample]:g} {read.signal.unit} is outside "
+            f"the sensor's range {valve.pressure_minimum:g} to {valve.pressure_maximum:g} Pa: use "
+            "a stretch of the record without it, name its unit, or correct the range"
+        )
+
+
+def _drive(
+    path: Path, reads: Sequence[ReadSignal], valve: Valve, form: Columns
+) -> tuple[NDArray[np.float64], Drive]:
+    """Return the drive in its SI unit.
+
+    A force on the diaphragm of a valve becomes the pressure that exerts it. Of a double-acting
+    actuator it is the pressure that alone would exert the force of both.
+    """
+    read, *others = reads
+    if read.signal.quantity == "force":
+        force = FORCE_UNITS[read.signal.unit].to_si(read.values)
+        drive = valve.actuator_drive(force)
+        _require_readable(path, read, valve, drive)
+        return drive, valve.driven_by
+    drive = _pressure(path, read, valve, form)
+    for other in others:
+        opposing = _pressure(path, other, valve, form)
+        own = np.interp(read.stamps, other.stamps, opposing)
+        drive = drive - form.opposing_area_ratio * (own - valve.pressure_reference)
+    return drive, Drive.PRESSURE
+
+
+def holds_a_force(path: Path, form: Columns) -> bool:
+    """Return whether a force, and no pressure, drives the stem in a table.
+
+    Raises ValueError if the file cannot be read, or leaves something open.
+    """
+    table = OpenTable(path, form)
+    table.require_settled()
+    signals = (signal for group in table.layout.valves.values() for signal in group)
+    return any(signal.quantity == "force" for signal in signals)
+
+
+def read_table(
+    path: Path,
+    valve: Valve,
+    form: Columns | None = None,
+    stretch: Stretch | None = None,
+    name: str | None = None,
+) -> tuple[RecordedValve, ...]:
+    """Read the recordings of pressure, or force, and stem position of all valves of a table.
+
+    Its samples pass through the same resampling as the samples of topics, with stamps in whole
+    nanoseconds, so that a recording gives the same numbers from a file and from topics.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its first bytes decide what it is.
+    valve : Valve
+        With a diaphragm it converts a force in the file into a pressure; it gives the sensor's
+        range, and the travel for positions in percent.
+    form : Columns, optional
+        What the file does not say itself. Pressure is read from a file with both pressure and
+        force.
+    stretch : Stretch, optional
+        The part to read; errors outside it do not matter.
+    name : str, optional
+        Only this valve of several.
+
+    Returns
+    -------
+    tuple of RecordedValve
+        The recordings on a uniform grid; the first of their notes says how the table was read.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, leaves something open, holds an impossible value, or more bad
+        values than `form` allows: file, row, cause and remedy.
+    RefusalError
+        If there is only one sample, or gaps take more than half of the time.
+    """
+    table = OpenTable(path, form)
+    table.require_settled()
+    valves = table.layout.valves
+    if name is not None and len(valves) > 1:
+        wanted = name.strip("/").casefold()
+        chosen = {one: each for one, each in valves.items() if _plain(one) == _plain(wanted)}
+        if not chosen:
+            known = ", ".join(valves)
+            raise ValueError(f"{path}: no valve is called {name!r}: choose one of {known}")
+        valves = chosen
+    every = [signal for signals in valves.values() for signal in signals]
+    read = dict(zip(every, table.read(every, stretch), strict=True))
+    form = table.layout.form
+    if len(valves) == 1:
+        ((label, signals),) = valves.items()
+        return (_recorded(table, label, [read[one] for one in signals], valve, form),)
+    found = []
+    for label, signals in valves.items():
+        try:
+            one = _recorded(table, label, [read[each] for each in signals], valve, form)
+        except (ValueError, RefusalError) as error:
+            reason = str(error).removeprefix(f"{path}: ")
+            one = RecordedValve(path, label, RefusalError(reason))
+        found.append(one)
+    return tuple(found)
+
+
+def _plain(text: str) -> str:
+    return "".join(filter(str.isalnum, text.casefold()))
+
+
+def _recorded(
+    table: OpenTable, label: str, reads: Sequence[ReadSignal], valve: Valve, form: Columns
+) -> RecordedValve:
+    """Make the recording of one valve: what drives it, its position, what opposes it."""
+    path = table.path
+    for each in reads:
+        require_good(path, each, form)
+    drives = [each for each in reads if each.signal.quantity != "position"]
+    (stem,) = (each for each in reads if each.signal.quantity == "position")
+    drive, driven_by = _drive(path, drives, valve, form)
+    position = _position(path, stem, form, valve)
+    names = (drives[0].signal.name, stem.signal.name)
+    by_name = dict(zip(names, (drives[0], stem), strict=True))
+    try:
+        recording = uniform_recording(
+            Samples(drives[0].stamps, drive),
+            Samples(stem.stamps, position),
+            names,
+            driven_by,
+            lambda gap: (
+                f"row {by_name[gap.name].rows[gap.sample]}, column "
+                f"{table.layout.headers[by_name[gap.name].signal.time[0]]!r}: gap of "
+                f"{gap.seconds:.3g} s: use a stretch of the record without it"
+            ),
+        )
+    except RefusalError as refusal:
+        raise RefusalError(f"{path}: {refusal}") from None
+    notes = [] if table.layout.is_own else [table.layout.words]
+    notes += [told for each in reads if (told := left_out(each))]
+    return RecordedValve(path, label, recording, tuple(notes))
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,14 @@ import re
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification.engine.bounded_step import bounded_minimum
 from valve_friction_ros.identification.engine.broad_model import ABSENT, BroadModel
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
 from valve_friction_ros.identification.engine.imperfections import TIMING
 from valve_friction_ros.identification.engine.intervals import Budget
-from valve_friction_ros.identification.engine.posterior_fit import fit
+from valve_friction_ros.identification.engine.posterior_fit import bounded_minimum, fit
 from valve_friction_ros.identification.engine.remarks import sampling_remarks
-from valve_friction_ros.identification.engine.search import Prior, _Search
+from valve_friction_ros.identification.engine.search import Prior, _Search, lagging
 from valve_friction_ros.identification.engine.sentences import main_doubt
-from valve_friction_ros.identification.engine.starts import lagging
 from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.verdict import interval_share
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate

@@ -17,7 +17,7 @@ from valve_friction_ros.identification import (
     IdentificationSettings,
     published_estimate,
 )
-from valve_friction_ros.identification.published.breakaway import (
+from valve_friction_ros.identification.published.identify import (
     _last_within,
     _onset,
     find_breakaways,

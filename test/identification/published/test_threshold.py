@@ -19,9 +19,9 @@ from valve_friction_ros.identification import (
     RefusalError,
     sweep_thresholds,
 )
+from valve_friction_ros.identification.published.identify import choose_threshold
 from valve_friction_ros.identification.published.regression import force_balance_regression
 from valve_friction_ros.identification.published.sweep import Sweep
-from valve_friction_ros.identification.published.threshold import choose_threshold
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, SensorNoise, SquareWave
 from valve_friction_ros.signals import differentiate
 

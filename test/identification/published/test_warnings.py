@@ -16,7 +16,7 @@ import pytest
 
 from valve_friction_ros.identification import IdentificationSettings, published_estimate
 from valve_friction_ros.identification.published import identify
-from valve_friction_ros.identification.published.breakaway import Breakaway
+from valve_friction_ros.identification.published.identify import Breakaway
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, Recording, SineWave, SquareWave
 
 VALUES = {"coulomb_friction": 3.0, "spring_constant": 10.0, "spring_preload": 1.0}

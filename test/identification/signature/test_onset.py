@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from valve_friction_ros.identification.signature.onset import fit_onset
+from valve_friction_ros.identification.signature.strokes import fit_onset
 
 TIME = np.arange(2000) * 1e-3
 REST = 5e-3

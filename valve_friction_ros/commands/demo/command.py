@@ -46,7 +46,7 @@ from valve_friction_ros.identification import (
     parameter_cells,
     parameter_mapping,
 )
-from valve_friction_ros.identification.preparation import compile_methods
+from valve_friction_ros.identification.methods import compile_methods
 from valve_friction_ros.model import (
     BENCH_VALVE,
     HIGH_FRICTION,

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.engine.bounded_step import bounded_minimum
 from valve_friction_ros.identification.engine.broad_model import BroadModel
 from valve_friction_ros.identification.engine.coordinates import (
     Coordinates,
@@ -25,6 +24,49 @@ from valve_friction_ros.identification.engine.coordinates import (
 )
 from valve_friction_ros.identification.engine.imperfections import BOUNDS
 from valve_friction_ros.identification.engine.weights import inflation, stroke_cells
+
+_ROUNDS = 12
+_ROUNDING = 1e-9
+
+
+def bounded_minimum(
+    curvature: NDArray[np.float64], slope: NDArray[np.float64], lowest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Minimise q'·A·q/2 − b'·q under q ≥ `lowest`, by an active set.
+
+    A coordinate that would leave its range is held at its end, and the others are solved anew; one
+    that is held though the form falls inwards is let go, for half of the rounds at most.
+
+    Parameters
+    ----------
+    curvature : ndarray of float, shape (p, p)
+        A, positive semi-definite, with a diagonal of about one.
+    slope : ndarray of float, shape (p,)
+        b.
+    lowest : ndarray of float, shape (p,)
+        At most zero; minus infinity where there is no end.
+
+    Returns
+    -------
+    ndarray of float, shape (p,)
+        q.
+    """
+    free = np.ones(slope.size, dtype=np.bool_)
+    q = np.zeros_like(slope)
+    for turn in range(_ROUNDS):
+        rest = slope[free] - curvature[np.ix_(free, ~free)] @ q[~free]
+        q[free] = np.linalg.lstsq(curvature[np.ix_(free, free)], rest, rcond=1e-13)[0]
+        outside = free & (q < lowest)
+        if outside.any():
+            q[outside] = lowest[outside]
+            free &= ~outside
+            continue
+        inwards = ~free & (curvature @ q - slope < -_ROUNDING)
+        if not inwards.any() or turn > _ROUNDS // 2:
+            break
+        free |= inwards
+    return np.asarray(np.maximum(q, lowest), dtype=np.float64)
+
 
 _DAMPINGS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 0.03, 0.3, 3.0)
 _SHORTER = (1.0, 0.5, 0.2)

@@ -12,19 +12,69 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from valve_friction_ros.identification.drawing import Drawing
+import numpy as np
+from numpy.typing import NDArray
+
+from valve_friction_ros.identification.drawing import Curve, Drawing, Panel
 from valve_friction_ros.identification.published.sweep import Sweep
-from valve_friction_ros.identification.published.sweep_drawing import (
-    SETTLED_SHARE,
-    chosen_region,
-    r_squared_panel,
-    sweep_panels,
-)
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import UNITS
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.valve import Valve
+
+SETTLED_SHARE = 0.1
+"""Largest difference of σ_s in the chosen region, over σ_s at the chosen threshold. Chosen."""
+
+_THRESHOLD = "threshold δv [m/s]"
+
+
+def sweep_panels(
+    thresholds: NDArray[np.float64],
+    coulomb_friction: NDArray[np.float64],
+    sigma: NDArray[np.float64],
+    threshold: float,
+    friction: Parameter,
+) -> tuple[Panel, Panel]:
+    """Return F_c and σ_s over the threshold δv, with the chosen threshold and the resulting F_c."""
+    chosen = int(np.argmin(np.abs(thresholds - threshold)))
+    marker = Curve([threshold], [coulomb_friction[chosen]], "o")
+    return (
+        Panel(
+            "coulomb",
+            _THRESHOLD,
+            "Coulomb friction $F_c$ [N]",
+            (Curve(thresholds, coulomb_friction), marker),
+            "δv sweep (● published choice, dashed: result, with 95 % band)",
+            level=friction,
+        ),
+        Panel(
+            "sigma",
+            _THRESHOLD,
+            "$\\sigma_s$ [N]",
+            (Curve(thresholds, np.maximum(sigma, 1e-9 * np.nanmax(sigma))),),
+            chosen=threshold,
+            is_logarithmic=True,
+        ),
+    )
+
+
+def r_squared_panel(sweep: Sweep, threshold: float) -> Panel:
+    """Return R²_s over the threshold δv, a detail for reports."""
+    curve = Curve(sweep.thresholds, sweep.r_squared)
+    return Panel("r_squared", _THRESHOLD, "$R^2_s$ [-]", (curve,), chosen=threshold, is_detail=True)
+
+
+def chosen_region(sweep: Sweep, threshold: float) -> tuple[float, float]:
+    """Return the lowest and highest threshold, m/s, of the region around the chosen threshold."""
+    choice = int(np.argmin(np.abs(sweep.thresholds - threshold)))
+    level = sweep.sigma[choice]
+    settled = np.abs(sweep.sigma - level) <= SETTLED_SHARE * level
+    others = np.flatnonzero(~settled)
+    below, above = others[others < choice], others[others > choice]
+    first = int(below[-1]) + 1 if below.size else 0
+    last = int(above[0]) - 1 if above.size else sweep.thresholds.size - 1
+    return float(sweep.thresholds[min(first, choice)]), float(sweep.thresholds[max(last, choice)])
 
 
 @dataclass(frozen=True, eq=False)

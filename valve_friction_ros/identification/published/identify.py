@@ -15,14 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.published.breakaway import find_breakaways
 from valve_friction_ros.identification.published.estimate import Estimate
 from valve_friction_ros.identification.published.regression import (
     ForceBalanceRegression,
     force_balance_regression,
 )
 from valve_friction_ros.identification.published.sweep import Sweep, sweep_thresholds
-from valve_friction_ros.identification.published.threshold import choose_threshold
+from valve_friction_ros.identification.refusal import LittleMotionError
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.trust.excitation import (
     require_drive,
@@ -35,7 +34,159 @@ from valve_friction_ros.identification.trust.plausible_units import require_plau
 from valve_friction_ros.identification.trust.sliding import mean_speed
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import MeasuredRecord, measured
+from valve_friction_ros.signals import MeasuredRecord, measured, runs_of, velocity_noise
+
+_RESOLUTION = 1e-12
+"""Residuals below this share of the largest in the sweep are rounding, not misfit.
+
+Chosen: double precision rounds forces at 1e-16, and the sweep adds up some 10,000 of them."""
+
+
+def choose_threshold(sweep: Sweep, window: int) -> int:
+    """Choose the step of the sweep whose estimates are determined best.
+
+    The published rule takes the region of smallest σ_s. Taken by the letter it fails: far up the
+    sweep a handful of samples, all of nearly one speed, fits any parameters, and σ_s is smallest
+    where it means least. The criterion must be the smallest uncertainty of the *estimates*, not of
+    the force. Their covariance is σ_s²·(ΦᵀΦ)⁻¹, and its determinant, the generalised variance,
+
+        ln det = 2·n_P·ln σ_s − ln det ΦᵀΦ ,
+
+    weighs both sides of the sweep in one number that no choice of units changes (the
+    D-criterion of experimental design). Below the plateau resting samples violate (4) and raise
+    σ_s; above it the loss of samples, and of the range of speed, lowers det ΦᵀΦ. The smallest
+    value lies on the plateau, at its low end where σ_s has settled, and so keeps the most
+    samples that still obey the sliding force balance. Steps with fewer samples than n_P windows
+    are left out, because the derivatives within one window are not independent.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Estimates for each threshold.
+    window : int
+        Length d of the derivative window, samples.
+
+    Returns
+    -------
+    int
+        Index into the arrays of `sweep`.
+
+    Raises
+    ------
+    RefusalError
+        If no threshold leaves enough samples to determine the free parameters.
+    """
+    usable = np.isfinite(sweep.sigma) & (sweep.samples >= sweep.free * window)
+    if not usable.any():
+        raise LittleMotionError(
+            "no threshold leaves enough moving samples to determine "
+            f"{sweep.free} parameters: record more strokes, or fix a parameter"
+        )
+    floor = _RESOLUTION * max(float(np.nanmax(sweep.sigma)), np.finfo(float).tiny)
+    criterion = 2 * sweep.free * np.log(np.maximum(sweep.sigma, floor)) - sweep.log_information
+    return int(np.argmin(np.where(usable, criterion, np.inf)))
+
+
+_AT_REST = 4.0
+"""A stem rests while its speed is below this many standard deviations of the velocity's noise.
+
+White noise exceeds 4 standard deviations in 6 of 100,000 samples."""
+
+_AT_REST_SHARE = 1e-3
+"""In a noiseless record a stem rests while its speed is below this share of its top speed.
+
+Chosen: above zero by far more than rounding, and below every speed that the sweep uses."""
+
+_FIRST_MARK, _SECOND_MARK = 4.0, 16.0
+"""Displacements, in standard deviations of the rest, whose instants locate the onset of motion.
+
+The first is above nearly all noise, as `_AT_REST`. The second is four times the first, chosen:
+far enough to measure the growth, near enough that the force still grows steadily."""
+
+_ROUNDING = 1e-12
+"""Rounding error of a displacement, m: a noiseless rest has the mark zero, and still lies within
+it.
+
+Four decades above the rounding of a position of 30 mm, 3e-18·m, and far below any sensor."""
+
+
+class Breakaway(NamedTuple):
+    """The last sample of a rest, and the direction of the motion that follows (+1 up, −1 down)."""
+
+    sample: int
+    direction: int
+
+
+def _last_within(displacement: NDArray[np.float64], mark: float) -> int:
+    """Last index before the displacement stays beyond `mark`, −1 if it is never within."""
+    within = np.flatnonzero(displacement <= mark + _ROUNDING)
+    return int(within[-1]) if within.size else -1
+
+
+def _onset(displacement: NDArray[np.float64], spread: float) -> int | None:
+    """Index of the last sample at rest of a displacement that grows, None if it is not visible."""
+    first = _last_within(displacement, _FIRST_MARK * spread)
+    second = _last_within(displacement, _SECOND_MARK * spread)
+    if first < 0 or second == displacement.size - 1:
+        return None
+    if second <= first:
+        return first
+    place = np.arange(second + 1)
+    trials = []
+    for power in (1, 2):
+        start = first - (second - first) / ((_SECOND_MARK / _FIRST_MARK) ** (1 / power) - 1)
+        growth = (np.maximum(place - start, 0) / (second - start)) ** power
+        misfit = displacement[: second + 1] - _SECOND_MARK * spread * growth
+        trials.append((float(misfit @ misfit), start))
+    onset = round(min(trials)[1])
+    return onset if onset >= 0 else None
+
+
+def find_breakaways(recording: Recording, settings: IdentificationSettings) -> list[Breakaway]:
+    """Find the instants at which the stem leaves a rest.
+
+    A rest is a stretch of at least two derivative windows without a speed that the noise cannot
+    explain. The part of the rest before the next motion gives its position and its noise.
+    The instants t₁ and t₂ at which the displacement passes 4 and 16 standard deviations of that
+    noise put the onset at t₁ − (t₂ − t₁)/(4^(1/p) − 1) if it grows with the time to the power p:
+    p = 2 under a growing force, p = 1 after a slip jump, whichever has the smaller residual.
+    Without noise the three instants coincide.
+
+    Parameters
+    ----------
+    recording : Recording
+        Stem position and pressure.
+    settings : IdentificationSettings
+        Window and order of the derivatives.
+
+    Returns
+    -------
+    list of Breakaway
+        In the order of time; indices into the samples of `recording`.
+    """
+    window = settings.published_window
+    record = measured(recording)
+    derivatives = record.derivatives(window, settings.order)
+    speed = np.abs(derivatives.velocity)
+    noise = velocity_noise(record.white_noise, record.sample_period, window, settings.order)
+    moving = speed > max(_AT_REST * noise, _AT_REST_SHARE * float(speed.max()))
+    for begin, end in runs_of(moving):
+        # The filter spreads any true motion over a window: a shorter burst is noise.
+        moving[begin:end] = end - begin >= window // 2
+    still = ~moving
+    found = []
+    for begin, end in runs_of(still):
+        if end - begin < 2 * window or end == still.size:
+            continue
+        first_moving = end + derivatives.margin
+        rest = recording.position[begin + window : first_moving - window // 2]
+        level, spread = float(np.median(rest)), float(np.std(rest))
+        stretch = recording.position[first_moving - window : first_moving + 2 * window] - level
+        onset = _onset(np.abs(stretch), spread)
+        if onset is not None:
+            found.append(Breakaway(first_moving - window + onset, int(np.sign(stretch[-1]))))
+    return found
+
 
 _MASS_TOLERANCE = 0.25
 """Relative change of a regressed mass with half the derivative window, up to which it is kept.

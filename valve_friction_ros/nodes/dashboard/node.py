@@ -9,38 +9,329 @@
 
 """A plant's valves in a browser: their diagnosis, history and signals, and their services."""
 
+import asyncio
 import contextlib
+import struct
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from queue import SimpleQueue
+from typing import Any, NamedTuple
 
+import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import FluidPressure, JointState
 
-from valve_friction_ros.dashboard import DashboardOptions, Plant
+from valve_friction_ros.dashboard import (
+    ESSENTIAL_KEYS,
+    Answer,
+    DashboardOptions,
+    Plant,
+    ServiceRequest,
+    Status,
+    Unread,
+)
 from valve_friction_ros.dashboard.accounts import Access, accounts_from
 from valve_friction_ros.dashboard.context import INSTALL, DashboardContext, GuardedOperator
 from valve_friction_ros.dashboard.history_cache import HistoryCache
 from valve_friction_ros.dashboard.kept_valves import HistoryOperator
 from valve_friction_ros.dashboard.live_state import Sources
+from valve_friction_ros.dashboard.live_strip import LiveStrip
 from valve_friction_ros.history import server_from
-from valve_friction_ros.nodes.dashboard.raw_statuses import statuses_in
-from valve_friction_ros.nodes.dashboard.service_calls import ServiceCalls
-from valve_friction_ros.nodes.dashboard.watched_signals import WatchedSignals
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
 from valve_friction_ros.nodes.plumbing.memory import keep_little_memory
 from valve_friction_ros.nodes.plumbing.output_folder import folder_of
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters, values_of
-from valve_friction_ros.nodes.plumbing.polled_node import TurnExecutor
+from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
-from valve_friction_ros.nodes.plumbing.qos import statuses
+from valve_friction_ros.nodes.plumbing.qos import statuses, watched
+from valve_friction_ros.nodes.plumbing.raw_samples import (
+    positions_in,
+    pressures_in,
+    readable,
+)
 from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, cannot_start
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
+from valve_friction_ros.nodes.service_request import LateError, TriggerCall, UnansweredError
+from valve_friction_ros.outside_text import printable
 from valve_friction_ros.settings import NODES
+
+_SPAN = 60.0
+"""Seconds of signal that are shown."""
+
+
+@dataclass
+class _Watch:
+    strip: LiveStrip
+    lookers: int = 0
+    sources: Sources = field(default_factory=Sources)
+    streams: tuple[PolledSubscription, ...] = ()
+
+    def follow(self, node: PolledNode, sources: Sources) -> None:
+        """Subscribe to the topics of the valve, anew where they have changed."""
+        if sources != self.sources:
+            self.end()
+            self.sources, self.strip.trouble = sources, ""
+            if sources.pressure_topic and sources.stem_topic:
+                self._begin(node)
+
+    def _begin(self, node: PolledNode) -> None:
+        """Subscribe to both topics or to none: their names come from outside."""
+        topics = (self.sources.pressure_topic, self.sources.stem_topic)
+        for kind, topic in zip((FluidPressure, JointState), topics, strict=True):
+            try:
+                made = PolledSubscription(node, kind, topic, watched(), raw=True)
+            except Exception as error:  # noqa: BLE001 - rclpy's, where the name is none of a topic
+                self._destroy()
+                about = printable(str(error).partition("\n")[0], 200)
+                self.strip.trouble = f"{printable(topic, 100)!r} cannot be subscribed to: {about}"
+                return
+            self.streams += (made,)
+
+    def _destroy(self) -> None:
+        for stream in self.streams:
+            stream.end()
+        self.streams = ()
+
+    def end(self) -> None:
+        """End the subscriptions."""
+        self._destroy()
+        self.sources = Sources()
+
+    def take(self) -> None:
+        """Hand over what has arrived; what is no such message is left out."""
+        if not self.streams:
+            return
+        pressures, stems = (
+            readable(stream.take(), kind)
+            for stream, kind in zip(self.streams, (FluidPressure, JointState), strict=True)
+        )
+        if pressures:
+            self.strip.add(0, *pressures_in([one.message for one in pressures]))
+        if stems:
+            found = positions_in([one.message for one in stems], self.sources.joint)
+            known = np.isfinite(found.values)
+            self.strip.add(1, found.stamps[known], found.values[known])
+
+
+class WatchedSignals:
+    """Subscribes to what an identifier subscribes to, as long as somebody looks.
+
+    Pages count in and out from any thread; the node's thread subscribes.
+
+    Parameters
+    ----------
+    sources_of : callable
+        Returns the topics of a valve, by the name of its identifier.
+    """
+
+    def __init__(self, sources_of: Callable[[str], Sources]) -> None:
+        self._sources_of = sources_of
+        self._lock = threading.Lock()
+        self._watches: dict[str, _Watch] = {}
+        self._dropped: list[_Watch] = []
+
+    def watch(self, node: str) -> LiveStrip:
+        """Count a page in; return where its samples go."""
+        with self._lock:
+            watch = self._watches.setdefault(node, _Watch(LiveStrip(_SPAN)))
+            watch.lookers += 1
+            return watch.strip
+
+    def unwatch(self, node: str) -> None:
+        """Count a page out."""
+        with self._lock:
+            watch = self._watches.get(node)
+            if watch is None:
+                return
+            watch.lookers -= 1
+            if watch.lookers <= 0:
+                self._dropped.append(self._watches.pop(node))
+
+    def rest(self) -> None:
+        """Unsubscribe from all, until the next step; in the node's thread."""
+        with self._lock:
+            watches = [*self._watches.values()]
+        for watch in watches:
+            watch.end()
+
+    def step(self, node: PolledNode) -> None:
+        """Subscribe, take and unsubscribe; in the node's thread."""
+        with self._lock:
+            watches, dropped = dict(self._watches), self._dropped
+            self._dropped = []
+        for watch in dropped:
+            watch.end()
+        for name, watch in watches.items():
+            watch.follow(node, self._sources_of(name))
+            watch.take()
+
+
+_MEETING = 3.0
+"""Longest time until a service is met, s."""
+_PATIENCE = 600.0
+"""Longest time until an answer, s."""
+
+
+class _Asked(NamedTuple):
+    """A call that a page waits for."""
+
+    node: str
+    request: ServiceRequest
+    answer: "Future[Answer]"
+
+
+class ServiceCalls:
+    """Calls services for pages: they ask in their thread, and the node's thread calls."""
+
+    def __init__(self) -> None:
+        self._asked: SimpleQueue[_Asked] = SimpleQueue()
+        self._under_way: list[tuple[TriggerCall, Future[Answer]]] = []
+
+    async def call(self, node: str, request: ServiceRequest) -> Answer:
+        """Call a service of an identifier and wait for its answer; any thread's event loop."""
+        answer: Future[Answer] = Future()
+        answer.set_running_or_notify_cancel()
+        self._asked.put(_Asked(node, request, answer))
+        return await asyncio.shield(asyncio.wrap_future(answer))
+
+    def rest(self, node: Node) -> None:
+        """Give up the calls under way, as the node rests; in the node's thread."""
+        self.step(node)
+        for call, answer in self._under_way:
+            answer.set_result(Answer(False, "the dashboard rests: ask again when it is active"))
+            call.close()
+        self._under_way = []
+
+    def step(self, node: Node) -> None:
+        """Go on with all calls; in the node's thread."""
+        while not self._asked.empty():
+            asked = self._asked.get_nowait()
+            name, values, switch = asked.request
+            call = TriggerCall(node, asked.node, name, _MEETING, _PATIENCE, values, switch)
+            self._under_way.append((call, asked.answer))
+        self._under_way = [one for one in self._under_way if not _has_ended(*one)]
+
+
+def _has_ended(call: TriggerCall, answer: "Future[Answer]") -> bool:
+    """Go on with a call; return whether it has ended, with its answer set."""
+    try:
+        if not call.step():
+            return False
+        said = Answer(call.answer.success, call.answer.message)
+    except LateError as error:
+        said = Answer(False, str(error))
+    except UnansweredError as error:
+        said = Answer(False, printable(str(error), 400))
+    answer.set_result(said)
+    call.close()
+    return True
+
+
+_LITTLE_ENDIAN = b"\x00\x01"
+_AFTER_STAMP = 12
+"""First byte after the representation's header (4 bytes) and the stamp (8)."""
+_COUNT = struct.Struct("<I")
+_KEYS = tuple(_COUNT.pack(len(key.encode()) + 1) + key.encode() + b"\0" for key in ESSENTIAL_KEYS)
+"""The essential keys as they stand in a message: their length, their text and a zero byte."""
+
+
+def statuses_in(message: bytes) -> Iterator[Unread]:
+    """Yield each status of a diagnostic_msgs/DiagnosticArray, still unread.
+
+    Raises ValueError if the bytes are no such message.
+    """
+    try:
+        if message[:2] == _LITTLE_ENDIAN:
+            yield from _quickly(message)
+        else:
+            for one in deserialize_message(message, DiagnosticArray).status:
+                yield Unread(one.name, partial(status_of, one))
+    except (struct.error, IndexError, MemoryError, RuntimeError) as error:
+        raise ValueError(f"no diagnostics: {error}") from None
+
+
+def status_of(message: DiagnosticStatus) -> Status:
+    """Return a status of a message."""
+    return Status(
+        message.name,
+        message.level[0],
+        message.hardware_id,
+        message.message,
+        {one.key: one.value for one in message.values},
+    )
+
+
+def _quickly(message: bytes) -> Iterator[Unread]:
+    frame, at = _text(message, _AFTER_STAMP)
+    del frame
+    count, at = _count(message, at)
+    for left in range(count - 1, -1, -1):
+        name, _ = _text(message, at + 1)
+        begin, at = at, _read(message, at)[1] if left else len(message)
+        yield Unread(name, partial(_status_at, message, begin), partial(_mark, message, begin, at))
+
+
+def _status_at(message: bytes, at: int) -> Status:
+    """Read a status; raises ValueError if the bytes are none."""
+    try:
+        return _read(message, at)[0]
+    except (struct.error, IndexError) as error:
+        raise ValueError(f"no status: {error}") from None
+
+
+def _mark(message: bytes, begin: int, end: int) -> tuple[object, ...]:
+    """Return level, message, tag and the values of the essential keys, a tenth of all.
+
+    The bytes between two texts are left out: they may be any.
+    """
+    try:
+        _, at = _text(message, begin + 1)
+        words, at = _text(message, at)
+        tag, at = _text(message, at)
+        values = [
+            _text(message, found + len(key))[0] if (found := message.find(key, at, end)) > 0 else ""
+            for key in _KEYS
+        ]
+    except (struct.error, IndexError) as error:
+        raise ValueError(f"no status: {error}") from None
+    return (message[begin], words, tag, *values)
+
+
+def _count(message: bytes, at: int) -> tuple[int, int]:
+    at += -at % 4  # the representation's header takes four bytes, so alignment counts from zero
+    return _COUNT.unpack_from(message, at)[0], at + 4
+
+
+def _text(message: bytes, at: int) -> tuple[str, int]:
+    size, at = _count(message, at)
+    end = at + size
+    if end > len(message):
+        raise IndexError("the message ends before its text")
+    return message[at : max(at, end - 1)].decode(errors="replace"), end
+
+
+def _read(message: bytes, at: int) -> tuple[Status, int]:
+    level = message[at]
+    name, at = _text(message, at + 1)
+    words, at = _text(message, at)
+    hardware_id, at = _text(message, at)
+    count, at = _count(message, at)
+    values = {}
+    for _ in range(count):
+        key, at = _text(message, at)
+        values[sys.intern(key)], at = _text(message, at)
+    return Status(name, level, hardware_id, words, values), at
+
 
 _PAUSE = 0.05
 """Time between two turns, s: for so long messages gather."""

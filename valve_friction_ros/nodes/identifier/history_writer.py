@@ -16,6 +16,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, TypeVar
 
 from rclpy.node import Node
@@ -41,15 +42,199 @@ from valve_friction_ros.history import (
     Trend,
     ValveHistory,
     entry_of,
+    server_from,
 )
+from valve_friction_ros.history.place import Claim
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.identifier.history_guard import HistoryGuard
-from valve_friction_ros.nodes.identifier.history_sending import HistorySending
-from valve_friction_ros.nodes.identifier.waiting_changes import WaitingChanges
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
 from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
 from valve_friction_ros.response import StepAnswer
+from valve_friction_ros.streams import utc_second
 from valve_friction_ros.usage import ValveUsage
+
+if TYPE_CHECKING:
+    from valve_friction_ros.history import HistoryFile
+
+_MOST = 1000
+
+_Change = Callable[["HistoryFile"], None]
+
+
+class WaitingChanges:
+    """Changes in their order, in bounded number, for two threads.
+
+    Where too many wait, the oldest identification is given up: others come. Without any it is the
+    oldest change. How many were given up is counted.
+
+    Parameters
+    ----------
+    most : int
+        Changes that wait at most.
+    """
+
+    def __init__(self, most: int = _MOST) -> None:
+        self._most = most
+        self._lock = Lock()
+        self._waiting: list[tuple[_Change, bool]] = []
+        self._identifications = self._others = 0
+
+    def add(self, change: _Change, identification: bool = False) -> None:
+        """Have a change wait, unless it does; give up another one where there are too many."""
+        with self._lock:
+            if any(change == one for one, _ in self._waiting):
+                return
+            self._waiting.append((change, identification))
+            if len(self._waiting) > self._most:
+                goes = next((k for k, (_, is_one) in enumerate(self._waiting) if is_one), 0)
+                _, is_one = self._waiting.pop(goes)
+                self._identifications += is_one
+                self._others += not is_one
+
+    def first(self) -> _Change | None:
+        """Return the oldest change, which goes on waiting; None if none waits."""
+        with self._lock:
+            return self._waiting[0][0] if self._waiting else None
+
+    def remove(self, change: _Change) -> None:
+        """Let a change go that was made, unless it was given up meanwhile."""
+        with self._lock:
+            self._waiting = [one for one in self._waiting if one[0] != change]
+
+    @property
+    def given_up(self) -> str:
+        """What was given up, in words; empty if nothing was."""
+        counts = (self._identifications, "identification"), (self._others, "other change")
+        told = [f"{count} {what}{'s' * (count > 1)}" for count, what in counts if count]
+        return " and ".join(told)
+
+    def forget_given_up(self) -> None:
+        """Count from now on."""
+        with self._lock:
+            self._identifications = self._others = 0
+
+
+if TYPE_CHECKING:
+    from valve_friction_ros.history import Sender
+
+
+class HistorySending:
+    """Sends the history to a server, if one is named; without it, nothing is done.
+
+    Raises ValueError if the address of the server cannot be used, or there is no file.
+    """
+
+    def __init__(self, node: Node, path: Path | None, valve: KeptValve) -> None:
+        self._node, self._valve = node, valve
+        self._untaken: str | None = None
+        self._sender: Sender | None = None
+        server = server_from(node.get_parameter("history_url").value, "history_url")
+        if server is None:
+            return
+        if path is None:
+            raise ValueError("history_url needs history_file, where rows wait for the server")
+        self._sender = database.sender_of(path, server)
+
+    def take(self) -> None:
+        """Take the rows of the valve, where another machine has kept them; wait some seconds."""
+        if self._sender is not None:
+            self._untaken = self._sender.take(self._valve)
+        if self._untaken is not None:
+            self._node.get_logger().warning(
+                "what another machine may have kept of this valve was not taken from the server, "
+                f"and is at the next start: {self._untaken}"
+            )
+
+    def follow(self) -> None:
+        """Log what has changed."""
+        news = None if self._sender is None else self._sender.news()
+        if news is not None:
+            self._node.get_logger().warning(news)
+
+    def values(self) -> dict[str, str]:
+        """Return what the diagnostics say of the server."""
+        if self._sender is None:
+            return {}
+        state = self._sender.state
+        values = {
+            "history_server": str(self._sender.server),
+            "history_server waiting": str(state.count.waiting),
+            "history_server problem": state.problem or "",
+        }
+        if state.count.waiting and state.count.since is not None:
+            values["history_server waiting since [time]"] = utc_second(state.count.since * 10**9)
+        if state.count.refused:
+            values["history_server refused"] = str(state.count.refused)
+        if self._untaken is not None:
+            values["history_server not taken"] = self._untaken
+        return values
+
+    def close(self) -> None:
+        """Send what can be sent at once."""
+        if self._sender is not None:
+            self._sender.end()
+            self._sender = None
+
+
+_HANDOVER = 10.0
+"""Time, s, for which a node that ends may still hold the history."""
+
+
+class HistoryGuard:
+    """Watches the history file of one valve.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    valve : str
+        Name of the valve.
+    """
+
+    def __init__(self, path: Path, valve: str) -> None:
+        self._path, self._valve = path, valve
+        self._claim = Claim(path, valve)
+        self._refused_since: float | None = None
+        self._known: tuple[int, int] | None = None
+
+    def ask(self) -> None:
+        """Claim the history of the valve, unless that is done."""
+        if self._claim.ask():
+            self._refused_since = None
+        elif self._refused_since is None:
+            self._refused_since = time.monotonic()
+
+    def release(self) -> None:
+        """Leave the history to another node."""
+        self._claim.release()
+
+    @property
+    def conflict(self) -> str | None:
+        """That another node keeps the history of this valve, too, if so."""
+        since = self._refused_since
+        if since is None or time.monotonic() - since < _HANDOVER:
+            return None
+        return (
+            f"another node keeps the history of {self._valve} in {self._path}: end one of them, "
+            "or name another history_file or namespace"
+        )
+
+    @property
+    def is_another(self) -> bool:
+        """Whether the file is not the one that was noted last, or is not there."""
+        return self._known is not None and self._identity() != self._known
+
+    def note(self) -> None:
+        """Note which file it is, if it is there."""
+        self._known = self._identity() or self._known
+
+    def _identity(self) -> tuple[int, int] | None:
+        """Return by what the system tells the file from another one."""
+        try:
+            found = self._path.stat()
+        except OSError:
+            return None
+        return found.st_dev, found.st_ino
+
 
 if TYPE_CHECKING:
     from valve_friction_ros.history import HistoryFile

@@ -12,14 +12,16 @@
 import math
 import sys
 import time
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
+from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.timer import Timer
 
 from valve_friction_ros.health import (
     AlarmKind,
@@ -29,6 +31,7 @@ from valve_friction_ros.health import (
     RefusedRecordError,
     by_severity,
 )
+from valve_friction_ros.health.valve_changes import DIFFERENCES
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
@@ -47,7 +50,6 @@ from valve_friction_ros.nodes.identifier.parameters import (
 from valve_friction_ros.nodes.identifier.report_service import ReportWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.results import EstimateTopic, NumberTopics
-from valve_friction_ros.nodes.identifier.schedule import Schedule
 from valve_friction_ros.nodes.identifier.standstill_watch import StandstillWatch
 from valve_friction_ros.nodes.identifier.status import (
     estimate_status,
@@ -57,8 +59,6 @@ from valve_friction_ros.nodes.identifier.status import (
 )
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
-from valve_friction_ros.nodes.identifier.watch import Watch
-from valve_friction_ros.nodes.identifier.whole_valve import WholeValve
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
 from valve_friction_ros.nodes.plumbing.background import InternalError
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
@@ -74,6 +74,103 @@ from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_ser
 from valve_friction_ros.settings import NODES
 from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
 from valve_friction_ros.wording import Code, Statement, said, sentence
+
+
+class Schedule:
+    """Calls for an identification by the node's clock, and remembers why the last was skipped.
+
+    A skip changes neither diagnosis nor level, and it is not logged. `group` is reentrant, so that
+    other callbacks run while an identification is awaited.
+    """
+
+    def __init__(
+        self, node: Node, identify: Callable[[], Awaitable[None]], group: CallbackGroup
+    ) -> None:
+        self._node = node
+        self._identify = identify
+        self._group = group
+        self._period = 0.0
+        self._timer: Timer | None = None
+        self._skip: tuple[str, int] | None = None
+        self.follow()
+
+    def follow(self) -> None:
+        """Follow the parameter."""
+        period = self._node.get_parameter("period").value
+        if period == self._period:
+            return
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
+            self._timer = None
+        if period > 0:
+            self._timer = self._node.create_timer(
+                period, self._identify, callback_group=self._group
+            )
+        self._period, self._skip = period, None
+
+    def skip(self, reason: str) -> None:
+        """Remember that nothing was identified, and why.
+
+        What began before the schedule ended may end after it, and does not count.
+        """
+        if self._timer is not None:
+            self._skip = reason, self._node.get_clock().now().nanoseconds
+
+    def stall(self) -> None:
+        """Remember that nothing new has come; an older reason for a skip still holds."""
+        if self._skip is None:
+            self.skip("no new samples since the last identification")
+
+    def succeed(self) -> None:
+        """Forget the last skip."""
+        self._skip = None
+
+    def values(self) -> dict[str, str]:
+        """Return the values of the diagnostic for the last skip, if there was any."""
+        if self._skip is None:
+            return {}
+        reason, stamp = self._skip
+        age = (self._node.get_clock().now().nanoseconds - stamp) / 1e9
+        return {"scheduled_skip": reason, "scheduled_skip_age [s]": f"{age:.3f}"}
+
+
+class WholeValve:
+    """Shows the findings of the latest result, and each change with its interval (a `Watch`)."""
+
+    def __init__(self, monitor: FrictionMonitor) -> None:
+        self._monitor = monitor
+
+    def take(self, _: Arrivals) -> None:
+        """Take no samples: the identification has them."""
+
+    def findings(self) -> Sequence[Finding]:
+        """Return what has changed since the baseline."""
+        return self._monitor.findings
+
+    def values(self) -> dict[str, str]:
+        """Return the changes: of a ratio in percent, else in the number's unit."""
+        values = {}
+        for name, change in self._monitor.changes.items():
+            unit = DIFFERENCES.get(name, "%")
+            for end in ("value", "low", "high"):
+                number = getattr(change, end)
+                key = f"{name} change {end}".removesuffix(" value")
+                values[f"{key} [{unit}]"] = f"{100 * (number - 1) if unit == '%' else number:.6g}"
+        return values
+
+
+class Watch(Protocol):
+    """Follows the samples of a valve, and adds to its diagnostics."""
+
+    def take(self, arrivals: Arrivals) -> None:
+        """Take samples, some 20 times a second, in the executor's thread; it must return soon."""
+
+    def findings(self) -> Sequence[Finding]:
+        """Return what is found on the valve now; each raises its level where it is more severe."""
+
+    def values(self) -> Mapping[str, str]:
+        """Return values of the diagnostics, the unit of a number in its key."""
+
 
 _DIAGNOSTIC_PERIOD = 1.0
 _PROCESSES = 1

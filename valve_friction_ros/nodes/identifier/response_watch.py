@@ -22,8 +22,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from valve_friction_ros import history as database
-from valve_friction_ros.health import Finding, FrictionMonitor, dead_band
-from valve_friction_ros.nodes.identifier.command_trouble import CommandTrouble
+from valve_friction_ros.health import Finding, FrictionMonitor, Level, StatusSignal, dead_band
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.plumbing.polled_subscription import PolledSubscription
 from valve_friction_ros.nodes.plumbing.qos import stream
@@ -37,6 +36,45 @@ from valve_friction_ros.response import (
     response_findings,
 )
 from valve_friction_ros.streams import Arrivals, Kind, Samples, utc_second
+from valve_friction_ros.wording import Code, said
+
+_PATIENCE = 60.0
+"""Time, s, for which commands come, and none can be used, before it is found."""
+
+
+class CommandTrouble:
+    """Remembers what is wrong with the latest commands, and since when none could be used."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget it, as where nobody gives commands any more."""
+        self._problem = ""
+        self._first = self._last = math.nan
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the latest commands; empty: nothing."""
+        return self._problem
+
+    def take(self, problem: str, is_used: bool, now: float) -> None:
+        """Note what is wrong with commands that have come at a time, s, and whether one is used."""
+        self._problem = problem
+        if is_used:
+            self._first = self._last = math.nan
+            return
+        self._last = now
+        if math.isnan(self._first):
+            self._first = now
+
+    def findings(self) -> list[Finding]:
+        """Return a finding where commands have come for a minute, and none could be used."""
+        if not self._last - self._first >= _PATIENCE:
+            return []
+        unusable = said(Code.COMMANDS_UNUSABLE, problem=self._problem)
+        return [Finding(Level.WARN, StatusSignal.CHECK_FUNCTION, unusable)]
+
 
 _SILENCE = 1.0
 """Time without messages, s, after which the quality of service is suspected."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from valve_friction_ros.alerts import AlertSender
 from valve_friction_ros.health import DigestDesk
 from valve_friction_ros.history import HistoryError
-from valve_friction_ros.identification.preparation import compile_methods
+from valve_friction_ros.identification.methods import compile_methods
 from valve_friction_ros.model.compiled import find_cache, note_cache
 from valve_friction_ros.nodes.plumbing.processes import Processes, ThisProcess
 from valve_friction_ros.nodes.plumbing.worker import Worker

@@ -9,24 +9,184 @@
 
 """Starting and stopping nodes as a process."""
 
+import contextlib
+import faulthandler
+import itertools
 import os
+import signal
+import socket
 import sys
 import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Empty
 
-from valve_friction_ros.nodes.plumbing.deadman import Deadman, arm, disarm
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode, TurnExecutor
 from valve_friction_ros.nodes.plumbing.stop_request import StopRequest
-from valve_friction_ros.nodes.plumbing.watchdog import Watchdog
-from valve_friction_ros.nodes.plumbing.worker import workers_have_ended
+from valve_friction_ros.nodes.plumbing.worker import Companion, workers_have_ended
+
+
+def notify(state: str) -> None:
+    """Send a state such as ``READY=1``; nothing happens where nobody listens."""
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if not address:
+        return
+    if address.startswith("@"):  # a name without a file
+        address = "\0" + address[1:]
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.setblocking(False)
+        sender.sendto(state.encode(), address)
+
+
+def watchdog_time() -> float | None:
+    """Return the time without ``WATCHDOG=1`` after which systemd acts, s; None if it does not."""
+    with contextlib.suppress(KeyError, ValueError):
+        if int(os.environ.get("WATCHDOG_PID", os.getpid())) == os.getpid():
+            return int(os.environ["WATCHDOG_USEC"]) / 1e6
+    return None
+
+
+LOOP_LIMIT = 10.0
+"""Time, s, after which a loop that has not turned counts as stuck."""
+_LOOK = 0.5
+"""Time between two looks, s; they are counted, so that a process that was stopped is not stuck."""
+_REPEAT = 1.0
+"""Time between two messages, s."""
+
+
+class Watchdog(Companion):
+    """Watches the loop of some nodes from a thread of its own, as long as the context lasts.
+
+    systemd's watchdog is served as long as the loop turns and no node has overdue work. When the
+    loop has not turned for `LOOP_LIMIT`, the stacks of all threads are written to stderr once, and
+    what each node says in that case is published on ``/diagnostics`` every second, in the loop's
+    stead.
+    """
+
+    def __init__(self, nodes: Sequence[PolledNode]) -> None:
+        super().__init__("watchdog")
+        self._nodes = nodes
+        # Made in time: a loop that is stuck may hold what the making of a publisher needs.
+        self._publisher: Publisher | None = None
+        if any(node.stuck_status("") for node in nodes):
+            self._publisher = nodes[0].create_publisher(DiagnosticArray, "/diagnostics", 10)
+        within = watchdog_time()
+        self._look = _LOOK if within is None else min(_LOOK, max(within / 4, 0.05))
+        self._turns = 0
+
+    def begin(self) -> None:
+        """Tell systemd that the nodes are there."""
+        notify("READY=1")
+
+    def end(self) -> None:
+        """Tell systemd that they end."""
+        notify("STOPPING=1")
+        self.thread.join(1.0)  # it may be within the middleware, which is to be shut down
+
+    def turned(self) -> None:
+        """Note that the loop has turned."""
+        self._turns += 1
+
+    def run(self) -> None:
+        """Look again and again."""
+        seen, idle = -1, 0
+        allowed, each = round(LOOP_LIMIT / self._look), round(_REPEAT / self._look)
+        while not self.has_ended.wait(self._look):
+            turns = self._turns
+            idle = 0 if turns != seen else idle + 1
+            seen = turns
+            if not idle and all(node.overdue() is None for node in self._nodes):
+                notify("WATCHDOG=1")
+            if idle >= allowed and (idle - allowed) % each == 0:
+                with contextlib.suppress(RuntimeError):  # the thread must live on
+                    self._say(idle * self._look)
+            if idle == allowed:
+                faulthandler.dump_traceback()
+
+    def _say(self, idle: float) -> None:
+        problem = (
+            f"stuck: the loop of this process has not turned for {idle:.0f} s, so nothing is "
+            "taken, identified or answered: restart it, and report the stacks in its log"
+        )
+        if self._publisher is not None:
+            message = DiagnosticArray(
+                status=[one for node in self._nodes if (one := node.stuck_status(problem))]
+            )
+            message.header.stamp = self._nodes[0].get_clock().now().to_msg()
+            self._publisher.publish(message)
+
+
+_LOOP_END = 60.0
+"""Time, s, after which a process ends whose loop has not turned. A process that was paused for
+longer ends when it goes on: the timer cannot tell one from the other."""
+_DUMP = 5.0
+"""Time, s, in which the stacks are written."""
+_ARM = 1.0
+_SILENCE = 10.0
+"""Time, s, without any input after which the middleware is asked whether it still works."""
+_AGAIN, _RARELY = 30.0, 300.0
+"""Times between two such questions, s, while the inputs are silent, and while they are not: each
+question is told to all participants of the domain."""
+_ANSWER = 20.0
+"""Time, s, within which the middleware answers; it takes milliseconds."""
+
+
+def arm(seconds: float = _LOOP_END) -> None:
+    """End the process after a time, unless it is armed again or disarmed before."""
+    faulthandler.dump_traceback_later(seconds, exit=True)
+    signal.setitimer(signal.ITIMER_REAL, seconds + _DUMP)  # its default is the end of the process
+
+
+def disarm() -> None:
+    """Let the process live."""
+    faulthandler.cancel_dump_traceback_later()
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+class Deadman:
+    """Ends the process of some nodes when its loop or the middleware hangs."""
+
+    def __init__(self, nodes: Sequence[PolledNode]) -> None:
+        self._nodes = nodes
+        self._next = itertools.cycle(nodes)
+        self._armed = self._asked = time.monotonic()
+
+    def goes_on(self) -> None:
+        """Note that the loop has done something."""
+        now = time.monotonic()
+        if now - self._armed >= _ARM:
+            self._armed = now
+            arm()
+
+    def turned(self) -> None:
+        """Note that the loop has turned; ask the middleware now and then."""
+        self.goes_on()
+        now = time.monotonic()
+        heard = max((node.last_heard for node in self._nodes), default=now)
+        pause = _AGAIN if now - heard >= _SILENCE else _RARELY
+        if now - self._asked >= pause:
+            self._asked = now
+            self._end_if_the_middleware_hangs()
+
+    def _end_if_the_middleware_hangs(self) -> None:
+        """Make a publisher, which takes the lock of the discovery, and destroy it.
+
+        A middleware that hangs never returns from this, and rclpy holds Python's lock meanwhile.
+        """
+        arm(_ANSWER)
+        node = next(self._next)
+        node.destroy_publisher(node.create_publisher(Empty, "~/alive", 1))
+        arm()
+
 
 _PAUSE = 0.1
 _LIVELY_PAUSE = 0.02

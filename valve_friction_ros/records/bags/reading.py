@@ -10,15 +10,40 @@
 """Recordings in rosbag2 bags, read without ROS, by the same buffer as in the node."""
 
 import contextlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+import io
+import os
+import re
+import shutil
+import sqlite3
+import struct
+from binascii import crc32
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO
+
+import yaml
+from backports import zstd
+from lz4.frame import LZ4FrameDecompressor
 
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.records.bags.files import opened, storage_files
-from valve_friction_ros.records.bags.rosbags_internals import UndecodableError, decode, stamp_of
-from valve_friction_ros.records.bags.storage import DamagedFileError, Storage
+from valve_friction_ros.records.bags.rosbags_internals import (
+    McapFile,
+    UndecodableError,
+    decode,
+    stamp_of,
+)
+from valve_friction_ros.records.bags.storage import (
+    MCAP,
+    ROS_1,
+    SQLITE,
+    ZSTD,
+    DamagedFileError,
+    Storage,
+    first_bytes,
+)
 from valve_friction_ros.records.bags.topics import (
     PRESSURE_TYPE,
     STEM_TYPE,
@@ -31,6 +56,256 @@ from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.stretch import Stretch
 from valve_friction_ros.streams.record_buffer import RecordBuffer
 from valve_friction_ros.streams.samples import joint_position, only_joint, uniform_recording
+
+_HEADER = struct.Struct(">16xH10xI")
+"""Page size, where 1 stands for 65536, and number of pages: https://sqlite.org/fileformat2.html"""
+
+
+class SqliteFile:
+    """A SQLite3 file, read row by row; if it is damaged, until SQLite meets the damage.
+
+    Rows that are still in a write-ahead log beside the file are read as well. `path` is the file
+    that messages name, `file` the same or what was unpacked of it. Without `salvage`, a damaged
+    file raises DamagedFileError, now or while its messages are gone through.
+    """
+
+    def __init__(self, path: Path, file: Path, salvage: bool) -> None:
+        self._path = path
+        self._salvage = salvage
+        with file.open("rb") as stream:
+            page_size, pages = _HEADER.unpack(stream.read(32).ljust(32, b"\0"))
+        page_size = 65536 if page_size == 1 else max(page_size, 1)
+        there, surplus = divmod(file.stat().st_size, page_size)
+        self._loss = f"; it holds {there} of {pages} pages" if there < pages else ""
+        self._folder: TemporaryDirectory[str] | None = None
+        is_logged = file.with_name(f"{file.name}-wal").exists()
+        if is_logged and not salvage:
+            raise DamagedFileError(path, "its recorder did not close it")
+        if surplus and not is_logged and salvage:
+            # SQLite would fill up the last page with zeros, and believe them.
+            self._folder = TemporaryDirectory()
+            file = Path(shutil.copy(file, self._folder.name))
+            os.truncate(file, there * page_size)
+        self._uri = f"{file.absolute().as_uri()}?{'mode=ro' if is_logged else 'immutable=1'}"
+        rows = self._rows("SELECT id, name, type FROM topics")
+        self._topics = {number: Topic(name, kind) for number, name, kind in rows}
+        self.topics: Collection[Topic] = set(self._topics.values())
+
+    def _rows(self, query: str, values: Sequence[int] = ()) -> Iterator[tuple[Any, ...]]:
+        connection = sqlite3.connect(self._uri, uri=True)
+        try:
+            if self._salvage:
+                # Else SQLite refuses to open a file that is shorter than its header says.
+                connection.execute("PRAGMA writable_schema = ON")
+            yield from connection.execute(query, values)
+        except sqlite3.Error as error:
+            if not self._salvage:
+                raise DamagedFileError(self._path, f"{error}{self._loss}") from None
+        finally:
+            connection.close()
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
+        """Go through the messages of some topics in the order of their recording."""
+        wanted = {number: topic for number, topic in self._topics.items() if topic in topics}
+        order = "id" if self._salvage else "timestamp, id"
+        query = (
+            f"SELECT topic_id, data FROM messages {'NOT INDEXED' if self._salvage else ''} "  # noqa: S608
+            f"WHERE topic_id IN ({','.join('?' * len(wanted))}) ORDER BY {order}"
+        )
+        for number, data in self._rows(query, [*wanted]):
+            if isinstance(data, bytes):
+                yield wanted[number], data
+
+    def close(self) -> None:
+        """Remove what was copied."""
+        if self._folder is not None:
+            self._folder.cleanup()
+
+
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x03, 0x04, 0x05, 0x06
+_ENDS = {0x00, 0x0F}
+"""No record of MCAP, but what a disk leaves after a loss of power; and the end of the data."""
+_MAGIC_SIZE = 8
+_WANTED = {_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK}
+_MESSAGE_HEADER = struct.Struct("<HIQQ")
+_CHUNK_HEADER = struct.Struct("<QQQI")
+
+
+def _text(stream: io.BytesIO) -> str:
+    (size,) = struct.unpack("<I", stream.read(4))
+    return stream.read(size).decode()
+
+
+def _chunk_content(chunk: bytes) -> bytes:
+    """Uncompressed content of a chunk; of a cut chunk, the part that is there; empty if damaged."""
+    stream = io.BytesIO(chunk)
+    try:
+        *_, size, checksum = _CHUNK_HEADER.unpack(stream.read(_CHUNK_HEADER.size))
+        compression = _text(stream)
+        stream.read(8)
+        content = stream.read()
+        if compression == "zstd":
+            content = zstd.ZstdDecompressor().decompress(content)
+        elif compression == "lz4":
+            content = LZ4FrameDecompressor().decompress(content)
+    except (struct.error, UnicodeDecodeError, zstd.ZstdError, RuntimeError):
+        return b""
+    is_damaged = len(content) == size and checksum and crc32(content) != checksum
+    return b"" if is_damaged else content
+
+
+def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
+    """Go through records of MCAP, opcode and content, up to the first that is not whole.
+
+    A chunk is opened; of one that is cut, what there is of it comes last.
+    """
+    while len(head := stream.read(9)) == 9:
+        opcode, length = struct.unpack("<BQ", head)
+        rest = size - stream.tell()
+        if opcode in _ENDS or (length > rest and opcode != _CHUNK):
+            return
+        if opcode not in _WANTED:
+            stream.seek(length, io.SEEK_CUR)
+            continue
+        content = stream.read(min(length, rest))
+        if opcode != _CHUNK:
+            yield opcode, content
+            continue
+        records = _chunk_content(content)
+        yield from _records(io.BytesIO(records), len(records))
+        if not records:
+            return
+
+
+class SalvagedMcap:
+    """An MCAP file read from its beginning to its end or first damage, without its index."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._channels: dict[int, Topic] = {}
+        types: dict[int, str] = {}
+        for opcode, content in self._walk():
+            record = io.BytesIO(content)
+            try:
+                if opcode == _SCHEMA:
+                    (schema,) = struct.unpack("<H", record.read(2))
+                    types[schema] = _text(record)
+                elif opcode == _CHANNEL:
+                    channel, schema = struct.unpack("<HH", record.read(4))
+                    self._channels[channel] = Topic(_text(record), types.get(schema, ""))
+            except (struct.error, UnicodeDecodeError):
+                break
+        self.topics: Collection[Topic] = set(self._channels.values())
+
+    def _walk(self) -> Iterator[tuple[int, bytes]]:
+        with self._path.open("rb") as stream:
+            stream.seek(_MAGIC_SIZE)
+            yield from _records(stream, self._path.stat().st_size)
+
+    def messages(self, topics: Collection[Topic]) -> Iterator[tuple[Topic, bytes]]:
+        """Go through the messages of some topics in the order of their recording."""
+        wanted = {number: topic for number, topic in self._channels.items() if topic in topics}
+        for opcode, content in self._walk():
+            if opcode == _MESSAGE and len(content) >= _MESSAGE_HEADER.size:
+                channel, *_ = _MESSAGE_HEADER.unpack_from(content)
+                if channel in wanted:
+                    yield wanted[channel], content[_MESSAGE_HEADER.size :]
+
+
+_STORAGE = re.compile(r"\.(mcap|db3)(\.zstd)?$")
+
+
+def _in_order(path: Path) -> list[str | int]:
+    """Key that sorts bag_2 before bag_10."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.name)]
+
+
+def _named_files(folder: Path) -> list[str] | None:
+    """Names of the files in a bag's metadata; None where there is none that can be read."""
+    try:
+        content = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
+        names = content["rosbag2_bagfile_information"]["relative_file_paths"]
+        return [Path(name).name for name in names] or None
+    except (OSError, ValueError, yaml.YAMLError, LookupError, TypeError):
+        return None
+
+
+def storage_files(path: Path) -> tuple[list[Path], list[str]]:
+    """Return the storage files of a bag in the order of time, and notes on what is missing.
+
+    Raises ValueError if there is none.
+    """
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder")
+    if not path.is_dir():
+        return [path], []
+    names = _named_files(path)
+    there = sorted((file for file in path.iterdir() if _STORAGE.search(file.name)), key=_in_order)
+    if names is None:
+        files = there
+        notes = ["without a metadata.yaml that can be read: took all storage files in the folder"]
+    else:
+        files = [path / name for name in names if (path / name).exists()]
+        absent = [name for name in names if not (path / name).exists()]
+        surplus = [file.name for file in there if file.name not in names]
+        notes = [f"{', '.join(absent)} of metadata.yaml is not there"] if absent else []
+        if surplus:
+            notes.append(f"{', '.join(surplus)} is not in metadata.yaml, and was left out")
+    if not files:
+        raise ValueError(
+            f"{path}: no bag: the folder holds no .mcap or .db3 file: name the folder that the "
+            "recorder made"
+        )
+    return files, notes
+
+
+@contextlib.contextmanager
+def _unpacked(path: Path) -> Iterator[Path]:
+    """Unpack a file that was compressed as a whole; of a cut file, the part that is there."""
+    if not first_bytes(path).startswith(ZSTD):
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        unpacked = Path(folder, path.stem)
+        with (
+            contextlib.suppress(EOFError, zstd.ZstdError),
+            zstd.open(path) as packed,
+            unpacked.open("wb") as whole,
+        ):
+            shutil.copyfileobj(packed, whole)
+        yield unpacked
+
+
+def _is_mcap(path: Path, start: bytes) -> bool:
+    """Return True for MCAP, False for SQLite3, by the first bytes; refuse anything else."""
+    if start.startswith((MCAP, SQLITE)):
+        return start.startswith(MCAP)
+    if not start and path.stat().st_size:
+        raise ValueError(f"{path}: nothing of it can be unpacked: copy or record it anew")
+    if not start:
+        raise ValueError(f"{path}: the file is empty: nothing was recorded, or copied")
+    if start.startswith(ROS_1):
+        raise ValueError(f"{path}: a bag of ROS 1: convert it by rosbags-convert")
+    raise ValueError(f"{path}: neither MCAP nor SQLite3, whatever its name says: record it anew")
+
+
+@contextlib.contextmanager
+def opened(path: Path, salvage: bool) -> Iterator[Storage]:
+    """Open a storage file, compressed or not; its first bytes give its format.
+
+    With `salvage` it is read without its index as far as it goes. Raises ValueError if it is no
+    storage file of ROS 2, and DamagedFileError if it cannot be read without salvage, now or while
+    its messages are gone through.
+    """
+    with _unpacked(path) as file:
+        is_mcap = _is_mcap(path, first_bytes(file))
+        if is_mcap and salvage:
+            yield SalvagedMcap(file)
+            return
+        storage = McapFile(path, file) if is_mcap else SqliteFile(path, file, salvage)
+        with contextlib.closing(storage):
+            yield storage
+
 
 _ALL = 1e9
 """A window longer than any recording, s."""
