@@ -16,6 +16,7 @@ import ast
 import re
 from collections import defaultdict
 from dataclasses import fields, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -235,3 +236,19 @@ def test_the_types_of_the_page_are_there():
     named = re.findall(r"^\| `([A-Z]\w+)` \|", PAGE, re.MULTILINE)
     assert len(named) > 8
     assert not set(named) - set(public_types())
+
+
+def test_only_one_module_rounds_a_number_to_its_interval():
+    """Half a width with digits of its own (``± {width:.2f}``) may show more than is known."""
+    sources = Path(vf.__file__).resolve().parent
+    others = [path for path in sources.rglob("*.py") if path.name != "wording.py"]
+    assert len(others) > 100
+    found = []
+    for path in others:
+        for text in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            parts = text.values if isinstance(text, ast.JoinedStr) else []
+            for before, after in pairwise(parts):
+                is_width = isinstance(before, ast.Constant) and before.value.endswith(("±", "± "))
+                if is_width and isinstance(after, ast.FormattedValue) and after.format_spec:
+                    found.append(f"{path.relative_to(sources)}:{text.lineno}")
+    assert not found

@@ -448,6 +448,7 @@ _FORMATS: dict[str, Callable[[Any, str], str]] = {
         f"{1e6 * one[0]:.3g} µm" if one[1] == "m" else f"{one[0]:.3g} {one[1]}"
     ),
     "±": lambda one, _: with_width(one[0], one[1] or 0.0),
+    "shares": lambda one, _: with_width(100.0 * one[0], 100.0 * one[1]),
     "list": _listed,
     "minute": lambda time, _: utc_minute(time),
     "of": _member,
@@ -606,8 +607,8 @@ _SENTENCES = {
     "combined ({has_baseline:?the baseline cannot be compared|no baseline}: " + _HEALTHY + ")",
     Code.BEFORE_CHANGE: "what it was before it changed, between {earliest:minute} and "
     "{latest:minute} (no baseline and no first moves to compare with: " + _HEALTHY + ")",
-    Code.DEAD_BAND_INTERVAL: "; the stem ignores reversals smaller than {share:in .3g %} ± "
-    "{half_width:two %} % of its travel",
+    Code.DEAD_BAND_INTERVAL: "; the stem ignores reversals smaller than "
+    "{share,half_width:shares} % of its travel",
     Code.BASELINE: "{frictions:list |, |}",
     Code.BASELINE_COULOMB: "coulomb friction {value,half_width:±} N",
     Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",

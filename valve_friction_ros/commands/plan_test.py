@@ -37,6 +37,7 @@ from valve_friction_ros.planning.steps import form_of, table_of
 from valve_friction_ros.records.units import PRESSURE, span
 from valve_friction_ros.records.valve_file import read_valve_file
 from valve_friction_ros.records.whole_file import write_whole
+from valve_friction_ros.wording import number_and_width
 
 _NAMES = (
     "coulomb_friction",
@@ -138,7 +139,10 @@ def _cell(one: Forecast, name: str) -> str:
     share = one.relative(name)
     if one.refusal:
         return "–"
-    return f"{one.values[name]:.4g} ± {percentage(share)}" if share < 1 else "unknown"
+    if not share < 1:
+        return "unknown"
+    value = one.values[name]
+    return f"{number_and_width(value, share * abs(value))[0]} ± {percentage(share)}"
 
 
 def print_plan(plan: StrokePlan, path: Path) -> None:

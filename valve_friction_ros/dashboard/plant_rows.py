@@ -25,7 +25,7 @@ from valve_friction_ros.history import HistoryEntry
 from valve_friction_ros.identification import SLIDING, UNITS
 from valve_friction_ros.outside_text import printable
 from valve_friction_ros.streams import utc
-from valve_friction_ros.wording import number_and_width
+from valve_friction_ros.wording import number_and_width, with_width
 
 
 def zone_asked(query: Mapping[str, str], usual: str) -> ZoneInfo:
@@ -416,7 +416,7 @@ class Difference:
             return "–"
         if not math.isfinite(self.half_width) or not 0.01 <= abs(self.ratio) < 1e4:
             return ratio_text(self.ratio)
-        return f"{self.ratio:.2f} ± {self.half_width:.2f}"
+        return with_width(self.ratio, self.half_width)
 
 
 def side_of_view(view: ValveView) -> ComparedIdentification:

@@ -39,11 +39,10 @@ from valve_friction_ros.fleet.rows import (
     ranked,
     status_of,
 )
-from valve_friction_ros.identification import two_digits
 from valve_friction_ros.outside_text import harmless
 from valve_friction_ros.page_template import page_environment
 from valve_friction_ros.records.whole_file import write_whole
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import number_and_width, percentage
 
 _Row = Mapping[str, Cell]
 _KEPT = (*COLUMNS, PICTURE)
@@ -318,8 +317,8 @@ def _with_width(row: _Row, name: str) -> _Number:
     value, width = row[f"{name}_n"], row[f"{name}_half_width_n"]
     if not isinstance(value, (int, float)):
         return _Number()
-    detail = f"± {two_digits(width)} N" if isinstance(width, (int, float)) else "N"
-    return _Number(f"{value:.4g}", detail, value)
+    number, known = number_and_width(value, width if isinstance(width, (int, float)) else math.nan)
+    return _Number(number, f"{known} N".strip(), value)
 
 
 def _ratio(row: _Row) -> _Number:

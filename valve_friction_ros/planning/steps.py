@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.planning.search import StrokePlan
 from valve_friction_ros.planning.stroke_test import FrictionRange
+from valve_friction_ros.wording import two_digits
 
 _LOW_CURRENT, _CURRENT_SPAN = 4.0, 16.0
 """mA of a signal of 0 %, and from there to 100 %."""
@@ -200,7 +201,7 @@ def form_of(steps: tuple[SetPoint, ...], plan: StrokePlan, tag: str) -> str:
         "",
         f"EXPECTED the stem moves between {100 * likely.reach[0] / plan.valve.travel:.0f} and "
         f"{100 * likely.reach[1] / plan.valve.travel:.0f} % of the travel; Coulomb friction will "
-        f"be known to ± {friction:.3g} N",
+        f"be known to ± {two_digits(friction)} N",
         "AFTER    [ ] signal as before the test   [ ] recording saved   [ ] loop in automatic   "
         "aborted [ ] because ________________",
     ]
