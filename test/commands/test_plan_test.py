@@ -169,7 +169,7 @@ def test_a_file_that_is_there_stays(plan, tmp_path):
 def test_percentages(plan, capsys, text):
     with pytest.raises(SystemExit):
         plan(*KNOWN, f"--from={text}")
-    assert "no percentage of the travel" in capsys.readouterr().err
+    assert "not a percentage of the travel" in capsys.readouterr().err
 
 
 class TestWithoutRos:

@@ -195,7 +195,7 @@ class TestAnswer:
     def test_no_percentage(self, call, estimate, other_csv, capsys, given):
         with pytest.raises(SystemExit):
             call(other_csv, "--estimate", estimate(), "--fail-below", given)
-        assert f"{given!r} is no percentage, such as 90; see --help" in capsys.readouterr().err
+        assert f"{given!r} is not a percentage, such as 90; see --help" in capsys.readouterr().err
 
     def test_a_picture(self, call, estimate, other_csv, valve_options, tmp_path):
         path = tmp_path / "validation.png"

@@ -61,40 +61,40 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
         "--baseline-half-width",
         type=float,
         metavar="N",
-        help="half the width of the 95 %% interval of the baseline (0: it is exact)",
+        help="half width of the 95 %% interval of the baseline (0: exact)",
     )
     parser.add_argument(
         "--baseline-recording",
         type=Path,
         metavar="FILE",
-        help="recording of this valve when it was healthy, read and identified as FILE is; its "
-        "friction is the baseline, and --report draws its signature",
+        help="recording of this valve when it was healthy, read and identified with the same "
+        "options; its friction is the baseline, and --report draws its signature",
     )
 
 
 def _add_sharing(parser: argparse.ArgumentParser) -> None:
-    """Declare on how many processes, or on which cluster."""
+    """Declare the number of processes, or the cluster."""
     parser.add_argument(
         "--jobs",
         type=int,
         metavar="N",
-        help="recordings identified at the same time, each by its own process (a core each)",
+        help="number of recordings identified in parallel, one process each (one per core)",
     )
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="instead of processes of this machine: the workers of a Dask cluster, which see DIR "
-        "under the same path; tcp://host:8786 or tls://host:8786 (the extra `cluster`)",
+        help="use the workers of a Dask cluster, which must see DIR under the same path, instead "
+        "of local processes; tcp://host:8786 or tls://host:8786 (extra `cluster`)",
     )
 
 
 def _identify(parser: argparse.ArgumentParser) -> None:
     parser.description = "Identify the Karnopp friction model from a recorded CSV file or bag."
     parser.epilog = (
-        "All results are in SI units. Exit code 2: the file, the record or all valves of a bag "
-        "were refused, or a file could not be written; 1: some valves were refused; 3: a diagnosis "
-        "reached --fail-on. Without a baseline no friction is compared: a line on stderr "
-        "says so, and the exit code stays 0 unless signals or model are in doubt."
+        "All results are in SI units. Exit code 1: some valves were refused; 2: the file, the "
+        "record or all valves of a bag were refused, or a file could not be written; 3: a "
+        "diagnosis reached --fail-on. Without a baseline no friction is compared: a line on stderr "
+        "says so, and the exit code stays 0 unless the signals or the model are in doubt."
     )
     add_recording_arguments(parser)
     add_identification_arguments(parser)
@@ -105,11 +105,12 @@ def _identify(parser: argparse.ArgumentParser) -> None:
 
 def _inspect(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Show what would be read of a table: how it is written, columns, units, rates, gaps, bad "
-        "values, and the course of each signal."
+        "Show how a table would be read: format, columns, units, sampling rates, gaps, bad values "
+        "and a sketch of each signal."
     )
     parser.epilog = (
-        "Exit code 2: the file cannot be read, or leaves something open; stderr asks for all of it."
+        "Exit code 2: the file cannot be read or is ambiguous; stderr names every option that "
+        "settles it."
     )
     add_recording_arguments(parser)
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the recording")
@@ -118,10 +119,9 @@ def _inspect(parser: argparse.ArgumentParser) -> None:
 
 def _identify_folder(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Identify all recordings in a folder and in the folders below it, on all cores or on the "
-        "workers of a Dask cluster. The "
-        "results are a table with a row for each valve, and a page that ranks the valves. After an "
-        "interruption the same command goes on."
+        "Identify all recordings in a folder and its subfolders, on all cores or on the workers of "
+        "a Dask cluster. Write a table with one row per valve, and a page that ranks the valves. "
+        "After an interruption, the same command resumes."
     )
     parser.epilog = (
         "Exit code 0: all were identified; 1: some were refused; 2: all recordings or an option "
@@ -130,8 +130,8 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "folder",
         metavar="DIR",
-        help="where the recordings are: a folder, or s3://bucket/folder and other stores by "
-        "fsspec's names (the extra `stores`)",
+        help="folder of the recordings, or s3://bucket/folder and other stores named as in fsspec "
+        "(extra `stores`)",
     )
     parser.add_argument(
         "--output",
@@ -139,57 +139,59 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="FILE",
-        help="FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page for people, valves ranked), "
-        "written at the end and when interrupted; may be repeated; until then the rows, in the "
-        "order in which they finished, are in FILE.sqlite",
+        help="FILE.csv, FILE.jsonl (JSON lines) or FILE.html (a page that ranks the valves), "
+        "written at the end and on interruption; may be repeated; until then FILE.sqlite holds the "
+        "rows in the order in which they were finished",
     )
     parser.add_argument(
         "--no-reports",
         action="store_true",
-        help="with FILE.html: no page for each valve in the folder FILE_reports, which takes a "
+        help="with FILE.html: write no page per valve in the folder FILE_reports, which takes a "
         "second and half a megabyte each",
     )
     parser.add_argument(
         "--baselines",
         type=Path,
         metavar="FILE.csv",
-        help="friction of the healthy valves: an earlier output of this command for a folder with "
-        "the same names, or a table with the columns recording (empty: any), valve and "
-        "coulomb_friction_n; the diagnosis compares with it",
+        help="friction of the healthy valves, with which the diagnosis compares: an earlier output "
+        "of this command for a folder with the same names, or a table with the columns recording "
+        "(empty: any), valve and coulomb_friction_n",
     )
     add_fail_on(parser)
     parser.add_argument(
         "--valve",
         type=Path,
         metavar="FILE.yaml",
-        help="valve of the recordings that have neither NAME.valve.yaml beside them nor valve.yaml "
-        "in their bag or beside them",
+        help="valve file for recordings that have neither NAME.valve.yaml beside them nor "
+        "valve.yaml in their bag or beside them",
     )
     parser.add_argument(
         "--plant",
         type=Path,
         metavar="FILE.csv",
-        help="the valves of the recordings in one table: tag, area, travel, spring, range; a "
-        "recording is of the valve whose tag is in its name or above its values",
+        help="table of the valves: tag, area, travel, spring, range; a recording belongs to the "
+        "valve whose tag appears in its file name or above its values",
     )
     parser.add_argument(
         "--history",
         type=Path,
         metavar="FILE.sqlite",
-        help="with --plant: file each result under its tag and the time of its recording, and "
-        "compare it with the baseline that is kept there; `history` and the dashboard read it",
+        help="with --plant: store each result under its tag and the time of its recording, and "
+        "compare it with the baseline stored there; `history` and the dashboard read it",
     )
     parser.add_argument(
         "--first-is-baseline",
         action="store_true",
-        help="with --history: the first result of a valve without a baseline becomes its baseline",
+        help="with --history: take the first result of a valve without a baseline as its baseline",
     )
     _add_sharing(parser)
     parser.add_argument(
-        "--retry-failed", action="store_true", help="identify again what was refused before"
+        "--retry-failed",
+        action="store_true",
+        help="identify again the recordings that were refused before",
     )
     parser.add_argument(
-        "--redo", action="store_true", help="replace rows that were made with other options"
+        "--redo", action="store_true", help="replace rows that were computed with other options"
     )
     add_identification_arguments(parser)
     add_reading_arguments(parser)
@@ -197,12 +199,14 @@ def _identify_folder(parser: argparse.ArgumentParser) -> None:
 
 def _describe_valve(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Write the valve file of an actuator. What the options leave open is asked for; with --yes "
-        "only what must be known."
+        "Write the valve file of an actuator. Ask for what the options leave open; with --yes only "
+        "for what is required."
     )
     parser.epilog = "Exit code 2: an answer is missing or impossible, or the file was not written."
-    parser.add_argument("--output", type=Path, metavar="FILE.yaml", help="file (standard output)")
-    parser.add_argument("--replace", action="store_true", help="replace a file that is there")
+    parser.add_argument(
+        "--output", type=Path, metavar="FILE.yaml", help="valve file (standard output)"
+    )
+    parser.add_argument("--replace", action="store_true", help="overwrite an existing file")
     parser.add_argument("--yes", action="store_true", help="take the defaults instead of asking")
     for each in QUESTIONS:
         parser.add_argument(
@@ -211,24 +215,26 @@ def _describe_valve(parser: argparse.ArgumentParser) -> None:
             metavar="ANSWER",
             help=f"{each.words}: {each.example}" + (f" ({each.default})" if each.default else ""),
         )
-    add_table_arguments(parser, "how its tables are written; kept in the section `columns:`")
+    add_table_arguments(parser, "format of its tables, stored in the section `columns:`")
 
 
 def _plan_test(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Plan the stroke test with the smallest predicted intervals, by the Fisher information of "
-        "simulated tests, and write it as a file that `pressure_source` plays. No valve is moved."
+        "simulated tests, and write it as a file that `pressure_source` plays. This moves no valve."
     )
     parser.epilog = (
         "All values are in SI units unless an option says otherwise. Exit code 2: a file or an "
-        "option was refused, no test within the limits tells the friction, or a file could not be "
-        "written."
+        "option was refused, no test within the limits determines the friction, or a file could "
+        "not be written."
     )
     parser.add_argument(
         "--valve", type=Path, required=True, metavar="VALVE.yaml", help="the valve file"
     )
     parser.add_argument(
-        "--valve-name", metavar="NAME", help="one of several valves, of the valve file or --history"
+        "--valve-name",
+        metavar="NAME",
+        help="which of several valves in the valve file or in --history",
     )
     add_planning_arguments(parser)
     parser.add_argument(
@@ -236,27 +242,27 @@ def _plan_test(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("stroke_test.csv"),
         metavar="FILE.csv",
-        help="corners of the pressure: time_s and pressure_pa (%(default)s)",
+        help="corners of the pressure signal: time_s and pressure_pa (%(default)s)",
     )
     parser.add_argument(
         "--table",
         type=Path,
         metavar="FILE.csv",
-        help="the set points with their times, in %%, mA, kPa and bar, the positions at which to "
-        "abort, and what each step tells: for a control system without ROS",
+        help="set points with their times in %%, mA, kPa and bar, abort positions, and what each "
+        "step determines: for a control system without ROS",
     )
     parser.add_argument(
         "--form",
         type=Path,
         metavar="FILE.txt",
-        help="the same as the form of a partial-stroke test, for a person with a stopwatch",
+        help="the same as a partial-stroke test form, for a person with a stopwatch",
     )
     parser.add_argument(
         "--signal-range",
         metavar="RANGE",
-        help="pressures of a signal of 0 and 100 %%, as '0.2..1.0 bar' (those of the spring)",
+        help="pressures at 0 and 100 %% signal, such as '0.2..1.0 bar' (the spring range)",
     )
-    parser.add_argument("--replace", action="store_true", help="replace a file that is there")
+    parser.add_argument("--replace", action="store_true", help="overwrite an existing file")
     parser.add_argument(
         "--figure", type=Path, metavar="FILE.png", help="draw pressure and expected stem"
     )
@@ -270,17 +276,17 @@ def _percent(text: str) -> float:
     except ValueError:
         share = math.nan
     if not share <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no percentage, such as 90")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage, such as 90")
     return share
 
 
 def _validate(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Simulate a recording with an identified model, and compare the stems. Validate on another "
-        "recording than the one that was identified."
+        "Simulate a recording with an identified model, and compare the stem positions. Use a "
+        "different recording from the one that was identified."
     )
     parser.epilog = (
-        "All values are in SI units. Exit code 2: a file or the record was refused, or the picture "
+        "All values are in SI units. Exit code 2: a file or the record was refused, or the figure "
         "could not be written; 3: the fit is below --fail-below."
     )
     add_recording_arguments(parser)
@@ -295,21 +301,21 @@ def _validate(parser: argparse.ArgumentParser) -> None:
         "--fail-below",
         type=_percent,
         metavar="PERCENT",
-        help="exit code 3 if the fit is below this; below "
-        f"{100 * LEAST_FIT:g} it is called poor in any case",
+        help="exit with code 3 if the fit is below this; a fit below "
+        f"{100 * LEAST_FIT:g} is always called poor",
     )
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw both stems")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="plot both stem positions")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 SERVICES = {
-    "identify": "identify the buffered samples, and say the diagnosis",
+    "identify": "identify the buffered samples and return the diagnosis",
     "set_baseline": "take the last result as the friction of the healthy valve",
     "restore_baseline": "undo the last set_baseline",
     "save": "save the buffered samples as a bag",
-    "report": "write a page about the last result",
+    "report": "write a report of the last result",
     "clear": "empty the buffer",
-    "reset_usage": "count the usage anew, as the packing is renewed",
+    "reset_usage": "reset the usage counters, after the packing was replaced",
 }
 
 
@@ -327,19 +333,21 @@ def _service(name: str) -> str:
 def _call(parser: argparse.ArgumentParser) -> None:
     listed = "\n".join(f"  {name:<17} {text}" for name, text in SERVICES.items())
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.description = f"Call a service of a running identifier, and wait:\n{listed}"
+    parser.description = (
+        f"Call a service of a running identifier and wait for its answer:\n{listed}"
+    )
     parser.epilog = (
-        "Exit code 2: the identifier is not there, refused, or did not answer in time; "
+        "Exit code 2: the identifier is not running, refused, or did not answer in time; "
         "3: the diagnosis reached --fail-on."
     )
-    parser.add_argument("valve", metavar="VALVE", help="its namespace, such as /fv_101")
+    parser.add_argument("valve", metavar="VALVE", help="namespace of the valve, such as /fv_101")
     parser.add_argument("service", type=_service, metavar="SERVICE", help="one of the above")
     parser.add_argument(
         "--timeout",
         type=float,
         default=_ANSWER_TIMEOUT,
         metavar="S",
-        help="how long to wait for the answer (%(default)g)",
+        help="time to wait for the answer (%(default)g)",
     )
     add_fail_on(parser)
 
@@ -348,7 +356,7 @@ EARLIEST = datetime(1970, 1, 1, tzinfo=timezone.utc)
 
 
 LATEST = datetime(2262, 1, 1, tzinfo=timezone.utc)
-"""Whose nanoseconds still are a signed 64-bit number."""
+"""Nanoseconds since 1970 of a later year may not fit a signed 64-bit integer."""
 
 
 def _time(text: str) -> datetime:
@@ -357,7 +365,7 @@ def _time(text: str) -> datetime:
         time = datetime.fromisoformat(text.replace("Z", "+00:00"))
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no time: write it as 2026-11-21 or 2026-11-21T18:30"
+            f"{text!r} is not a time: write it as 2026-11-21 or 2026-11-21T18:30"
         ) from None
     time = time if time.tzinfo else time.replace(tzinfo=timezone.utc)
     if not EARLIEST <= time <= LATEST:
@@ -366,7 +374,7 @@ def _time(text: str) -> datetime:
 
 
 def _until(text: str) -> datetime:
-    """Read the end of a stretch; a date stands for the whole day."""
+    """Read the end of a period; a date includes its whole day."""
     is_date = "T" not in text and " " not in text
     return min(_time(text) + timedelta(days=is_date), LATEST)
 
@@ -384,12 +392,12 @@ def _add_history(parser: argparse.ArgumentParser, words: str) -> None:
 
 def _history(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "List what the identifiers have kept: identifications, refusals, baselines, trend, "
-        "usage, answers to its command and recorded alarms."
+        "List what the identifiers have stored: identifications, refusals, baselines, trend, "
+        "usage, response to the command, and alarms."
     )
     parser.epilog = (
         "Times are in UTC. Exit code 2: the file or an option was refused, or the table or the "
-        "picture could not be written; 3: the latest diagnosis of a valve reached --fail-on."
+        "figure could not be written; 3: the latest diagnosis of a valve reached --fail-on."
     )
     _add_history(parser, "the identifiers' history_file, or the server of their history_url")
     add_valve_argument(parser)
@@ -401,14 +409,14 @@ def _history(parser: argparse.ArgumentParser) -> None:
         type=_until,
         default=LATEST,
         metavar="TIME",
-        help="only before this time; a date stands for its whole day",
+        help="only before this time; a date includes its whole day",
     )
     parser.add_argument("--csv", type=Path, metavar="FILE.csv", help="write the list as a table")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw friction over time")
+    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="plot friction over time")
     parser.add_argument(
         "--usage",
         action="store_true",
-        help="in place of the identifications: distance, reversals, breakaways and times, by days",
+        help="list distance, reversals, breakaways and times per day instead of identifications",
     )
     add_fail_on(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -416,20 +424,20 @@ def _history(parser: argparse.ArgumentParser) -> None:
 
 def _history_copy(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Copy a history: from a file to a PostgreSQL server, back, or between two of a kind. Only "
-        "what the other one lacks, or has otherwise, is written, so a copy that was interrupted is "
-        "called again. Then all rows are compared, by count and checksum."
+        "Copy a history from a file to a PostgreSQL server, from a server to a file, or between "
+        "two of a kind. Only rows that the target lacks or holds differently are written, so an "
+        "interrupted copy can be run again. Then all rows are compared by count and checksum."
     )
     parser.epilog = (
-        "The address of a server is postgresql://user@host/database; its password belongs into "
-        "~/.pgpass or PGPASSWORD. Exit code 1: rows differ, as the other one has kept them "
-        "otherwise; 2: one of the two cannot be read or written."
+        "The address of a server is postgresql://user@host/database; put its password in "
+        "~/.pgpass or PGPASSWORD. Exit code 1: rows differ, because the target holds other values "
+        "for them; 2: the source or the target cannot be read or written."
     )
     parser.add_argument(
-        "source", type=history_place, metavar="FROM", help=f"the history that is copied, {PLACE}"
+        "source", type=history_place, metavar="FROM", help=f"the history to copy, {PLACE}"
     )
     parser.add_argument(
-        "target", type=history_place, metavar="TO", help="where to; it is made if it is missing"
+        "target", type=history_place, metavar="TO", help="the target; created if it does not exist"
     )
     add_valve_argument(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -437,12 +445,12 @@ def _history_copy(parser: argparse.ArgumentParser) -> None:
 
 def _dashboard(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Serve the pages of a history: plant, valve, alarms and comparison. Nothing is heard and "
-        "no ROS is needed; alarms of a file can be answered. The node `dashboard` shows what its "
-        "identifiers say now, too."
+        "Serve the pages of a history: plant, valve, alarms and comparison. It needs no ROS and "
+        "shows no live values; alarms in a history file can be answered. The node `dashboard` also "
+        "shows what the identifiers report now."
     )
     parser.epilog = (
-        "Ctrl-C ends it. Exit code 2: the history cannot be read, or the address is taken or is "
+        "Stop it with Ctrl-C. Exit code 2: the history cannot be read, or the address is in use or "
         "not allowed."
     )
     _add_history(parser, "the history of `identify-folder --history` or of the identifiers")
@@ -450,40 +458,41 @@ def _dashboard(parser: argparse.ArgumentParser) -> None:
         "--time-zone",
         default="UTC",
         metavar="ZONE",
-        help="zone of the times, as Europe/Berlin (%(default)s)",
+        help="time zone, such as Europe/Berlin (%(default)s)",
     )
     parser.add_argument(
         "--reports",
         type=Path,
         metavar="DIR",
-        help="folder of the reports, as `identify-folder --output FILE.html` makes it: each valve "
-        "shows its own",
+        help="folder of reports that `identify-folder --output FILE.html` wrote: each valve page "
+        "links to its own",
     )
     parser.add_argument(
-        "--port", type=int, default=8080, metavar="N", help="port to listen at (%(default)s)"
+        "--port", type=int, default=8080, metavar="N", help="port to listen on (%(default)s)"
     )
     parser.add_argument(
         "--host",
         default="127.0.0.1",
         metavar="ADDRESS",
-        help="address to listen at; any but this machine's own needs accounts (%(default)s)",
+        help="address to listen on; any other than loopback needs accounts (%(default)s)",
     )
     parser.add_argument(
         "--accounts",
         type=Path,
         metavar="FILE",
-        help="accounts by `valve_friction dashboard-account`; empty: the environment's",
+        help="accounts file made with `valve_friction dashboard-account`; empty: from the "
+        "environment",
     )
 
 
 def _dashboard_account(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Print an account of the dashboard: its name, role and the hash of a password, which is "
-        "asked for twice on a terminal, else read from the first line of the standard input."
+        "Print an account line for the dashboard: name, role and the hash of a password. The "
+        "password is asked for twice on a terminal, or read from the first line of standard input."
     )
     parser.epilog = (
         "`valve_friction dashboard-account anna --role operate >> accounts; chmod 600 accounts` "
-        "adds it to a file, which the dashboard reads when it starts. Exit code 2: the name or the "
+        "adds it to a file that the dashboard reads at start. Exit code 2: the name or the "
         "password was refused."
     )
     parser.add_argument("name", metavar="NAME", help="letters, digits and _.@+-")
@@ -491,7 +500,7 @@ def _dashboard_account(parser: argparse.ArgumentParser) -> None:
         "--role",
         choices=[role.value for role in Role],
         default=Role.VIEW.value,
-        help="view: look only; operate: call services of identifiers too (%(default)s)",
+        help="view: read only; operate: may also call services of identifiers (%(default)s)",
     )
 
 
@@ -501,8 +510,8 @@ PAGE = "reproduction.html"
 def _reproduce_paper(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Run the paper's experiments, identification and validation on the simulated bench, and "
-        f"write {PAGE} and every figure, beside the paper's numbers. The last line counts the "
-        "matches, and names what does not match."
+        f"write {PAGE} with every figure next to the paper's numbers. The last line counts the "
+        "matches and names what does not match."
     )
     parser.epilog = "Exit code 0: the report is written, whatever matched; 2: it is not."
     parser.add_argument(
@@ -510,14 +519,14 @@ def _reproduce_paper(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("reproduction"),
         metavar="FOLDER",
-        help="where the report goes (%(default)s)",
+        help="output folder (%(default)s)",
     )
     parser.add_argument(
         "--config",
         type=Path,
         metavar="FOLDER",
-        help="folder of bench_low.yaml, bench_high.yaml and bench_graphite.yaml; by default the "
-        "package's own",
+        help="folder with bench_low.yaml, bench_high.yaml and bench_graphite.yaml (those of the "
+        "package)",
     )
     parser.add_argument(
         "--position-noise-um",
@@ -543,15 +552,14 @@ def _demo(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         "Exit code 0: all numbers are within tolerance, and the excess friction was diagnosed; 1: "
-        "not so; "
-        "2: the bench did not run, or the picture could not be written."
+        "they are not, or it was not; 2: the bench did not run, or the figure could not be written."
     )
     parser.add_argument(
         "--output",
         type=Path,
         default=Path("valve_friction_demo.png"),
         metavar="FILE.png",
-        help="picture of the result (%(default)s)",
+        help="figure of the result (%(default)s)",
     )
     parser.add_argument(
         "--dashboard",
@@ -577,4 +585,4 @@ DECLARATIONS: Mapping[str, Callable[[argparse.ArgumentParser], None]] = MappingP
         "demo": _demo,
     }
 )
-"""What declares the arguments of each sub-command, by its name."""
+"""Function that declares the arguments of each sub-command."""

@@ -38,7 +38,7 @@ def _percent(text: str) -> float:
     except ValueError:
         share = math.nan
     if not 0 <= share <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no percentage of the travel, such as 40")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage of the travel, such as 40")
     return share
 
 
@@ -52,15 +52,15 @@ def add_planning_arguments(parser: argparse.ArgumentParser) -> None:
         dest="aim",
         choices=[*AIMS],
         default="friction",
-        help="what shall be known best; friction: F_c, F_v and F_s alike (%(default)s)",
+        help="parameter to determine best; friction: F_c, F_v and F_s alike (%(default)s)",
     )
 
 
 def _add_known(parser: argparse.ArgumentParser) -> None:
     known = parser.add_argument_group(
         "known",
-        "of friction and spring: an option goes before an earlier result, and that before the "
-        "valve file; without any friction a range from light to heavy packings is planned for",
+        "friction and spring: an option overrides an earlier result, which overrides the valve "
+        "file; without any friction, the plan covers light to heavy packings",
     )
     source = known.add_mutually_exclusive_group()
     source.add_argument(
@@ -88,19 +88,19 @@ def _add_known(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=2.0,
         metavar="FACTOR",
-        help="friction may be so many times smaller or larger than what is known (%(default)g)",
+        help="factor by which friction may be smaller or larger than stated (%(default)g)",
     )
 
 
 def _add_limits(parser: argparse.ArgumentParser) -> None:
-    limits, default = parser.add_argument_group("limits", "of what the test may do"), Limits()
+    limits, default = parser.add_argument_group("limits", "what the test may do"), Limits()
     limits.add_argument(
         "--from",
         dest="lowest",
         type=_percent,
         default=default.lowest,
         metavar="PERCENT",
-        help=f"lowest position, of the travel ({100 * default.lowest:g})",
+        help=f"lowest position, in percent of travel ({100 * default.lowest:g})",
     )
     limits.add_argument(
         "--to",
@@ -113,15 +113,15 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
     limits.add_argument(
         "--allow-stops",
         action="store_true",
-        help="the stem may reach seat and stop; else a stem without friction stays "
-        f"{100 * default.stop_margin:g} %% of the travel away from them",
+        help="let the stem reach seat and stop; otherwise even a stem without friction stays "
+        f"{100 * default.stop_margin:g} %% of travel away from them",
     )
     for name, unit, text in (
         ("speed", "M/S", "largest speed of the sliding stem, m/s"),
         ("duration", "S", "longest duration, s"),
         ("pressure_rate", "PA/S", "largest rate of the pressure, Pa/s"),
-        ("pressure_minimum", "PA", "lowest pressure, Pa; the valve file's holds too"),
-        ("pressure_maximum", "PA", "highest pressure, Pa; the valve file's holds too"),
+        ("pressure_minimum", "PA", "lowest pressure, Pa; the limit in the valve file applies too"),
+        ("pressure_maximum", "PA", "highest pressure, Pa; the limit in the valve file applies too"),
     ):
         value = getattr(default, name)
         shown = f" ({value:g})" if math.isfinite(value) else ""
@@ -140,7 +140,7 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
         ("sample-rate", "HZ", usual.sample_rate, "samples per second of both signals"),
         ("position-noise-um", "UM", 1e6 * usual.position_noise, "noise of the stem sensor, µm"),
         ("pressure-noise-pa", "PA", usual.pressure_noise, "noise of the pressure sensor, Pa"),
-        ("converter-lag", "S", usual.converter_lag, "time constant of what sets the pressure, s"),
+        ("converter-lag", "S", usual.converter_lag, "time constant of the pressure converter, s"),
     ):
         sensors.add_argument(
             f"--{name}", type=float, default=value, metavar=unit, help=f"{text} (%(default)g)"
@@ -149,7 +149,7 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
         "--timing-uncertainty",
         type=float,
         metavar="S",
-        help="standard deviation of the whole lag between the signals, as of `identify` (valve "
+        help="standard deviation of the total lag between the signals, as in `identify` (valve "
         f"file, or {TIMING_UNCERTAINTY:g})",
     )
 

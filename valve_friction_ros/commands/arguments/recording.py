@@ -38,8 +38,8 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         metavar="FILE",
-        help="recording: CSV, may be gzipped, or - for standard input; Excel or Parquet; or a bag "
-        "of ROS 2, MCAP or SQLite3: its folder or one of its files, may be compressed",
+        help="recording: CSV (gzipped or not, - for standard input), Excel or Parquet; or a ROS 2 "
+        "bag, MCAP or SQLite3: its folder or one of its files, compressed or not",
     )
     parser.add_argument(
         "--valve",
@@ -52,37 +52,37 @@ def add_recording_arguments(parser: argparse.ArgumentParser) -> None:
         "--save-columns",
         type=Path,
         metavar="FILE.yaml",
-        help="write the valve file with what was recognized of this table: the next one like it "
-        "needs no option",
+        help="write a valve file with the recognized table format, so that the next export needs "
+        "no option",
     )
     add_reading_arguments(parser)
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what a file does not say itself."""
+    """Declare the options that say what a file leaves open."""
     stretch = parser.add_argument_group("part of the recording")
     for name, default, help_text in (
-        ("begin", -math.inf, "leave out what lies before S seconds after the first sample"),
-        ("end", math.inf, "leave out what lies after S seconds after the first sample"),
-        ("last", math.inf, "only the last S seconds, as a node with `window` S takes them"),
+        ("begin", -math.inf, "skip everything before S seconds after the first sample"),
+        ("end", math.inf, "skip everything after S seconds after the first sample"),
+        ("last", math.inf, "only the last S seconds, like a node with `window` S"),
     ):
         stretch.add_argument(f"--{name}", type=float, default=default, metavar="S", help=help_text)
     bag = parser.add_argument_group(
-        "bags", "topics are found by their types, unless these options name them"
+        "bags", "topics are found by type unless these options name them"
     )
     bag.add_argument(
         "--pressure-topic",
         metavar="TOPIC",
-        help="topic of the pressure; without a leading slash: in the namespace of each valve",
+        help="pressure topic; without a leading slash: in the namespace of each valve",
     )
-    bag.add_argument("--stem-topic", metavar="TOPIC", help="topic of the stem, likewise")
+    bag.add_argument("--stem-topic", metavar="TOPIC", help="stem topic, likewise")
     bag.add_argument(
         "--joint", metavar="NAME", help="joint that is the stem (the only one, or 'stem')"
     )
-    bag.add_argument("--valve-name", metavar="NAMESPACE", help="only this valve of several")
+    bag.add_argument("--valve-name", metavar="NAMESPACE", help="which of several valves")
     add_table_arguments(
         parser,
-        "each may stand in the valve file instead, in its section `columns:`, as time_column: Time",
+        "each may be set in the section `columns:` of the valve file instead, as time_column: Time",
     )
 
 
