@@ -46,7 +46,7 @@ def test_each_parameter_has_its_description_unit_and_default():
         assert f"`{spec.name}`\n: " in text
     assert (
         "`window`\n: `60.0` s; 0.1 to 86400\n\n"
-        "  Length of the record that is kept and identified.\n"
+        "  Length of the record that is buffered and identified.\n"
     ) in text
     assert "`joint`\n: `stem`; at start only\n" in text
     assert "`travel`\n: not stated: `0.028575` m is assumed\n" in text

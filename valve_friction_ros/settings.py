@@ -168,7 +168,8 @@ class _Valve:
     diaphragm_area = Setting(_Of("model", "BENCH_VALVE.diaphragm_area"), (1e-6, 1e3))
     """Diaphragm area S_a [m²]."""
     pressure_reference = Setting(_Of("model", "BENCH_VALVE.pressure_reference"), (-1e9, 1e9))
-    """Pressure without force P_ref [Pa]: 101325 for an absolute sensor, 0 for a gauge sensor."""
+    """Pressure at which the actuator exerts no force, P_ref [Pa]: 101325 for an absolute sensor, 0
+    for a gauge sensor."""
     travel = Setting(_Of("model", "BENCH_VALVE.travel"))
     """Stem travel between its stops [m]; .inf: no stops. Above zero."""
     pressure_minimum = Setting(_Of("model", "BENCH_VALVE.pressure_minimum"))
@@ -179,7 +180,7 @@ class _Valve:
 
 class _Karnopp:
     mass = Setting(_Of("model", "LOW_FRICTION.mass"), (1e-6, 1e6))
-    """Mass of the moving parts m [kg]."""
+    """Moving mass m [kg]."""
     viscous_friction = Setting(_Of("model", "LOW_FRICTION.viscous_friction"), (0.0, 1e9))
     """Viscous friction coefficient F_v [N·s/m]."""
     coulomb_friction = Setting(_Of("model", "LOW_FRICTION.coulomb_friction"), (0.0, 1e9))
@@ -196,173 +197,176 @@ class _Karnopp:
 
 class _Identification:
     method = Setting(DEFAULT_METHOD, choices=METHOD_NAMES, option="--method", spell=current_name)
-    """Method of identification [-]: plant, with the imperfections of a plant in the fit; bench,
-    with the Karnopp model alone; published, the regression of the paper; signature, for two periods
-    of a slow triangle in the window."""
+    """Identification method [-]: plant fits the imperfections of a plant too; bench fits the
+    Karnopp model alone; published is the regression of the paper; signature needs two periods of a
+    slow triangle in the window."""
     derivative_window = Setting(0, (0, 100_001), option="--derivative-window")
     """Length d of the derivative window [samples], odd; 0: 31 for the published estimate, and
     chosen from the noise of each record for the method signature."""
     timing_uncertainty = Setting(None, option="--timing-uncertainty")
-    """Standard deviation of the whole lag between the signals [s]: clocks, transmitters, a volume
-    before the diaphragm; unset: 0.04, a plant without special care, and 0 by the
-    method bench; 0: the signals surely belong together."""
+    """Standard deviation of the total lag between the signals [s]: clocks, transmitters, the volume
+    ahead of the diaphragm; unset: 0.04, a plant without special care, and 0 for the method bench;
+    0: the signals are known to be synchronous."""
     polynomial_order = Setting(IdentificationSettings.order, (2, 20), option="--order")
     """Order n of the derivative polynomial [-]."""
     position_bias = Setting(None, option="--position-bias")
     """Bias x̄ of the position [m], for the four-column form of the methods published and signature;
     unset: identify the preload."""
     assumed_mass = Setting(IdentificationSettings.assumed_mass, (1e-6, 1e6))
-    """Mass assumed where a record does not determine it, and mass is not stated [kg]."""
+    """Mass assumed where the record does not determine it and none is stated [kg]."""
 
 
 class _Survey:
     packing = Setting("ptfe", choices=PACKINGS, option="--packing")
-    """Class of the packing [-], by which a first survey without a baseline judges the dead band:
-    ptfe, watched from 10 % of the travel and bad from 20; graphite, 15 and 30."""
+    """Packing class [-], which sets the dead band limits of a first survey without a baseline:
+    ptfe, watch from 10 % of the travel and bad from 20 %; graphite, 15 % and 30 %."""
     survey_watch = Setting(None, option="--survey-watch")
-    """Dead band from which a first survey says watch, as a share of the travel [-]; unset: that of
+    """Dead band above which a first survey says watch, as a share of the travel [-]; unset: that of
     the packing."""
     survey_bad = Setting(None, option="--survey-bad")
-    """Dead band from which a first survey says bad, as a share of the travel [-]; unset: that of
+    """Dead band above which a first survey says bad, as a share of the travel [-]; unset: that of
     the packing."""
 
 
 class _Identifier:
     window = Setting(60.0, (0.1, 86400.0))
-    """Length of the record that is kept and identified [s]."""
+    """Length of the record that is buffered and identified [s]."""
     input_timeout = Setting(3.0, (0.1, 86400.0))
-    """Silence of an input after which it is reported [s]."""
+    """Time without a message after which an input is reported as silent [s]."""
     clock_tolerance = Setting(60.0, (0.0, 1e9))
-    """Distance of stamps from the clock of the node from which it is reported [s]; 0: none, as for
-    recordings that are played without /clock."""
+    """Difference between stamps and the clock of the node above which it is reported [s]; 0: never,
+    as for recordings played without /clock."""
     identification_limit = Setting(600.0, (1.0, 86400.0))
-    """Time after which an identification that has not ended is reported as stuck [s]."""
+    """Time after which an unfinished identification is reported as stuck [s]."""
     baseline_coulomb_friction = Setting(None)
-    """Coulomb friction of the healthy valve [N], above zero; unset: not known."""
+    """Coulomb friction of the healthy valve [N], above zero; unset: unknown."""
     baseline_in_alarm = Setting(False)
-    """Whether ~/set_baseline and ~/restore_baseline may change the baseline in WARN or
-    ERROR [-]."""
+    """Whether ~/set_baseline and ~/restore_baseline may change the baseline while the level is WARN
+    or ERROR [-]."""
     warn_ratio = Setting(_Of("health", "FrictionLimits.warn_ratio"), (1.0, 1e3))
-    """Friction over baseline worth maintenance [-]."""
+    """Ratio of friction to baseline that calls for maintenance [-]."""
     error_ratio = Setting(_Of("health", "FrictionLimits.error_ratio"), (1.0, 1e3))
-    """Friction over baseline in excess [-]."""
+    """Ratio of friction to baseline that is excessive [-]."""
     low_ratio = Setting(_Of("health", "FrictionLimits.low_ratio"), (0.0, 1.0))
-    """Friction over baseline at which the packing may leak [-]."""
+    """Ratio of friction to baseline below which the packing may leak [-]."""
     save_folder = Setting("", read_only=True)
     """Folder that ~/save writes bags into [-]; empty: valve_friction_ros/saved under ROS_HOME, or
-    under ~/.ros; a relative one is in valve_friction_ros there."""
+    under ~/.ros; a relative path is below valve_friction_ros there."""
     save_megabytes = Setting(1000.0, (0.001, 1e6), read_only=True)
-    """Room that the bags of ~/save of a valve may take [MB], and as much the pages of ~/report;
-    when it is full, both refuse."""
+    """Disk space that the bags of ~/save may take per valve [MB], and likewise the reports of
+    ~/report; once it is used up, the service refuses."""
     report_folder = Setting("", read_only=True)
     """Folder that ~/report writes pages into [-]; empty: valve_friction_ros/reports under ROS_HOME,
-    or under ~/.ros; a relative one is in valve_friction_ros there."""
+    or under ~/.ros; a relative path is below valve_friction_ros there."""
     history_days = Setting(1100.0, (0.0, 36525.0), read_only=True)
-    """Time for which they are kept [days]; 0: for ever."""
+    """Time for which the history is kept [days]; 0: forever."""
     period = Setting(0.0, (0.0, 31_557_600.0))
     """Time from one scheduled identification to the next [s]; 0: only on demand."""
     spring_change = Setting(_Of("health", "ValveLimits.spring_change"), (0.0, 1e3))
-    """Change of the spring constant, as a share, worth maintenance [-], against the baseline."""
+    """Relative change of the spring constant from the baseline that calls for maintenance [-]."""
     spring_failure = Setting(_Of("health", "ValveLimits.spring_failure"), (0.0, 1e3))
-    """Change of the spring constant, as a share, that is a failure [-], against the baseline."""
+    """Relative change of the spring constant from the baseline that is a failure [-]."""
     preload_change = Setting(_Of("health", "ValveLimits.preload_change"), (0.0, 1e3))
-    """Shift of the preload over the spring's force in the travel, reported [-], against the
-    baseline."""
+    """Change of the preload from the baseline that is reported, as a share of the spring force over
+    the travel [-]."""
     slip_change = Setting(_Of("health", "ValveLimits.slip_change"), (0.0, 1e3))
-    """Growth of the slip jump, as a share of the travel, reported [-], against the baseline."""
+    """Growth of the slip jump over the baseline that is reported, as a share of the travel [-]."""
     viscous_factor = Setting(_Of("health", "ValveLimits.viscous_factor"), (0.0, 1e3))
-    """Factor of the viscous friction, up or down, reported [-], against the baseline."""
+    """Factor by which viscous friction rises or falls from the baseline that is reported [-]."""
     asymmetry_change = Setting(_Of("health", "ValveLimits.asymmetry_change"), (0.0, 1e3))
-    """Change of viscous friction up against down, as a share, reported [-], against the
-    baseline."""
+    """Change of the asymmetry of viscous friction, upward to downward, from the baseline that is
+    reported, as a share [-]."""
     stop_change = Setting(_Of("health", "ValveLimits.stop_change"), (0.0, 1e3))
-    """Shift of a travel stop, as a share of the travel, reported [-], against the baseline."""
+    """Shift of a travel stop from the baseline that is reported, as a share of the travel [-]."""
     noise_factor = Setting(_Of("health", "ValveLimits.noise_factor"), (0.0, 1e3))
-    """Factor of the noise of a sensor, reported [-], against the baseline."""
+    """Factor by which the noise of a sensor rises over the baseline that is reported [-]."""
     lag_change = Setting(_Of("health", "ValveLimits.lag_change"), (0.0, 1e3))
-    """Change of the lag of the stem behind the pressure, reported [s], against the baseline."""
+    """Change of the lag of the stem behind the pressure, from the baseline, that is reported
+    [s]."""
     command_unit = Setting("m", choices=("m", "%"))
     """Unit of stem_command [-]: m, or % of the travel."""
     deviation_limit = Setting(0.0, (0.0, 100.0))
-    """Median distance of the resting stem from its command that warns [% of the travel]; 0:
-    none."""
+    """Median deviation of the resting stem from its command that raises a warning [% of the
+    travel]; 0: none."""
     dead_time_limit = Setting(0.0, (0.0, 3600.0))
-    """Median time from a step of the command to the first movement that warns [s]; 0: none."""
+    """Median dead time T_d from a step of the command to the first movement that raises a warning
+    [s]; 0: none."""
     t86_limit = Setting(0.0, (0.0, 3600.0))
-    """Median time from a step of the command to 86.5 % of the move that warns [s]; 0: none."""
+    """Median T86, from a step of the command to 86.5 % of the move, that raises a warning [s]; 0:
+    none."""
     webhook_url = Setting("", read_only=True)
-    """Address that each change of the level is posted to [-], https, or http to this machine;
-    empty: that of the environment, VALVE_FRICTION_WEBHOOK_URL, or nowhere. No secret belongs into
-    it: everybody on the ROS graph can read it. No token is sent there."""
+    """Address to which each change of the level is posted [-], https, or http on this machine;
+    empty: VALVE_FRICTION_WEBHOOK_URL from the environment, or nowhere. Put no secret in it:
+    everybody on the ROS graph can read it. No token is sent there."""
     webhook_period = Setting(60.0, (0.0, 86400.0))
-    """Least time from one posted change of the level to the next [s]; then the newest level
-    counts."""
+    """Shortest time between two posts [s]; the newest level is posted once it has passed."""
     webhook_digest = Setting(-1.0, (-1.0, 23.999))
-    """Time of day at which one post lists the alarms of all valves of the process [h], UTC; below
-    0: no digest."""
+    """Time of day at which a single post lists the alarms of all valves of the process [h], UTC;
+    below 0: no digest."""
     counting_dead_band = Setting(_Of("usage", "DEFAULT_BAND"), (1e-6, 0.5))
-    """Dead band of travelled distance, reversals and breakaways, as a share of the travel [-];
-    raised where the sensor's noise or resolution demands more."""
+    """Dead band for counting distance, reversals and breakaways, as a share of the travel [-];
+    raised where the noise or resolution of the sensor demands more."""
     air_to = Setting("open", choices=("open", "close"))
-    """Where the seat is [-]: open, air opens the valve, at position 0; close, at the travel."""
+    """What air does [-]: open, the seat is at position 0; close, the seat is at full travel."""
     travel_limit = Setting(0.0, (0.0, 1e9))
-    """Travelled distance of the life of a packing [m]; 0: no limit."""
+    """Stem travel over the life of a packing [m]; 0: no limit."""
     reversal_limit = Setting(0.0, (0.0, 1e12))
-    """Reversals of the life of a packing [-]; 0: no limit."""
+    """Reversals over the life of a packing [-]; 0: no limit."""
     alarm_recording = Setting(10.0, (0.0, 600.0))
-    """Time from a rise of the level until the buffer before and after it is saved [s]; 0: never."""
+    """Time after a rise of the level at which the buffer, before and after it, is saved [s]; 0:
+    never."""
     alarm_folder = Setting("", read_only=True)
     """Folder of these recordings [-]; empty: valve_friction_ros/alarms under ROS_HOME, or under
-    ~/.ros; a relative one is in valve_friction_ros there."""
+    ~/.ros; a relative path is below valve_friction_ros there."""
     alarm_recordings = Setting(20, (1, 100_000), read_only=True)
-    """Recordings of a valve that are kept, the latest [-]."""
+    """Number of the latest recordings kept per valve [-]."""
     alarm_megabytes = Setting(200.0, (0.001, 1e6), read_only=True)
-    """Room that the recordings of a valve may take [MB]."""
+    """Disk space that the recordings may take per valve [MB]."""
     alarm_pause = Setting(600.0, (0.0, 31_557_600.0))
-    """Time after a recording in which only a higher level is recorded [s]."""
+    """Time after a recording during which only a higher level is recorded [s]."""
     alarm_kind = Setting("all", choices=("all", *ALARM_KINDS))
-    """Alarm that the next request is for [-]; a request sets these four back."""
+    """Alarm that the next request concerns [-]; a request resets these four parameters."""
     alarm_who = Setting("")
-    """Person who makes the next request on an alarm [-]; none is taken without."""
+    """Person who makes the next request on an alarm [-]; required."""
     alarm_text = Setting("")
-    """Words of that person [-], kept with the request."""
+    """Comment of that person [-], stored with the request."""
     alarm_hours = Setting(8.0, (0.0, 8784.0))
-    """Time for which the next request shelves an alarm, up to 720, or has it out of service [h]."""
+    """Time for which the next request shelves an alarm, at most 720, or takes it out of service
+    [h]."""
     valve_tag = Setting("", read_only=True)
     """Tag of the valve, hardware_id of its diagnostics [-]; empty: the namespace."""
     history_file = Setting(str(history_file()), read_only=True)
-    """File in which identifications and baselines are kept [-]; empty: nowhere."""
+    """File in which identifications and baselines are stored [-]; empty: nowhere."""
     history_url = Setting("", read_only=True)
-    """PostgreSQL server that the history_file is sent to, postgresql://user@host/database [-];
-    empty: that of the environment, VALVE_FRICTION_HISTORY_URL, or none. No password belongs
-    here."""
+    """PostgreSQL server to which the history_file is sent, postgresql://user@host/database [-];
+    empty: VALVE_FRICTION_HISTORY_URL from the environment, or none. Put no password here."""
     joint = Setting(_Of("streams.samples", "DEFAULT_JOINT"), read_only=True)
     """Name of the stem's joint in stem_state [-]; empty: the first joint."""
     estimate_topic = Setting(True, read_only=True)
-    """Whether ~/estimate tells a subscriber, also a late one, what is known of the valve [-];
-    /diagnostics has the same each second."""
+    """Whether ~/estimate publishes what is known of the valve, latched for late subscribers [-];
+    /diagnostics has the same every second."""
     result_topic = Setting(False, read_only=True)
-    """Whether ~/result has the numbers of each identification in one stamped message [-]."""
+    """Whether ~/result publishes the numbers of each identification in one stamped message [-]."""
     number_topics = Setting(False, read_only=True)
-    """Whether each number, and the sweep, has a latched topic of its own [-]."""
+    """Whether each number, and the sweep, is published on a latched topic of its own [-]."""
 
 
 class _Managed:
     lifecycle = Setting(False, read_only=True)
-    """Whether the node waits to be configured and activated, as by `ros2 lifecycle set` [-]; false:
-    it is active from its start."""
+    """Whether the node waits until it is configured and activated, as with `ros2 lifecycle set`
+    [-]; false: it is active from the start."""
 
 
 class _Identifiers:
     valves = Setting([""], read_only=True)
-    """Namespaces of the valves, an identifier each [-]."""
+    """Namespaces of the valves, one identifier per valve [-]."""
     identification_processes = Setting(2, (0, 64), read_only=True)
-    """Most processes beside this one that identify at once; they end when nobody asks [-]; 0:
-    threads of it."""
+    """Largest number of worker processes that identify in parallel, which end when idle [-]; 0:
+    threads of this process."""
     parameter_services = Setting(True, read_only=True)
-    """Whether the parameters of the valves can be read and changed while they run, and their alarms
-    answered by services [-]; not for more than 20 valves unless told: it doubles what a process
-    costs at its start."""
+    """Whether parameters of the valves can be read and changed at run time, and their alarms
+    answered by services [-]; off for more than 20 valves unless set, as it doubles the cost of
+    starting a process."""
 
 
 class _Simulator:
@@ -376,23 +380,23 @@ class _Simulator:
 
 class _StrokePlayer:
     file = Setting("")
-    """CSV file with the columns time_s and pressure_pa, as plan-test writes it [-]; needed."""
+    """CSV file with the columns time_s and pressure_pa, as plan-test writes it [-]; required."""
     file_minimum = Setting(0.0, (-1e9, 1e9))
     """Lowest pressure that may be set [Pa]."""
     file_maximum = Setting(0.0, (-1e9, 1e9))
-    """Highest pressure that may be set [Pa]; needed."""
+    """Highest pressure that may be set [Pa]; required."""
     file_rate = Setting(1e12, (0.0, 1e12))
     """Largest rate of the pressure in the file [Pa/s]."""
     pressure_margin = Setting(1e4, (0.0, 1e9))
-    """How far the measured pressure may lie beyond these two [Pa]."""
+    """Margin by which the measured pressure may exceed these two limits [Pa]."""
     position_minimum = Setting(0.0, (-10.0, 10.0))
-    """Position of the stem below which the test goes back [m]."""
+    """Stem position below which the test returns to its start [m]."""
     position_maximum = Setting(0.0, (-10.0, 10.0))
-    """Position of the stem above which the test goes back [m]; needed."""
+    """Stem position above which the test returns to its start [m]; required."""
     silence = Setting(1.0, (0.05, 60.0))
-    """Time without a pressure or a stem after which the test goes back [s]."""
+    """Time without a pressure or a stem position after which the test returns to its start [s]."""
     longest_test = Setting(3600.0, (1.0, 86400.0))
-    """Longest time that a test may take [s]."""
+    """Longest duration of a test [s]."""
     sample_rate = Setting(20.0, (1.0, 1000.0))
     """Set points per second [Hz]."""
     joint = Setting(_Of("streams.samples", "DEFAULT_JOINT"))
@@ -417,9 +421,9 @@ class _PressureSource:
     file_rate = Setting(1e12, (0.0, 1e12))
     """Largest rate of the pressure in the file [Pa/s]."""
     sample_rate = Setting(1000.0, (0.1, 1e5))
-    """Samples per second of signal [Hz]."""
+    """Samples per second of the signal [Hz]."""
     speed = Setting(1.0, (1e-3, 1e3))
-    """Seconds of signal published in a second of real time [-]."""
+    """Seconds of signal published per second of real time [-]."""
     converter_lag = Setting(_Of("model", "DEFAULT_LAG"), (0.0, 1e3))
     """Time constant of the V/P converter [s]."""
     pressure_noise = Setting(0.0, (0.0, 1e9))
@@ -432,40 +436,41 @@ class _PressureSource:
 
 class _Dashboard:
     host = Setting(_Of("dashboard.accounts", "Access.host"))
-    """Address that it listens at [-]; any but this machine's own needs accounts."""
+    """Address to listen on [-]; any other than loopback needs accounts."""
     host_names = Setting("")
-    """Names that browsers call it by, beside its address, separated by commas [-]."""
+    """Host names under which browsers reach it, besides its address, separated by commas [-]."""
     accounts_file = Setting("")
-    """File of accounts, by `valve_friction dashboard-account` [-]; empty: the environment's."""
+    """Accounts file, made with `valve_friction dashboard-account` [-]; empty: from the
+    environment."""
     certificate_file = Setting("")
-    """Certificate for TLS, in PEM [-]; empty: no TLS."""
+    """TLS certificate, PEM [-]; empty: no TLS."""
     key_file = Setting("")
-    """Key of the certificate, in PEM [-]."""
+    """Private key of the certificate, PEM [-]."""
     session_hours = Setting(_Of("dashboard.accounts", "Access.session_hours"), (0.1, 10000.0))
-    """Time after which a log-in ends [h]."""
+    """Time after which a session ends [h]."""
     session_file = Setting("")
-    """File in which log-ins survive a restart [-]; empty: they do not."""
+    """File that keeps sessions over a restart [-]; empty: they end with it."""
     port = Setting(_Of("dashboard", "DashboardOptions.port"), (1, 65535))
-    """Port that it listens at [-]."""
+    """Port to listen on [-]."""
     history_file = Setting(str(history_file()))
-    """File of the identifiers' history, which is read [-]; empty: none."""
+    """History file of the identifiers, which is read [-]; empty: none."""
     history_url = Setting("")
-    """PostgreSQL server of the identifiers' histories, which is read in place of the file [-];
-    empty: that of the environment, VALVE_FRICTION_HISTORY_URL. No password belongs here."""
+    """PostgreSQL server with the histories of the identifiers, read instead of the file [-]; empty:
+    VALVE_FRICTION_HISTORY_URL from the environment. Put no password here."""
     time_zone = Setting(_Of("dashboard", "DashboardOptions.time_zone"))
-    """Zone of the times, an IANA name such as Europe/Berlin [-]."""
+    """Time zone, an IANA name such as Europe/Berlin [-]."""
     silence = Setting(_Of("dashboard", "DashboardOptions.silence"), (1.5, 86400.0))
-    """Time without a message after which a valve counts as silent [s]."""
+    """Time without a message after which a valve is shown as silent [s]."""
     report_folder = Setting("")
-    """Folder of the identifiers' reports, which it offers [-]; empty: the usual one."""
+    """Folder of the reports to offer [-]; empty: the default of the identifiers."""
     save_folder = Setting("")
-    """Folder of the identifiers' bags, which it offers [-]; empty: the usual one."""
+    """Folder of the saved bags to offer [-]; empty: the default of the identifiers."""
     alarm_folder = Setting("")
-    """Folder of the recordings of alarms, which it offers [-]; empty: the usual one."""
+    """Folder of the alarm recordings to offer [-]; empty: the default of the identifiers."""
 
 
 VALVE = _declared(_Valve, is_assumed=True)
-"""What describes a valve that is watched; one that is simulated is by default the paper's."""
+"""Description of a watched valve; a simulated one is that of the paper by default."""
 
 KARNOPP = _declared(_Karnopp)
 """The friction and the spring of a simulated valve."""
@@ -488,7 +493,7 @@ IDENTIFICATION = (
             None,
             name=f"fixed.{name}",
             description=f"Known value of {name} [{UNITS.get(name, 'm/s')}], then not identified; "
-            "unset: not known",
+            "unset: unknown",
         )
         for name in FIXABLE
     ),
@@ -502,7 +507,7 @@ _BY_DATA_SHEET = tuple(
     replace(
         one,
         initial=None,
-        description=f"{one.description}, by the data sheet: compared with what a record shows",
+        description=f"{one.description}, from the data sheet: compared with what a record shows",
     )
     for one in KARNOPP
     if one.name in STATED

@@ -484,3 +484,12 @@ def test_the_zero_drifts_with_the_range_of_the_sensor_whatever_the_stroke():
     assert sensor_span(full) == sensor_span(partial) == sensor_span(-partial) == 9000.0
     assert sensor_span(np.array([-500.0, 500.0])) == 1000.0
     assert zero_drift(sensor_span(partial), minutes=2.0) == pytest.approx(18.0)
+
+
+@pytest.mark.parametrize(("viscous", "width"), [((50.0, 49.0), 4.0), ((50.0, 51.0), 5.0)])
+def test_a_dry_friction_beside_an_unknown_viscous_one_is_known_less(viscous, width):
+    """A third of what both differ, 3, and the half width of 4 are 5."""
+    ours = {"coulomb_friction": number(100.0, 4.0), "viscous_friction": number(*viscous)}
+    theirs = {"coulomb_friction": number(109.0, 30.0)}
+    found = checked_by_curve(ours, theirs, follows=True)["coulomb_friction"]
+    assert (found.value, found.half_width) == (100.0, pytest.approx(width))

@@ -287,12 +287,14 @@ def checked_by_curve(
     Where the simulated stem `follows` the record to within noise, a number comes from the one that
     knows it better; spring, preload and sliding friction from the simulation where both exclude
     each other, as reversals and rests tell it a lag from a viscous friction; a part of their
-    difference then widens the intervals of all but the sliding friction. Where the stem does not
-    follow, they come from the force balance. What both divide between dry and viscous friction is
-    uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at which
-    speed it is gone.
+    difference then widens the intervals of spring and preload, and those of F_c and F_v where the
+    simulation does not determine F_v. Where the stem does not follow, they come from the force
+    balance. What both divide between dry and viscous friction is uncertain by what they differ, and
+    F_c also by a `slip_force`, N, of which no one knows at which speed it is gone.
     """
     result = dict(simulated)
+    viscous = simulated.get("viscous_friction")
+    is_split = viscous is not None and viscous.half_width < viscous.value
     for name in ("coulomb_friction", "viscous_friction"):
         ours, theirs = simulated.get(name), balanced.get(name)
         if ours is None or theirs is None:
@@ -301,7 +303,8 @@ def checked_by_curve(
         apart = abs(ours.value - theirs.value)
         width = math.hypot(theirs.half_width, apart, open_)
         if follows and ours.half_width < width:
-            result[name] = replace(ours, half_width=math.hypot(ours.half_width, _PULL * apart))
+            pull = 0.0 if is_split else _PULL * apart
+            result[name] = replace(ours, half_width=math.hypot(ours.half_width, pull))
         else:
             result[name] = replace(theirs, half_width=width, rival=ours.rival)
     for name in (SLIDING, "spring_constant", "spring_preload"):
