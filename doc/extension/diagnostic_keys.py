@@ -90,9 +90,12 @@ def declared_keys() -> set[str]:
     found: set[str] = set()
     for file, functions in _WRITERS.items():
         tree = ast.parse((nodes / file).read_text(encoding="utf-8"))
-        written = [each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)]
+        written: dict[str, set[str]] = {}
+        for each in ast.walk(tree):
+            if isinstance(each, ast.FunctionDef):
+                written.setdefault(each.name, set()).update(_keys(each))
         for name in functions:
-            found |= {key for each in written if each.name == name for key in _keys(each)}
+            found |= written[name]
     return found
 
 

@@ -36,20 +36,6 @@ from valve_friction_ros.model import (
 from valve_friction_ros.model.valve import Valve
 
 
-def compile_methods() -> None:
-    """Compile all kernels, or load their compiled forms, by identifying six simulated seconds.
-
-    Takes a second, and up to a minute the first time on a machine.
-    """
-    compile_kernels()
-    period, count = 0.01, 600
-    pressure = SineWave(period=3.0).sample(period * np.arange(count))
-    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, period).position
-    random = np.random.default_rng(0)
-    noisy = position + 1e-6 * random.standard_normal(count)
-    identify(Recording(period, pressure + 5.0 * random.standard_normal(count), noisy), BENCH_VALVE)
-
-
 class Method(Protocol):
     """A method of identification: from a record to parameters with verdicts."""
 
@@ -137,3 +123,17 @@ def identify(
     if isinstance(settings, str):
         return method_named(settings)(recording, valve)
     return method_named(method)(recording, valve, settings)
+
+
+def compile_methods() -> None:
+    """Compile all kernels, or load their compiled forms, by identifying six simulated seconds.
+
+    Takes a second, and up to a minute the first time on a machine.
+    """
+    compile_kernels()
+    period, count = 0.01, 600
+    pressure = SineWave(period=3.0).sample(period * np.arange(count))
+    position = simulate(BENCH_VALVE, LOW_FRICTION, pressure, period).position
+    random = np.random.default_rng(0)
+    noisy = position + 1e-6 * random.standard_normal(count)
+    identify(Recording(period, pressure + 5.0 * random.standard_normal(count), noisy), BENCH_VALVE)

@@ -11,6 +11,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from valve_friction_ros.identification.engine import friction_curve
-from valve_friction_ros.identification.engine.balance_regression import LagPrior
+from valve_friction_ros.identification.engine.balance_regression import LagPrior, Regression
 from valve_friction_ros.identification.engine.friction_curve import (
     FrictionCurve,
     checked_by_curve,
@@ -471,6 +472,13 @@ class TestConverterOfTheForce:
         assert one.value == pytest.approx(self.STEP, rel=0.02)
         assert one.rounding == pytest.approx(1.96 * self.STEP / math.sqrt(24.0), rel=0.05)
         assert abs(one.value - self.FRICTION) < one.half_width < 0.5 * self.STEP
+
+    def test_a_stem_without_a_sure_speed_has_that_of_its_averages(self):
+        """No chance is left to divide by: the halves of the samples may disagree on all motion."""
+        work, averages = SimpleNamespace(rounding=3.0), SimpleNamespace(speed=0.5)
+        for sliding_speed, expected in ((2.0, 3.0), (0.0, 12.0)):
+            one = SimpleNamespace(work=work, averages=averages, sliding_speed=sliding_speed)
+            assert Regression.rounding(one, "viscous_friction") == expected
 
     def test_noise_that_carries_the_force_across_steps_lifts_it(self):
         one = self.balanced(noise=self.STEP)[SLIDING]

@@ -23,7 +23,7 @@ from valve_friction_ros.identification.engine.imperfections import (
     sensor_span,
     zero_drift,
 )
-from valve_friction_ros.identification.engine.intervals import Budget, Estimated
+from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
 from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     LAGS,
@@ -64,7 +64,7 @@ _CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "dri
 """Terms of the force that are not friction."""
 
 _OUTLIER = 5.0
-_LEAST_MISFIT, _LEAST_OF_MACHINE = 5e-3, 3e-4
+_LEAST_MISFIT, _LEAST_WITHOUT_SPRING = 5e-3, 3e-4
 """Deviations beyond which an average is left out, and the share of the friction to which no force
 balance is trusted further: less than that of a packing is taken for a stiffer spring, or a friction
 that changes; without a spring there is nothing to take it for."""
@@ -295,7 +295,7 @@ class Regression:
     @property
     def least_variance(self) -> float:
         """Variance of an average to which the balance is trusted, N²."""
-        share = _LEAST_MISFIT if self.spring > 0.0 else _LEAST_OF_MACHINE
+        share = _LEAST_MISFIT if self.spring > 0.0 else _LEAST_WITHOUT_SPRING
         return float(share * self.friction) ** 2
 
     def noise_variance(self, solved: _Solved) -> float:
@@ -397,6 +397,20 @@ class Regression:
             value * self.kept[name] for name, value in self.fixed.items() if name in self.kept
         )
         return np.asarray(np.interp(lags, WORK_LAGS, self.work.by_lag) - known)
+
+    def rounding(self, name: str) -> float:
+        """Return the deviation of a number by the converter of the force (`Work.rounding`).
+
+        What is extrapolated from two speeds is off by twice that at one.
+        """
+        off = self.work.rounding
+        if name in (SLIDING, "spring_preload"):
+            return off
+        if name in ("coulomb_friction", "static_friction"):
+            return 2.0 * off
+        if name == "viscous_friction":
+            return 2.0 * off / (self.sliding_speed or self.averages.speed)
+        return 0.0
 
     def beyond_shift(self, lag: float) -> float:
         """Return the deviation of the work, N, by what a lag is beside a shift of one signal.
@@ -608,11 +622,12 @@ class Posterior:
         return value, slope, math.sqrt(max(factor * rest, np.finfo(float).tiny))
 
     def number(self, name: str, gradient: _Array, spread: float) -> Estimated:
-        """Return a number with its interval; `spread` is that of other Stribeck speeds."""
+        """Return a number with its interval; `spread` is what no lag makes, but noise."""
+        rounding = self.regression.rounding(name)
         centre, slope, width = self._given_lag(gradient)
         beside = self.regression.beside(name, self.lags)
         values, weights = centre + beside, self.of_record if name == SLIDING else self.probability
-        record, rival = math.hypot(width, spread), math.nan
+        record, rival = math.hypot(width, math.hypot(spread, rounding)), math.nan
         if self.lags.size > 1:
             index = len(self.regression.names)
             values = values + slope * (self.changes - self.solved.estimate[index])
@@ -636,7 +651,10 @@ class Posterior:
         # The tails of the lag are heavier than normal ones: its share is that of the interval.
         whole = high / NORMAL_QUANTILE
         timing = min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
-        return Estimated(mean, high, Budget(record, timing, {}, timing * self._unsaid()), rival)
+        sources = {ROUNDING: rounding} if rounding > 0.0 else {}
+        return Estimated(
+            mean, high, Budget(record, timing, sources, timing * self._unsaid()), rival
+        )
 
     def _unsaid(self) -> float:
         """Return the share of what the lag leaves open that comes from its prior, not from noise.

@@ -34,7 +34,7 @@ from valve_friction_ros.identification.engine.balance_regression import (
     Posterior,
     Regression,
 )
-from valve_friction_ros.identification.engine.intervals import ROUNDING, Estimated
+from valve_friction_ros.identification.engine.intervals import Estimated
 from valve_friction_ros.identification.engine.sliding_averages import (
     CLOSE,
     LARGEST_LAG,
@@ -83,10 +83,6 @@ is at least then, over the likeliest."""
 _PULL = 1.0 / 3.0
 """Share of the difference from the force balance that widens the interval of a simulated number:
 what only the transients know is known no better."""
-
-_ROUNDED = {SLIDING: 1.0, "spring_preload": 1.0, "coulomb_friction": 2.0, "static_friction": 2.0}
-"""Numbers that a converter of the force rounds, over what it does to its work: that at one speed,
-and what is extrapolated from two."""
 
 _TINY = float(np.finfo(float).tiny)
 _OPEN_SLIP = 0.3
@@ -200,10 +196,6 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
     for name, gradient in gradients.items():
         values = [one[name] for one in posterior.near if name in one]
         spread = math.hypot(float(np.std(values or [0.0])), regression.definition(name, solved))
-        rounding = _ROUNDED.get(name, 0.0) * regression.work.rounding
-        if name == "viscous_friction":
-            rounding = 2.0 * regression.work.rounding / regression.sliding_speed
-        spread = math.hypot(spread, rounding)
         if name == SLIDING:
             spread = math.hypot(
                 spread,
@@ -212,9 +204,6 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
                 regression.beyond_shift(regression.later(solved)),
             )
         numbers[name] = posterior.number(name, gradient, spread)
-        if rounding > 0.0:
-            budget = replace(numbers[name].budget, sources={ROUNDING: rounding})
-            numbers[name] = replace(numbers[name], budget=budget)
     return FrictionCurve(
         averages.length * float(averages.time[1] - averages.time[0]),
         *regression.bins(solved),

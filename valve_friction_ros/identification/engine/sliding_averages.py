@@ -340,8 +340,8 @@ class Work(NamedTuple):
     along: _Array
     strokes: int
     noise: float
-    rounding: float
     speed: float
+    rounding: float = 0.0
     by_lag: _Array = WORK_LAGS
 
     @classmethod
@@ -364,8 +364,7 @@ class Work(NamedTuple):
             along = np.gradient(position) * is_free / path.distance
             # Twice averaged noise is that of some samples at a time: as much as of each alone.
             noise = force.noise * math.sqrt(step / force.period * float(along @ along))
-            rounding = _rounding(force, time, along)
-            return cls(time, pressed, position, along, path.strokes, noise, rounding, speed)
+            return cls(time, pressed, position, along, path.strokes, noise, speed)
 
         work = by(length)
         while work.noise > _WORK_NOISE * abs(work.of_friction) and 2 * length <= longest:
@@ -373,7 +372,9 @@ class Work(NamedTuple):
             work = by(length)
         hidden = work.of_friction - by(2 * length).of_friction
         of_path = path.deviation / path.distance * work.of_friction
-        return work._replace(noise=math.hypot(work.noise, 0.5 * hidden, of_path)).seen_late()
+        noise = math.hypot(work.noise, 0.5 * hidden, of_path)
+        rounding = _rounding(force, time, work.along)
+        return work._replace(noise=noise, rounding=rounding).seen_late()
 
     @property
     def of_friction(self) -> float:

@@ -248,6 +248,9 @@ _KEYS = tuple(_COUNT.pack(len(key.encode()) + 1) + key.encode() + b"\0" for key 
 def statuses_in(message: bytes) -> Iterator[Unread]:
     """Yield each status of a diagnostic_msgs/DiagnosticArray, still unread.
 
+    rclpy takes 0.2 ms to turn the status of an identifier into objects, a tenth of a core for 500
+    valves a second. Here the name is read as the message comes, the rest once a page shows it.
+
     Raises ValueError if the bytes are no such message.
     """
     try:

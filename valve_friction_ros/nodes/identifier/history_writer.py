@@ -53,7 +53,7 @@ from valve_friction_ros.streams import utc_second
 from valve_friction_ros.usage import ValveUsage
 
 if TYPE_CHECKING:
-    from valve_friction_ros.history import HistoryFile
+    from valve_friction_ros.history import HistoryFile, Sender
 
 _MOST = 1000
 
@@ -111,10 +111,6 @@ class WaitingChanges:
         """Count from now on."""
         with self._lock:
             self._identifications = self._others = 0
-
-
-if TYPE_CHECKING:
-    from valve_friction_ros.history import Sender
 
 
 class HistorySending:
@@ -235,9 +231,6 @@ class HistoryGuard:
             return None
         return found.st_dev, found.st_ino
 
-
-if TYPE_CHECKING:
-    from valve_friction_ros.history import HistoryFile
 
 _LONGEST = 60.0
 """Time, s, after which a writing that has not ended is a problem; a busy file ends it sooner."""

@@ -153,7 +153,16 @@ def disarm() -> None:
 
 
 class Deadman:
-    """Ends the process of some nodes when its loop or the middleware hangs."""
+    """Ends the process of some nodes when its loop or the middleware hangs.
+
+    Two things freeze a node for good, and no thread of Python can help in either. The loop may hang
+    in a library that holds Python's lock. And the middleware may lock itself up while clients come
+    and go (eProsima/Fast-DDS issue 6502): then nothing is received, answered or discovered any
+    more, and the loop turns. So a timer of C, that of ``faulthandler``, writes the stacks of all
+    threads to stderr and ends the process with exit code 1, and what started it can start it again.
+    Where nobody reads stderr any more, so that the stacks cannot be written, the system's alarm
+    signal ends it 5 s later.
+    """
 
     def __init__(self, nodes: Sequence[PolledNode]) -> None:
         self._nodes = nodes
