@@ -138,12 +138,15 @@ _LIMIT_VELOCITIES = (2e-4, 6e-4)
 _SUSPICIOUS = 1.5
 """Inflation of a residual beyond which other starts are tried: a third of it is not noise."""
 
+_SURE_FALL = 2.0
+"""Standard deviations by which a friction must fall with speed for a fit of v_s to be tried."""
+
 _START_NOISE = 3.0
 _START_TIME = 5e-3
 """The first position is known to so many deviations of its noise, and to what the stem moves in
 such a time (s) and in that by which its sensor may be late."""
 
-_MOST_WORK, _FOR_LAGS = 12_000_000, 4_000_000
+_MOST_WORK, _FOR_LAGS = 30_000_000, 6_000_000
 """Steps of simulations after which no other branch begins, and what is left for other lags after
 them: a second of a processor or so, and a third of one.
 
@@ -312,12 +315,9 @@ class _Search:
         if not starts:
             return None
         near = nearest(self.stepwise, starts)[0]
-        near = nearest(self.stepwise, [near, *self.falling(near)])[0]
-        falls = near["stribeck_velocity"] > 0
-        own = ("slip_force", "stribeck_velocity") if falls else ()
+        near = nearest(self.stepwise, self.falling(near))[0]
+        own = ("slip_force", "stribeck_velocity")
         first = self.fit(near, (*self.main, *own), _MORE_STEPS, self.stepwise)
-        if not falls:
-            return self.full(first.at)
         if not self.may_go_on:
             return None
         return self.fit(first.at, self.free(first.at), 2 * _MORE_STEPS, self.exact)
@@ -459,7 +459,7 @@ class _Search:
             return plain.at
         slipping = self.slip_starts(self.base, {**self.base, **plain.at})
         slipped = self.lagged(slipping, (*self.main, "slip_force"))
-        return min(plain, slipped, key=lambda one: one.objective).at
+        return _likeliest([plain, slipped]).at
 
     def lagged(self, starts: Sequence[Coordinates], names: tuple[str, ...]) -> PosteriorFit:
         """Fit from the nearest start, and again from there with the likeliest lag."""
@@ -489,17 +489,34 @@ class _Search:
         while branches and not (fits and self.is_enough(fits)):
             found = branches.pop(0)()
             fits += [] if found is None else [found]
-        best = min(fits, key=lambda one: one.objective)
-        if self.is_enough(fits):
-            return best
-        return min(best, self.stopping(best), key=lambda one: one.objective)
+        best = _likeliest(fits)
+        return best if self.is_enough(fits) else _likeliest([best, self.stopping(best)])
 
     def is_enough(self, fits: Sequence[PosteriorFit]) -> bool:
         """Whether one of the fits is likely, or no other may be tried."""
         likely = any(
-            one.inflation < _SUSPICIOUS and one.stages[-1].penalty < UNLIKELY for one in fits
+            one.inflation < _SUSPICIOUS
+            and one.stages[-1].penalty < UNLIKELY
+            and _fall_at_low_speed(one) < _SURE_FALL
+            for one in fits
         )
         return likely or not self.may_go_on
+
+
+def _likeliest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
+    """Return the fit whose residual and priors together are the least, by the same inflation."""
+    inflated = min(one.inflation for one in fits)
+    return min(
+        fits, key=lambda one: one.stages[-1].misfit / inflated + one.stages[-1].penalty
+    )
+
+
+def _fall_at_low_speed(fit: PosteriorFit) -> float:
+    """Return by how many standard deviations the friction falls with speed, where v_s is 0."""
+    if "at_low_speed" not in fit.names:
+        return 0.0
+    index = fit.names.index("at_low_speed")
+    return fit.at["at_low_speed"] / math.sqrt(float(fit.stages[-1].covariance[index, index]))
 
 
 def _delay(fit: PosteriorFit) -> float:
