@@ -32,6 +32,7 @@ from valve_friction_ros.identification.engine.imperfections import sensor_span, 
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
 from valve_friction_ros.identification.engine.sliding_averages import (
     _lengths,
+    _Path,
     _path,
     _turns,
     averaged_twice,
@@ -446,6 +447,33 @@ class TestCheckOfASimulation:
         ours = {SLIDING: number(100.0, 9.0)}
         impossible = {SLIDING: number(-5.0, 200.0)}
         assert checked_by_curve(ours, impossible, False) == ours
+
+
+class TestDistanceUnderNoiseThatLasts:
+    """Noise that averages share lengthens each stroke at its ends, without any work."""
+
+    @pytest.mark.parametrize(
+        ("work", "distance", "deviation"),
+        [(100.0, 10.0, 0.5), (103.0, 10.3, 0.2), (105.0, 10.5, 0)],
+    )
+    def test_what_is_longer_is_believed_as_far_as_it_does_work(self, work, distance, deviation):
+        found = _Path(10.5, 0.0, 4, work).beside(_Path(10.0, 0.0, 4, 100.0))
+        assert found[:3] == pytest.approx((distance, deviation, 4))
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_friction_of_small_strokes(self, seed):
+        """Strokes of 1 mm, noise of 12 µm that lasts 30 ms: 3 % of the distance is not motion."""
+        time = np.arange(0.0, 60.0, 2e-3)
+        wave = 0.5 * math.pi * time
+        position = 5e-4 * np.sin(wave)
+        force = 1e5 * position + 80.0 * np.tanh(40.0 * np.cos(wave))
+        decay = math.exp(-2e-3 / 0.03)
+        white = math.sqrt(1.0 - decay**2) * np.random.default_rng(seed).standard_normal(time.size)
+        stem = position + 12e-6 * lfilter([1.0], [1.0, -decay], white)
+        record = StampedRecord(StampedSignal(time, force), StampedSignal(time, stem), Drive.FORCE)
+        one = curve_numbers(friction_curves(record, Valve(), NO_LAG))[SLIDING]
+        truth = float(np.sum(np.abs(np.diff(position)) * 80.0) / np.sum(np.abs(np.diff(position))))
+        assert abs(one.value - truth) < one.half_width < 0.15 * truth
 
 
 class TestConverterOfTheForce:

@@ -11,6 +11,7 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from valve_friction_ros.identification.engine.imperfections import TIMING
 from valve_friction_ros.identification.engine.intervals import Budget
 from valve_friction_ros.identification.engine.posterior_fit import bounded_minimum, fit
 from valve_friction_ros.identification.engine.remarks import sampling_remarks
-from valve_friction_ros.identification.engine.search import Prior, _Search, lagging
+from valve_friction_ros.identification.engine.search import Prior, _likeliest, _Search, lagging
 from valve_friction_ros.identification.engine.sentences import main_doubt
 from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.verdict import interval_share
@@ -161,3 +162,24 @@ def test_every_source_has_words():
         doubt = main_doubt(Budget(1.0, 0.0, {name: 2.0}), interval_share(1.0, 0.2))
         assert doubt.startswith("its interval is ±20 % of its value: the record does not determine")
     assert main_doubt(Budget(1.0, 0.0, {"drift": 0.1}), 0.2).endswith("leaves of the motion")
+
+
+def ended(misfit, penalty, inflation, low_speed=(0.0, 1.0)):
+    """Return the end of a fit, as far as the search compares it with others."""
+    value, variance = low_speed
+    stage = SimpleNamespace(misfit=misfit, penalty=penalty, covariance=np.array([[variance]]))
+    return SimpleNamespace(
+        stages=[stage], inflation=inflation, names=("at_low_speed",), at={"at_low_speed": value}
+    )
+
+
+class TestSearch:
+    def test_a_residual_far_above_the_noise_does_not_outweigh_the_priors(self):
+        """At 100 variances for one, 1,000 more of the residual are 10, and the priors 30 less."""
+        unlikely, likely = ended(50_000.0, 40.0, 100.0), ended(51_000.0, 10.0, 110.0)
+        assert _likeliest([unlikely, likely]) is likely
+
+    @pytest.mark.parametrize(("low_speed", "enough"), [((0.19, 0.01), True), ((0.21, 0.01), False)])
+    def test_a_friction_that_surely_falls_with_speed_is_looked_into(self, low_speed, enough):
+        search = SimpleNamespace(may_go_on=True)
+        assert _Search.is_enough(search, [ended(100.0, 1.0, 1.0, low_speed)]) is enough

@@ -146,7 +146,7 @@ _START_TIME = 5e-3
 """The first position is known to so many deviations of its noise, and to what the stem moves in
 such a time (s) and in that by which its sensor may be late."""
 
-_MOST_WORK, _FOR_LAGS = 30_000_000, 6_000_000
+_MOST_WORK, _FOR_LAGS = 24_000_000, 5_000_000
 """Steps of simulations after which no other branch begins, and what is left for other lags after
 them: a second of a processor or so, and a third of one.
 
@@ -506,9 +506,7 @@ class _Search:
 def _likeliest(fits: Sequence[PosteriorFit]) -> PosteriorFit:
     """Return the fit whose residual and priors together are the least, by the same inflation."""
     inflated = min(one.inflation for one in fits)
-    return min(
-        fits, key=lambda one: one.stages[-1].misfit / inflated + one.stages[-1].penalty
-    )
+    return min(fits, key=lambda one: one.stages[-1].misfit / inflated + one.stages[-1].penalty)
 
 
 def _fall_at_low_speed(fit: PosteriorFit) -> float:

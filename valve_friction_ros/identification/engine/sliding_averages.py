@@ -78,6 +78,10 @@ _STUCK = 5
 _COVERED = 0.7
 """Least share of the distance that a stem has left after averaging, else it turns round within."""
 
+_SLOWER, _KEPT = 4, 0.95
+"""Averages over so many times the averaging time tell noise that lasts from motion, where they
+leave that share of the distance."""
+
 
 def averaged_twice(signal: _Array, length: int) -> _Array:
     """Average over `length` samples, twice, centred; the ends are held."""
@@ -170,11 +174,26 @@ def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal,
 
 
 class _Path(NamedTuple):
-    """Distance of all strokes, m, its deviation, and their number."""
+    """Distance of all strokes, m, its deviation, their number, and the work of friction, J."""
 
     distance: float
     deviation: float
     strokes: int
+    work: float
+
+    def beside(self, slower: "_Path") -> "_Path":
+        """Return the distance that the work confirms; `slower` is averaged over a longer time.
+
+        Noise that such averages share lengthens every stroke at its ends, and the force does no
+        work there; a fast move adds as much work as its distance tells.
+        """
+        extra = self.distance - slower.distance
+        if not (extra > 0.0 and slower.work > 0.0):
+            return self
+        per_distance = slower.work / slower.distance
+        unreal = extra - min(max((self.work - slower.work) / per_distance, 0.0), extra)
+        deviation = math.hypot(self.deviation, unreal)
+        return self._replace(distance=self.distance - unreal, deviation=deviation)
 
 
 class Averages(NamedTuple):
@@ -247,7 +266,14 @@ def averages_of(
     finer = _finest_path(force, stem, time, free, averaging_time)
     if path.distance < _COVERED * finer.distance:
         return None
-    path = max(path, finer)
+    slow = _SLOWER * length
+    slower = _path(
+        [averaged_twice(half[free], slow) for half in position],
+        averaged_twice(averaged[0][free], slow),
+        stem.noise,
+    )
+    is_kept = slower.distance > _KEPT * finer.distance
+    path = max(path, finer).beside(slower if is_kept else path)
     return Averages(
         time,
         averaged,
@@ -304,7 +330,8 @@ def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
     if short > 0.0 and of_long > 0.0:
         real = min(max(float(np.sum(work[is_short])) / short * long / of_long, 0.0), 1.0)
     distance = max(whole - (1.0 - real) * short, _TINY)
-    return _Path(distance, math.sqrt(real * (1.0 - real)) * short, max(lengths.size, 1))
+    deviation = math.sqrt(real * (1.0 - real)) * short
+    return _Path(distance, deviation, max(lengths.size, 1), float(np.sum(work)))
 
 
 def _off_line(force: _Array, position: _Array) -> _Array:
