@@ -21,7 +21,7 @@ from scipy.signal import find_peaks, oaconvolve, savgol_coeffs, savgol_filter
 from scipy.stats import norm
 
 from valve_friction_ros import signals
-from valve_friction_ros.model.stamped import StampedSignal
+from valve_friction_ros.model.recording import StampedSignal
 from valve_friction_ros.signals import (
     as_sent_on_change,
     differentiate,

@@ -26,8 +26,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.model.stamped import StampedSignal
+from valve_friction_ros.model.recording import Recording, StampedSignal
 
 
 class Derivatives(NamedTuple):

@@ -17,7 +17,7 @@ import pytest
 
 from valve_friction_ros.health.stem_reach import stem_reach
 from valve_friction_ros.model import BENCH_VALVE, HIGH_FRICTION, Recording, SineWave, simulate
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 STICKY = replace(HIGH_FRICTION, static_friction=2 * HIGH_FRICTION.coulomb_friction)
 SLIP = STICKY.static_friction - STICKY.coulomb_friction

@@ -23,7 +23,7 @@ import valve_friction_ros as vf
 from valve_friction_ros.health import FrictionLimits
 from valve_friction_ros.identification import METHODS
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, SensorNoise, TriangleWave
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 VALVE_FILE = "diaphragm_area: 0.0445\ntravel: 0.028575\nfixed.mass: 1.6\nwindow: 30.0\n"
 

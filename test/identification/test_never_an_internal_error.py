@@ -45,7 +45,7 @@ from valve_friction_ros.model import (
     TriangleWave,
     Valve,
 )
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.streams import Arrivals, Kind
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

@@ -73,7 +73,7 @@ from valve_friction_ros.health import Baseline, Level
 from valve_friction_ros.history import HistoryError
 from valve_friction_ros.identification import FIXABLE
 from valve_friction_ros.model import Valve
-from valve_friction_ros.model.frozen import frozen
+from valve_friction_ros.model.checks import frozen
 from valve_friction_ros.records.bags.storage import is_bag
 from valve_friction_ros.records.recordings import ReadingOptions
 from valve_friction_ros.records.stores import explained, on_disk, place

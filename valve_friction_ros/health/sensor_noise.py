@@ -14,8 +14,7 @@ import math
 import numpy as np
 
 from valve_friction_ros.health.measured import Measured
-from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.model.stamped import StampedSignal
+from valve_friction_ros.model.recording import Recording, StampedSignal
 from valve_friction_ros.signals import stamped_noise, without_repeats
 
 _FEWEST = 200

@@ -30,7 +30,7 @@ from valve_friction_ros.history.entry import (
     trended,
 )
 from valve_friction_ros.identification import SLIDING
-from valve_friction_ros.identification.trust.student import student_quantile
+from valve_friction_ros.identification.trust.uncertainty import student_quantile
 from valve_friction_ros.model.checks import require_non_negative
 from valve_friction_ros.response import ResponseSummary, summarised
 from valve_friction_ros.streams import utc

@@ -29,16 +29,16 @@ from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.settings import IdentificationSettings
 from valve_friction_ros.identification.signature.valve_signature import ValveSignature
 from valve_friction_ros.identification.trust.calibration import with_calibration
-from valve_friction_ros.identification.trust.correlation import CORRELATION
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.model_comparison import (
     ModelComparison,
     models_compared,
 )
 from valve_friction_ros.identification.trust.stated import CONTRADICTED, with_stated
+from valve_friction_ros.identification.trust.uncertainty import CORRELATION
 from valve_friction_ros.identification.trust.verdict import Parameter
 from valve_friction_ros.identification.units import SLIDING
-from valve_friction_ros.model.frozen import frozen
+from valve_friction_ros.model.checks import frozen
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.simulation import simulate

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from valve_friction_ros.model.checks import (
+    frozen,
     require_finite,
     require_non_negative,
     require_positive,
 )
-from valve_friction_ros.model.frozen import frozen
 
 PUBLISHED_WINDOW = 31
 """Derivative window d of the paper, samples (Appendix A)."""

@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING
 from valve_friction_ros.on_demand import names_on_demand
 
 if TYPE_CHECKING:
-    from valve_friction_ros.model.bench import (
+    from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
+    from valve_friction_ros.model.excitations import (
         BENCH_VALVE,
         GRAPHITE_PACKING,
         GRAPHITE_VALVE,
         HIGH_FRICTION,
         LOW_FRICTION,
         PRESSURE_RANGE,
-    )
-    from valve_friction_ros.model.drive import DEFAULT_LAG, Drive
-    from valve_friction_ros.model.excitations import (
         Excitation,
         IsaSteps,
         SampledPressure,

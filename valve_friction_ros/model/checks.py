@@ -7,9 +7,25 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Checks of the value types; their messages name the value and its rule."""
+"""What keeps value types valid: checks whose messages name the rule, and frozen mappings.
 
+Python neither copies nor pickles a mapping that nobody can change; `frozen` ones it does.
+"""
+
+import copyreg
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+
+def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
+    """Return a copy of a mapping that nobody can change."""
+    return MappingProxyType(dict(mapping))
+
+
+# Results and settings hold such mappings, and go to other processes, to joblib and to Dask.
+copyreg.pickle(MappingProxyType, lambda one: (frozen, (dict(one),)))
 
 
 def require_finite(name: str, value: float) -> float:

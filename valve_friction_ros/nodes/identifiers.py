@@ -26,11 +26,11 @@ from valve_friction_ros.nodes.identifier.node import Identifier
 from valve_friction_ros.nodes.identifier.results import EstimateTopic
 from valve_friction_ros.nodes.identifier.status import stuck_status
 from valve_friction_ros.nodes.identifier.workers import running_workers
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.parameters import declare_parameters
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.rclpy_private import PROFILES, parameter_overrides
 from valve_friction_ros.nodes.plumbing.running import WRONG_REQUESTS, join_graph, run_nodes
+from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported
 from valve_friction_ros.settings import HOST
 
 _FEW = 20

@@ -24,7 +24,7 @@ from valve_friction_ros.identification import (
     require_valve_units,
 )
 from valve_friction_ros.model import KarnoppParameters, Valve
-from valve_friction_ros.model.frozen import frozen
+from valve_friction_ros.model.checks import frozen
 from valve_friction_ros.records.columns import Columns
 from valve_friction_ros.records.spelling import nearest, resembling
 from valve_friction_ros.records.whole_file import cause_of

@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from valve_friction_ros.identification.refusal import LittleMotionError, RefusalError
 from valve_friction_ros.model.drive import Drive
-from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 
 DAY = 86_400_000_000_000
 """A day, ns."""

@@ -16,7 +16,7 @@ from valve_friction_ros.identification.engine.balance_regression import LagPrior
 from valve_friction_ros.identification.engine.departures import static_friction
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
 from valve_friction_ros.model import KarnoppParameters, Valve, simulate
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 PERIOD = 2e-3
 TIME = np.arange(30_000) * PERIOD

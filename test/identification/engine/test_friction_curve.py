@@ -38,7 +38,7 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     averaged_twice,
 )
 from valve_friction_ros.model import Drive, KarnoppParameters, StemState, Valve, advance, simulate
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 PERIOD = 1e-3
 TIME = np.arange(40_000) * PERIOD
@@ -378,6 +378,16 @@ class TestNumbersOfSeveralAveragingTimes:
             np.hypot(10.0, 1.5)
         )
 
+    def test_where_no_stem_surely_slides_a_contradiction_is_held_by_the_interval(self):
+        """A half width of 1 beside 10: what lies 20 apart contradicts it, 10 apart does not."""
+
+        def width_beside(other):
+            pairs = (number(100.0, 1.0), number(other, 10.0))
+            unsure = [replace(curve(**{SLIDING: one}), is_sure=False) for one in pairs]
+            return curve_numbers(unsure)[SLIDING].half_width
+
+        assert width_beside(120.0) == pytest.approx(math.hypot(width_beside(110.0), 20.0))
+
     def test_none_is_narrower_than_a_force_balance_can_be(self):
         """Least of all where no second averaging time confirms it, or no spring returns it."""
         assert self.of((100.0, 1e-9), (100.0, 1e-9)).half_width == pytest.approx(1.5)
@@ -471,9 +481,11 @@ class TestDistanceUnderNoiseThatLasts:
         white = math.sqrt(1.0 - decay**2) * np.random.default_rng(seed).standard_normal(time.size)
         stem = position + 12e-6 * lfilter([1.0], [1.0, -decay], white)
         record = StampedRecord(StampedSignal(time, force), StampedSignal(time, stem), Drive.FORCE)
-        one = curve_numbers(friction_curves(record, Valve(), NO_LAG))[SLIDING]
-        truth = float(np.sum(np.abs(np.diff(position)) * 80.0) / np.sum(np.abs(np.diff(position))))
-        assert abs(one.value - truth) < one.half_width < 0.15 * truth
+        curves = friction_curves(record, Valve(), NO_LAG)
+        one = curve_numbers(curves)[SLIDING]
+        assert abs(one.value - 80.0) < one.half_width < 0.15 * 80.0
+        mean_speed = 5e-4 * 0.5 * math.pi * math.pi / 4.0
+        assert curves[0].sliding_speed == pytest.approx(mean_speed, rel=0.1)
 
 
 class TestConverterOfTheForce:

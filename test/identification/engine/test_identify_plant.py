@@ -25,7 +25,7 @@ from valve_friction_ros.model import (
     converter_response,
     simulate,
 )
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 PERIOD = 1e-3
 DURATION = 42.0

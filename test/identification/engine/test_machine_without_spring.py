@@ -23,7 +23,7 @@ from valve_friction_ros.identification import (
     identify,
 )
 from valve_friction_ros.model import Drive, Recording, Valve
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 DATA = next(
     (

@@ -27,7 +27,7 @@ from valve_friction_ros.identification.engine.sentences import main_doubt
 from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.verdict import interval_share
 from valve_friction_ros.model import BENCH_VALVE, LOW_FRICTION, simulate
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.signals import stamped_noise
 
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from valve_friction_ros.identification import RefusalError, find_steps, step_test
 from valve_friction_ros.model import IsaSteps, Recording, SensorNoise, converter_response, simulate
-from valve_friction_ros.model.bench import PRESSURE_RANGE
+from valve_friction_ros.model.excitations import PRESSURE_RANGE
 
 PERIOD = 1e-3
 SPAN = PRESSURE_RANGE[1] - PRESSURE_RANGE[0]

@@ -14,7 +14,7 @@ import math
 import numpy as np
 import pytest
 
-from valve_friction_ros.identification.trust.jackknife import jackknife
+from valve_friction_ros.identification.trust.uncertainty import jackknife
 
 GROUPS = [[1.0, 2.0, 6.0], [10.0, 14.0]]
 

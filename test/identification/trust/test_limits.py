@@ -11,7 +11,7 @@
 
 import math
 
-from valve_friction_ros.identification.trust.limits import FALL_SPEED
+from valve_friction_ros.identification.trust.verdict import FALL_SPEED
 
 
 def test_friction_may_fall_up_to_twice_the_stribeck_velocity_of_graphite():

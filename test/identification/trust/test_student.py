@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import stdtrit
 
-from valve_friction_ros.identification.trust.student import student_quantile
+from valve_friction_ros.identification.trust.uncertainty import student_quantile
 
 
 @given(

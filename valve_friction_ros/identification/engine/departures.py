@@ -44,7 +44,7 @@ from valve_friction_ros.identification.trust.uncertainty import (
     NORMAL_QUANTILE,
     half_width,
 )
-from valve_friction_ros.model.stamped import StampedRecord
+from valve_friction_ros.model.recording import StampedRecord
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import runs_of
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from valve_friction_ros.identification.refusal import RefusalError
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import (
     runs_of,

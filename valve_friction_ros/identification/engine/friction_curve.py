@@ -43,9 +43,9 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     averages_of,
     force_and_stem,
 )
-from valve_friction_ros.identification.trust.correlation import Correlation, correlation_of
+from valve_friction_ros.identification.trust.uncertainty import Correlation, correlation_of
 from valve_friction_ros.identification.units import SLIDING
-from valve_friction_ros.model.stamped import StampedRecord
+from valve_friction_ros.model.recording import StampedRecord
 from valve_friction_ros.model.valve import Valve
 
 _Array = NDArray[np.float64]
@@ -241,7 +241,7 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
     """Return each number from the shortest averaging time that knows it as well as any.
 
     The interval holds the scatter of those averaging times that know it nearly as well, and at
-    least `_LEAST_HALF_WIDTH`.
+    least `_LEAST_HALF_WIDTH`; where no stem surely slides, also what any of them contradicts it by.
     """
     result: dict[str, Estimated] = {}
     has_spring = any("spring_constant" in curve.numbers for curve in curves)
@@ -256,13 +256,20 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
         least_width = min(one.half_width for one in known)
         best = next(one for one in known if one.half_width <= _AS_WELL * least_width)
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
+        apart = [abs(one.value - best.value) for one in known if not (sure or _agree(one, best))]
         half_width = math.hypot(
             best.half_width,
             _SCATTERS * float(np.std(near)),
             least * best.value,
+            max(apart, default=0.0),
         )
         result[name] = replace(best, half_width=half_width)
     return result
+
+
+def _agree(one: Estimated, other: Estimated) -> bool:
+    """Return whether two numbers differ by no more than both intervals together."""
+    return abs(one.value - other.value) <= math.hypot(one.half_width, other.half_width)
 
 
 def checked_by_curve(
@@ -301,7 +308,7 @@ def checked_by_curve(
         if ours is None or theirs is None or not (theirs.value > 0 or name == "spring_preload"):
             continue
         apart = abs(ours.value - theirs.value)
-        agree = apart <= math.hypot(ours.half_width, theirs.half_width)
+        agree = _agree(ours, theirs)
         if not follows:
             wider = theirs.half_width if agree else max(theirs.half_width, apart)
             result[name] = replace(theirs, half_width=wider)

@@ -70,11 +70,6 @@ from valve_friction_ros.identification.settings import (
     IdentificationSettings,
 )
 from valve_friction_ros.identification.trust.calibration import BUDGET, COVERAGE
-from valve_friction_ros.identification.trust.correlation import (
-    CORRELATION,
-    Correlation,
-    correlation_of,
-)
 from valve_friction_ros.identification.trust.excitation import (
     require_changing_drive,
     require_drive,
@@ -91,6 +86,11 @@ from valve_friction_ros.identification.trust.plausible_units import (
     time_remarks,
 )
 from valve_friction_ros.identification.trust.sliding import COMPARABLE, SPEED_EXPONENT, mean_speed
+from valve_friction_ros.identification.trust.uncertainty import (
+    CORRELATION,
+    Correlation,
+    correlation_of,
+)
 from valve_friction_ros.identification.trust.verdict import (
     WEAK_SHARE,
     Parameter,
@@ -100,8 +100,7 @@ from valve_friction_ros.identification.trust.verdict import (
 )
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.karnopp_parameters import KarnoppParameters
-from valve_friction_ros.model.recording import Recording
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import Recording, StampedRecord, StampedSignal
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.signals import (
     MeasuredRecord,

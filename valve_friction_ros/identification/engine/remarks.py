@@ -12,7 +12,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.model.stamped import StampedRecord, StampedSignal
+from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 from valve_friction_ros.signals import quantisation_step, stamped_noise, without_repeats
 from valve_friction_ros.wording import percentage
 

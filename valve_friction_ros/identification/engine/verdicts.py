@@ -20,9 +20,10 @@ from valve_friction_ros.identification.engine.intervals import NOISE_LIKE, Estim
 from valve_friction_ros.identification.engine.posterior_fit import PosteriorFit
 from valve_friction_ros.identification.engine.sentences import late_sensor, main_doubt, slips
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.trust.limits import FALL_SPEED, NO_SLIP
 from valve_friction_ros.identification.trust.misfit import Misfit
 from valve_friction_ros.identification.trust.verdict import (
+    FALL_SPEED,
+    NO_SLIP,
     PRELOAD_SCALE,
     WEAK_SHARE,
     Parameter,

@@ -39,13 +39,12 @@ from valve_friction_ros.identification.trust.excitation import (
     require_travel,
     require_unbroken,
 )
-from valve_friction_ros.identification.trust.jackknife import Jackknife, jackknife
-from valve_friction_ros.identification.trust.limits import FALL_SPEED
 from valve_friction_ros.identification.trust.misfit import stem_distance
 from valve_friction_ros.identification.trust.plausible_units import require_plausible_units
 from valve_friction_ros.identification.trust.sliding import FINEST_SLIDING
-from valve_friction_ros.identification.trust.uncertainty import half_width
+from valve_friction_ros.identification.trust.uncertainty import Jackknife, half_width, jackknife
 from valve_friction_ros.identification.trust.verdict import (
+    FALL_SPEED,
     PRELOAD_SCALE,
     Parameter,
     fixed,

@@ -23,9 +23,9 @@ from valve_friction_ros.identification.signature.strokes import (
     velocity_window,
 )
 from valve_friction_ros.identification.trust.excitation import require_drive
-from valve_friction_ros.identification.trust.jackknife import jackknife
+from valve_friction_ros.identification.trust.uncertainty import jackknife
 from valve_friction_ros.identification.trust.verdict import Parameter
-from valve_friction_ros.model.frozen import frozen
+from valve_friction_ros.model.checks import frozen
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.wording import percentage

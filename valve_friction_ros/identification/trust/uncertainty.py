@@ -7,16 +7,203 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Standard errors and intervals that are valid for correlated residuals."""
+"""Standard errors, correlations and intervals that are valid for correlated residuals."""
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from statistics import NormalDist
+from typing import NamedTuple, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from valve_friction_ros.identification.trust.student import student_quantile
+_MANY = 1e8
+"""Degrees of freedom from which the quantile is that of the normal distribution to 10⁻⁸."""
+
+_TINY = 1e-300
+_ROUNDING = 1e-15
+_MOST_TERMS = 10_000
+_MOST_STEPS = 200
+"""A fraction of n degrees of freedom takes some √n terms; each step towards a quantile far out in
+the tail of few degrees of freedom doubles it at least."""
+
+
+@cache
+def student_quantile(probability: float, freedom: float) -> float:
+    """Return the t that Student's distribution stays below with a probability.
+
+    Parameters
+    ----------
+    probability : float
+        Above 0.5 and below 1.
+    freedom : float
+        Degrees of freedom, above zero; infinitely many make it the normal distribution.
+
+    Notes
+    -----
+    Above zero the distribution function is concave, so Newton's method from zero rises towards the
+    quantile without passing it. scipy.special would do, but takes 55 MB and a fifth of a second of
+    processor time in a program that needs nothing else of it.
+    """
+    freedom = min(freedom, _MANY)
+    half = 0.5 * freedom
+    scale = math.exp(math.lgamma(half + 0.5) - math.lgamma(half)) / math.sqrt(math.pi * freedom)
+    t = 0.0
+    for _ in range(_MOST_STEPS):
+        density = scale * (1 + t * t / freedom) ** -(half + 0.5)
+        step = (1 - probability - _above(t, freedom)) / -density
+        t += step
+        if not step > _ROUNDING * t:
+            break
+    return t
+
+
+def _above(t: float, freedom: float) -> float:
+    """Return P(T > t) for t ≥ 0: half the incomplete beta function I_x(n/2, 1/2), x = n/(n + t²).
+
+    By its continued fraction (Abramowitz and Stegun 26.5.8, evaluated as Lentz does), or by that
+    of 1 − I where it converges faster.
+    """
+    share = freedom / (freedom + t * t)
+    half = 0.5 * freedom
+    if share < (half + 1) / (half + 2.5):
+        return 0.5 * _beta(half, 0.5, share, t * t / (freedom + t * t))
+    return 0.5 - 0.5 * _beta(0.5, half, t * t / (freedom + t * t), share)
+
+
+def _beta(a: float, b: float, x: float, rest: float) -> float:
+    """Return the regularised incomplete beta function I_x(a, b); `rest` is 1 − x."""
+    if x <= 0.0:
+        return 0.0
+    logarithm = math.lgamma(a + b) - math.lgamma(a) - math.lgamma(b)
+    front = math.exp(logarithm + a * math.log(x) + b * math.log(rest)) / a
+    numerator, denominator = 1.0, 1.0 / _not_zero(1 - (a + b) * x / (a + 1))
+    value = denominator
+    for order in range(1, _MOST_TERMS):
+        even = order * (b - order) * x / ((a + 2 * order - 1) * (a + 2 * order))
+        odd = -(a + order) * (a + b + order) * x / ((a + 2 * order) * (a + 2 * order + 1))
+        for term in (even, odd):
+            denominator = 1.0 / _not_zero(1 + term * denominator)
+            numerator = _not_zero(1 + term / numerator)
+            value *= numerator * denominator
+        if abs(numerator * denominator - 1) < _ROUNDING:
+            break
+    return front * value
+
+
+def _not_zero(value: float) -> float:
+    return value if abs(value) > _TINY else _TINY
+
+
+_Member = TypeVar("_Member")
+
+
+class Jackknife(NamedTuple):
+    """Values of all members together, their standard errors, and the degrees of freedom.
+
+    A standard error is nan where a group has a single member; the freedom is members less groups.
+    """
+
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    freedom: int
+
+
+def jackknife(
+    groups: Sequence[Sequence[_Member]],
+    statistic: Callable[[Sequence[Sequence[_Member]]], Mapping[str, float]],
+) -> Jackknife:
+    """Evaluate `statistic`, and its standard error from the scatter within the groups.
+
+    Leaving out each of the n members of a group in turn gives n values θ_i, and the group's share
+    of the variance is (n − 1)/n·Σ(θ_i − mean θ)². For a mean this is s²/n. The effect of
+    one member's error on several quantities is included.
+
+    Parameters
+    ----------
+    groups : sequence of sequences
+        Independent members of each kind, at least one a group.
+    statistic : callable
+        From groups to named values.
+
+    Returns
+    -------
+    Jackknife
+        Values, standard errors, degrees of freedom.
+
+    References
+    ----------
+    B. Efron and C. Stein, Annals of Statistics 9 (1981) 586–596.
+    """
+    values = dict(statistic(groups))
+    variances = dict.fromkeys(values, 0.0)
+    for index, group in enumerate(groups):
+        size = len(group)
+        if size < 2:
+            variances = dict.fromkeys(values, math.nan)
+            break
+        trials = [
+            statistic([*groups[:index], [*group[:one], *group[one + 1 :]], *groups[index + 1 :]])
+            for one in range(size)
+        ]
+        for name in values:
+            mean = sum(trial[name] for trial in trials) / size
+            scatter = sum((trial[name] - mean) ** 2 for trial in trials)
+            variances[name] += (size - 1) / size * scatter
+    errors = {name: math.sqrt(variance) for name, variance in variances.items()}
+    return Jackknife(values, errors, sum(map(len, groups)) - len(groups))
+
+
+CORRELATION = "correlation"
+"""Name of the evidence that holds it."""
+
+
+class Correlation(TypedDict):
+    """Names of numbers, and a row of correlations for each, in that order."""
+
+    names: list[str]
+    matrix: list[list[float]]
+
+
+def correlation_of(
+    gradients: Mapping[str, NDArray[np.float64]],
+    covariance: NDArray[np.float64],
+    own: Mapping[str, float] | None = None,
+) -> Correlation:
+    """Return the correlation of numbers that depend on correlated coordinates.
+
+    Parameters
+    ----------
+    gradients : mapping of str to ndarray of float, shape (p,)
+        Derivatives of each number by the coordinates. A number that does not vary is left out.
+    covariance : ndarray of float, shape (p, p)
+        Covariance of the coordinates.
+    own : mapping of str to float, optional
+        Variance of a number that no other shares.
+
+    Examples
+    --------
+    The sum of two independent numbers of variance 1 and 3 goes with the first by 1/2.
+
+    >>> import numpy as np
+    >>> gradients = {"one": np.array([1.0, 0.0]), "sum": np.array([1.0, 1.0])}
+    >>> found = correlation_of(gradients, np.diag([1.0, 3.0]))
+    >>> found["names"], found["matrix"][0]
+    (['one', 'sum'], [1.0, 0.5])
+    """
+    rows = np.array(list(gradients.values()))
+    whole = rows @ covariance @ rows.T
+    whole += np.diag([(own or {}).get(name, 0.0) for name in gradients])
+    kept = np.diag(whole) > 0
+    whole = whole[np.ix_(kept, kept)]
+    deviation = np.sqrt(np.diag(whole))
+    matrix = np.clip(whole / np.outer(deviation, deviation), -1.0, 1.0)
+    np.fill_diagonal(matrix, 1.0)
+    names = [name for name, is_kept in zip(gradients, kept.tolist(), strict=True) if is_kept]
+    return {"names": names, "matrix": matrix.tolist()}
+
 
 CONFIDENCE = 0.95
 """Probability that an interval covers the true value; the usual choice of metrology (GUM)."""

@@ -16,6 +16,16 @@ from enum import Enum
 from valve_friction_ros.identification.units import PARAMETER_UNITS
 from valve_friction_ros.wording import percentage
 
+FALL_SPEED = 6.5e-3
+"""Speed, m/s, up to which friction may fall: twice the v_s = 3.26 mm/s published for graphite.
+
+At 2·v_s the fall is complete but for e⁻⁴ = 2 %. A slower record does not separate F_c from the
+friction at low speed. An absolute size from one packing, applied to every valve."""
+
+NO_SLIP = "no slip jump in the record: F_s cannot be separated from F_c"
+"""Reason of a static friction that is not identifiable."""
+
+
 WEAK_SHARE = 0.05
 """Half width of an interval, as a share of the value, above which the verdict is weak.
 

@@ -29,9 +29,8 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.bag_service import bag_writer
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.report_service import ReportWriter
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.output_folder import OutputFolder, valve_name
-from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.streams import Samples, Snapshot, nanoseconds, utc, utc_second
 

@@ -19,13 +19,13 @@ from rclpy.node import Node
 from valve_friction_ros.health import FrictionMonitor
 from valve_friction_ros.identification import STATED, RefusalError
 from valve_friction_ros.model import Valve
-from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.output_folder import (
     OutputFolder,
     file_name,
     require_room,
     valve_name,
 )
+from valve_friction_ros.nodes.plumbing.worker import done_in
 from valve_friction_ros.records.bags.storage import bag_libraries
 from valve_friction_ros.records.bags.topics import StreamNames
 from valve_friction_ros.settings import IDENTIFICATION

@@ -51,8 +51,7 @@ from valve_friction_ros.history.status_values import number_text, ratio_values
 from valve_friction_ros.identification import IdentificationSettings
 from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
-from valve_friction_ros.nodes.plumbing.worker import Worker
+from valve_friction_ros.nodes.plumbing.worker import InternalError, Worker, bugs_reported, done_in
 from valve_friction_ros.streams import Arrivals, utc_second
 from valve_friction_ros.wording import Code, said, sentence
 

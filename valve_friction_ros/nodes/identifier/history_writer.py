@@ -47,7 +47,7 @@ from valve_friction_ros.history import (
 from valve_friction_ros.history.place import Claim
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.workers import HistoryThread
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
+from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported, done_in
 from valve_friction_ros.response import StepAnswer
 from valve_friction_ros.streams import utc_second
 from valve_friction_ros.usage import ValveUsage

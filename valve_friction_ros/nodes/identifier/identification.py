@@ -20,7 +20,7 @@ from valve_friction_ros.health import (
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.results import NumberTopics
 from valve_friction_ros.nodes.identifier.workers import Workers
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported, done_in
+from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported, done_in
 
 
 class Identification:

@@ -35,13 +35,12 @@ from valve_friction_ros.health.valve_changes import DIFFERENCES
 from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.alarm_board import AlarmBoard
 from valve_friction_ros.nodes.identifier.alarm_recorder import AlarmRecorder
-from valve_friction_ros.nodes.identifier.alerts import Alerts, webhook_from
+from valve_friction_ros.nodes.identifier.alerts import Alerts, FaultLog, LevelLog, webhook_from
 from valve_friction_ros.nodes.identifier.bag_service import BagSaver
 from valve_friction_ros.nodes.identifier.baseline_in_force import BaselineInForce
 from valve_friction_ros.nodes.identifier.evidence_watch import EvidenceWatch
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.identification import Identification
-from valve_friction_ros.nodes.identifier.level_log import FaultLog, LevelLog
 from valve_friction_ros.nodes.identifier.parameters import (
     CHANGEABLE,
     monitor_settings,
@@ -60,7 +59,6 @@ from valve_friction_ros.nodes.identifier.status import (
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
 from valve_friction_ros.nodes.identifier.valve_inputs import ValveInputs
 from valve_friction_ros.nodes.identifier.workers import Workers, running_workers
-from valve_friction_ros.nodes.plumbing.background import InternalError
 from valve_friction_ros.nodes.plumbing.managed_node import ManagedNode
 from valve_friction_ros.nodes.plumbing.parameters import (
     declare_parameters,
@@ -71,6 +69,7 @@ from valve_friction_ros.nodes.plumbing.parameters import (
 from valve_friction_ros.nodes.plumbing.readiness import Readiness
 from valve_friction_ros.nodes.plumbing.running import run_node
 from valve_friction_ros.nodes.plumbing.trigger_service import create_trigger_service
+from valve_friction_ros.nodes.plumbing.worker import InternalError
 from valve_friction_ros.settings import NODES
 from valve_friction_ros.streams import Arrivals, DataQuality, Intake, Signal
 from valve_friction_ros.wording import Code, Statement, said, sentence

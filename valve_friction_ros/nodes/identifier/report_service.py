@@ -21,7 +21,6 @@ from valve_friction_ros.identification import RefusalError
 from valve_friction_ros.nodes.identifier.history_writer import HistoryWriter
 from valve_friction_ros.nodes.identifier.response_watch import ResponseWatch
 from valve_friction_ros.nodes.identifier.usage_watch import UsageWatch
-from valve_friction_ros.nodes.plumbing.background import done_in
 from valve_friction_ros.nodes.plumbing.memory import give_back_memory
 from valve_friction_ros.nodes.plumbing.output_folder import (
     OutputFolder,
@@ -31,6 +30,7 @@ from valve_friction_ros.nodes.plumbing.output_folder import (
     valve_name,
 )
 from valve_friction_ros.nodes.plumbing.processes import ThisProcess, imported
+from valve_friction_ros.nodes.plumbing.worker import done_in
 from valve_friction_ros.streams import utc
 
 

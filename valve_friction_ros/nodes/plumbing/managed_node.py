@@ -21,8 +21,8 @@ from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.timer import Timer
 
-from valve_friction_ros.nodes.plumbing.background import bugs_reported
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
+from valve_friction_ros.nodes.plumbing.worker import bugs_reported
 
 _WRONG = (ParameterException, RuntimeError, ValueError, OSError)
 """What a node raises where its parameters do not let it be configured."""

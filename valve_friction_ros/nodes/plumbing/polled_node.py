@@ -44,12 +44,12 @@ from rclpy.task import Task
 from rclpy.timer import Timer
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.rclpy_private import (
     awaits_coroutines,
     take_request,
     takes_directly,
 )
+from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported
 
 _LONGEST_TURN = 0.5
 """Time, s, after which what is still ready waits for the next turn."""

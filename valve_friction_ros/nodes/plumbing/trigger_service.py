@@ -15,9 +15,9 @@ from typing import Any
 from std_srvs.srv import Trigger
 
 from valve_friction_ros.identification import RefusalError
-from valve_friction_ros.nodes.plumbing.background import InternalError, bugs_reported
 from valve_friction_ros.nodes.plumbing.polled_node import PolledNode
 from valve_friction_ros.nodes.plumbing.qos import REQUESTS
+from valve_friction_ros.nodes.plumbing.worker import InternalError, bugs_reported
 
 
 def create_service(
