@@ -251,7 +251,7 @@ def test_a_stem_that_swings_with_its_pressure_is_not_called_sticky():
     assert monitor.hunting is not None
     assert not monitor.hunting.sticks
     (finding,) = response_findings(monitor.summary, ResponseLimits(), monitor.hunting)
-    assert "friction is not seen to be the cause" in finding.message
+    assert "nothing shows that friction is the cause" in finding.message
 
 
 def test_a_swing_that_has_died_away_is_no_hunting():
@@ -360,7 +360,7 @@ def messages(moves, limits=NO_LIMITS, dead_band=np.nan):
 def test_the_causes_that_the_pressure_leaves():
     (seized,) = messages(SEIZED)
     assert "ignored 5 of the latest 5 steps of its command of 5 %" in seized
-    assert "the pressure answers: the stem is stuck, or its position sensor" in seized
+    assert "the pressure responds: the stem is stuck, or its position sensor" in seized
     (starved,) = messages(STARVED)
     assert "does not reach the actuator" in starved
     (mixed,) = messages([*SEIZED[:3], *STARVED[:2]])

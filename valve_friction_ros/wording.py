@@ -290,11 +290,11 @@ def misfit_words(misfit: float, unit: str) -> str:
 _ABORTS = {
     "POSITION": "the stem was at {0:.4g} m, beyond its limit of {1:.4g} m",
     "PRESSURE": "the measured pressure was {0:.6g} Pa, beyond its limit of {1:.6g} Pa",
-    "SILENT_STEM": "no position of the stem came for {0}, and {1:g} s are allowed",
-    "SILENT_PRESSURE": "no pressure came for {0}, and {1:g} s are allowed",
+    "SILENT_STEM": "no stem position arrived for {0}, and {1:g} s are allowed",
+    "SILENT_PRESSURE": "no pressure arrived for {0}, and {1:g} s are allowed",
     "HELD_UP": "the player stood still for {0:.2g} s ({1:g} s are allowed)",
-    "ASKED": "somebody has stopped it",
-    "SHUTDOWN": "the player was ended",
+    "ASKED": "an operator stopped it",
+    "SHUTDOWN": "the player was shut down",
 }
 
 
@@ -320,22 +320,19 @@ def evidence_ratio_words(
     independent: float,
     describes: tuple[bool, bool],
 ) -> str:
-    """Say how strongly a record speaks for one of two models, and how far that may be believed."""
+    """Say how strongly a record favours one of two models, and how far to trust that."""
     digits = abs(log_ratio) / math.log(10.0)
     ratio = f"1e{digits:.0f}" if digits >= 4 else f"{10.0**digits:.2g}"
     which = "first" if log_ratio > 0 else "second"
-    told = "the record hardly tells the two models apart"
+    told = "the record hardly distinguishes the two models"
     if support != "HARDLY":
         told = (
-            f"the record speaks {_SUPPORTS[support]} for the {which} model: it is {ratio} times as "
+            f"the record {_SUPPORTS[support]} favours the {which} model: it is {ratio} times as "
             "probable"
         )
-    count = (
-        f"its {samples:.0f} samples count as {independent:.0f}, as what a model leaves at one of "
-        "them is much as at the next"
-        if independent < 0.5 * samples
-        else f"its {samples:.0f} samples count"
-    )
+    count = f"{samples:.0f} samples"
+    if independent < 0.5 * samples:
+        count += f" carry the information of {independent:.0f} independent ones"
     wrong = {
         (False, False): "; neither describes the valve to within noise, so this says which is "
         "nearer, not which is true",
@@ -346,7 +343,7 @@ def evidence_ratio_words(
 
 
 _LACKS = {
-    "RESULT": "there is no result since the start of its identifier",
+    "RESULT": "its identifier has produced no result since it started",
     "VALUE": "{of} is not identifiable",
     "SIZE": "{of} is not above zero",
     "INTERVAL": "{of} has no interval",
@@ -376,10 +373,10 @@ _LACK_REMEDIES = {
     "PRECISION": _BETTER_RECORD,
     "HEALTH": (
         "Repair the valve, then identify it again.",
-        "If it is healthy, have baseline_in_alarm of its identifier set to true.",
+        "If it is healthy, set baseline_in_alarm of its identifier to true.",
     ),
 }
-_LET_IT_WORK = "Or let the valve work on: its moves in service become a baseline in time."
+_LET_IT_WORK = "Or leave the valve in service: its moves become a baseline in time."
 
 
 def lack_remedies(lacks: Sequence[tuple[str, str]]) -> tuple[str, ...]:
@@ -398,7 +395,7 @@ def _ago(age: int) -> str:
     """Write an age, ns, in whole units; a clock that has gone back since is named."""
     seconds = age / 1e9
     if seconds < 0:
-        return "at a time to come, by a clock that has gone back since"
+        return "in the future: a clock has been set back since"
     units = (("days", 86400), ("h", 3600), ("min", 60))
     unit, length = next((one for one in units if seconds >= 2 * one[1]), ("s", 1))
     return f"{seconds // length:.0f} {unit} ago"
@@ -492,7 +489,7 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "UNKNOWN": "",
         "IMPOSSIBLE": "friction below zero",
         "NORMAL": "friction normal",
-        "UNCLEAR": "friction cannot be told from its baseline",
+        "UNCLEAR": "friction cannot be distinguished from its baseline",
         "GROWN": "friction has grown",
         "EXCESS": "excess friction",
         "FALLEN": "friction has fallen",
@@ -522,9 +519,9 @@ _TABLES: dict[str, Mapping[str, str]] = {
     },
     "survey": {
         "UNKNOWN": "",
-        "GOOD": ": good, by the limits of a first survey",
-        "WATCH": ": watch it, by the limits of a first survey",
-        "BAD": ": bad, by the limits of a first survey",
+        "GOOD": ": good, by the limits of the first survey",
+        "WATCH": ": watch it, by the limits of the first survey",
+        "BAD": ": bad, by the limits of the first survey",
     },
     "end": {"lower_stop": "lower end", "upper_stop": "upper end"},
     "sensor": {"BOTH": "zero and span", "EITHER": "zero or span", "SPAN": "span"},
@@ -535,22 +532,22 @@ _TABLES: dict[str, Mapping[str, str]] = {
         "BOTH": ", as both travel stops have moved alike",
     },
     "cause": {
-        "FRICTION": "the pressure answers and friction holds the stem: check packing and guide",
-        "LATE": "the pressure itself answers late: check the positioner",
+        "FRICTION": "the pressure responds and friction holds the stem: check packing and guide",
+        "LATE": "the pressure itself responds late: check the positioner",
         "SLOW": "the pressure itself is slow: check positioner, air supply and volume",
         "SETTING": "the stem follows its pressure, which stops short: check calibration and gain "
         "of the positioner, and the air supply",
-        "UNKNOWN": "pressure and stem do not tell whether positioner or valve is to blame",
-        "PRESSURE_ANSWERS": "the pressure answers: the stem is stuck, or its position sensor has "
+        "UNKNOWN": "pressure and stem do not show whether the positioner or the valve is to blame",
+        "PRESSURE_ANSWERS": "the pressure responds: the stem is stuck, or its position sensor has "
         "stopped: look at the stem",
-        "PRESSURE_SILENT": "nor does the pressure answer: it does not reach the actuator: check "
-        "the positioner, its command and the air supply",
-        "PRESSURE_ANSWERS_SOME": "the pressure answers some of them: the stem is stuck, its "
+        "PRESSURE_SILENT": "the pressure does not respond either: it does not reach the actuator: "
+        "check the positioner, its command and the air supply",
+        "PRESSURE_ANSWERS_SOME": "the pressure responds to some of them: the stem is stuck, its "
         "position sensor has stopped, or the pressure does not always reach the actuator",
         "STICTION": "it sticks and jumps while the pressure swings: stiction, and integral action: "
         "check the packing first",
-        "NOT_FRICTION": "friction is not seen to be the cause: check gain and air supply of the "
-        "positioner",
+        "NOT_FRICTION": "nothing shows that friction is the cause: check gain and air supply of "
+        "the positioner",
     },
 }
 """Words for the members of enums and for names, by table."""
@@ -581,17 +578,17 @@ _SENTENCES = {
     Code.NOT_COMPARED_SPEED: "the stem slides at {speed:in .2g mm/s} mm/s, and at "
     "{healthy:in .2g mm/s} mm/s in the baseline, with too little known of the friction between: "
     "move it as in the baseline",
-    Code.NOT_COMPARED_LACKING: "the baseline has no {of:words}: set it anew",
+    Code.NOT_COMPARED_LACKING: "the baseline has no {of:words}: set it again",
     Code.WAS_COMPARED: "{what} was {ratio:figures} times its baseline{time:dated}",
     Code.MISFIT: "the Karnopp model does not describe this valve ({misfit:misfit} of misfit)",
     Code.DOUBTED: "{doubt}; {of}",
     Code.SCALED: "friction and spring constant have changed by one factor, which points to "
-    "{scale}: check them before any work on the packing; {of}",
+    "{scale}: check both before any work on the packing; {of}",
     Code.DATED: "{of}{time:dated}",
     Code.DATED_EARLIER: "{of} (identified earlier, {time:minute})",
     Code.AGED: "{of} (identified {age:ago}, before the restart)",
     Code.STANDS_UNCOMPARED: "{alarm}; the latest record cannot be compared: {latest}",
-    Code.STANDS_UNCERTAIN: "{alarm}; the latest record does not surely end it: {latest}",
+    Code.STANDS_UNCERTAIN: "{alarm}; the latest record does not clear it: {latest}",
     Code.FAILED: "{error}; before: {of}",
     Code.NO_ESTIMATE: "no estimate: {reason}",
     Code.NOTHING_IDENTIFIED: "nothing has been identified yet",
@@ -614,7 +611,7 @@ _SENTENCES = {
     Code.BASELINE_SLIDING: f"sliding friction {_SLIDING_SIZE}",
     Code.SLIDING_SIZE: _SLIDING_SIZE,
     Code.BASELINE_REMARK: "it is known to ±{share:percent}: only friction that has grown to "
-    "{least:.2g} times is sure to be declared; " + _MORE_STROKES,
+    "{least:.2g} times is certain to be declared; " + _MORE_STROKES,
     Code.BY_MOVES: "by {moves} moves in service since {since:minute}{dead_band}",
     Code.CHANGED: "{of}; it changed between {earliest:minute} and {latest:minute}",
     Code.AREA_AND_SCALE: "the scale of the {drive:drive} sensor and the diaphragm area",
@@ -632,7 +629,7 @@ _SENTENCES = {
     Code.SPRING_CHANGED: "the spring constant has changed"
     "{with_preload:?, and its preload with it}: {change:times} the baseline, now {value:.4g} N/m: "
     "check the spring{causes:list , and | and |, which would look the same}",
-    Code.BALANCE_SHIFTED: "the balance of forces has shifted: spring preload {change:by N}, "
+    Code.BALANCE_SHIFTED: "the force balance has shifted: spring preload {change:by N}, "
     "{share:percent} of the spring's force over the travel: check {causes:list | or |}",
     Code.BENCH_SET: "the bench set",
     Code.DRIVE_ZERO: "the zero of the {drive:drive} sensor ({reading:+.3g} {unit} in its reading)",
@@ -647,16 +644,16 @@ _SENTENCES = {
     "between the signals would look much the same",
     Code.ASYMMETRY_CHANGED: "viscous friction has become larger {upward:?up|down}ward: share "
     "{change:by}: check stem and packing for wear on one side, and the air path for a throttle "
-    "that acts one way",
+    "that acts in one direction only",
     Code.NOISE_GROWN: "the noise of the {signal:of signal} has grown to {change:times} the "
     "baseline: check the sensor, its cable, its supply and its mounting",
-    Code.LAG_CHANGED: "the stem has become {later:?later|earlier} against the {drive:drive}: "
+    Code.LAG_CHANGED: "the stem has become {later:?later|earlier} relative to the {drive:drive}: "
     "{change:by ms}: check filters and clocks of both sensors, and tubing and volume between "
     "sensor and actuator; a changed viscous friction would look much the same",
     Code.STOPS_MOVED_ALIKE: "both travel stops have moved alike, by {change:by mm}: the zero of "
     "the position sensor or its coupling to the stem has moved: check its mounting",
     Code.TRAVEL_LOST: "travel is lost at its {stop:of end}: the stem stops {change:by mm} from "
-    "where it went before: check for dirt or a part in the trim, a stop that was set, and the "
+    "where it went before: check for dirt or a foreign part in the trim, an adjusted stop, and the "
     "{sensor:of sensor} of the position sensor",
     Code.STOP_MOVED_OUTWARD: "the travel stop at its {stop:of end} has moved outward by "
     "{change:by mm}: check seat and plug for wear, stop and coupling, and the {sensor:of sensor} "
@@ -665,10 +662,10 @@ _SENTENCES = {
     "while its {drive:drive} changed by {change:.3g} {unit}: more than {ratio:.2g} times the "
     "friction of the baseline holds it, or a part in the trim or a lock does, or the position "
     "sensor has stopped: look at the stem",
-    Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test while the force asked "
-    "it to move: static friction is at least {friction:.3g} N, {ratio:.2f} times the friction of "
-    "the baseline, or something blocks the stem: look at the stem, and repeat the test with more "
-    "force",
+    Code.HELD_IN_TEST: "the stem stayed at {position:in .1f mm} mm in a test while the force "
+    "should have moved it: static friction is at least {friction:.3g} N, {ratio:.2f} times the "
+    "friction of the baseline, or something blocks the stem: look at the stem, and repeat the "
+    "test with more force",
     Code.BUFFER_CLEARED: "{because}: the buffer was cleared",
     Code.CLEARED_ON_REQUEST: "on request",
     Code.CLEARED_AS_SETTINGS: "valve or window parameters were changed",

@@ -69,7 +69,7 @@ def test_a_scale_of_the_sensor_qualifies_the_friction(
     assert (answer["diagnosis"]["level"], answer["diagnosis"]["ne_107"]) == ("WARN", "C")
     assert answer["diagnosis"]["message"].startswith(
         "friction and spring constant have changed by one factor, which points to the scale of "
-        "the pressure sensor and the diaphragm area: check them before any work on the packing"
+        "the pressure sensor and the diaphragm area: check both before any work on the packing"
     )
     report = PageReader(page.read_text())
     # Half as much again is beyond spring_failure: an error, but of the sensors.

@@ -47,7 +47,7 @@ def test_it_is_said_at_the_end_of_the_table(call, valve):
     code, out, _ = call(RECORDING, "--valve", valve, "--method", "bench")
     assert code == 0
     assert "no baseline yet" in out.splitlines()[-1]
-    assert out.rstrip().endswith("good, by the limits of a first survey")
+    assert out.rstrip().endswith("good, by the limits of the first survey")
 
 
 @pytest.mark.parametrize(("given", "survey"), CASES[:2])

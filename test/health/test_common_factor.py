@@ -41,7 +41,7 @@ GROWN = Diagnosis(
 )
 WORDS = (
     "friction and spring constant have changed by one factor, which points to the scale of the "
-    "pressure sensor and the diaphragm area: check them before any work on the packing; "
+    "pressure sensor and the diaphragm area: check both before any work on the packing; "
 )
 
 

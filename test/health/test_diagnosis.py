@@ -476,7 +476,7 @@ class TestWords:
         )
         assert found.message == (
             "no baseline yet; the stem ignores reversals smaller than 5.2 % of its travel: good, "
-            "by the limits of a first survey"
+            "by the limits of the first survey"
         )
 
     def test_without_a_travel_the_friction_itself_is_told(self, with_values, friction):

@@ -385,7 +385,7 @@ def test_a_preload_near_zero_is_judged_by_its_newtons(healthy_result, zero):
     finding = only(diagnose_parameters(result, Baseline.of(healthy_result)))
     assert f"the zero of the pressure sensor ({1e-3 * zero:.2g}" in finding.message
     back = diagnose_parameters(healthy_result, Baseline.of(result))
-    assert "the balance of forces has shifted" in only(back).message
+    assert "the force balance has shifted" in only(back).message
 
 
 def test_a_doubted_model_leaves_what_the_signals_and_the_force_balance_say_and_the_slip_jump(

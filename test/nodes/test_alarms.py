@@ -127,7 +127,7 @@ def test_stamps_of_a_time_to_come(live, history, tmp_path):
     status = client.next_status()
     assert status.level == ERROR
     assert status.message.endswith(
-        " (identified at a time to come, by a clock that has gone back since, before the restart)"
+        " (identified in the future: a clock has been set back since, before the restart)"
     )
     assert values_of(status)["alarm_recording"] == str(tmp_path / "1")
     client.identified(HEALTHY)

@@ -218,7 +218,7 @@ def test_what_is_missing_to_a_baseline_is_explained_and_offered(tab):
     page.locator(".vf-dl").get_by_text("buffered samples").wait_for(state="attached")
     page.get_by_role("button", name="Set baseline …").click()
     asked = page.locator(".vf-dialog")
-    asked.get_by_text("there is no result since the start of its identifier").wait_for()
+    asked.get_by_text("its identifier has produced no result since it started").wait_for()
     asked.get_by_text("Identify the valve.").wait_for()
     assert not axe_violations(page)
     asked.get_by_role("button", name="Identify").click()

@@ -81,7 +81,7 @@ def test_moves_in_service(live, unit, scale):
     status = client.next_status(lambda one: one.level == WARN, "a late stem")
     assert values_of(status)["NE 107"] == "M"
     assert "after its command (median of 6 moves, limit 0.8 s)" in status.message
-    assert "the pressure itself answers late: check the positioner" in status.message
+    assert "the pressure itself responds late: check the positioner" in status.message
 
 
 def test_the_figures_outlive_a_kill(live, tmp_path):

@@ -50,7 +50,7 @@ def test_an_alarm_ends_by_a_sure_result_only_also_over_a_restart(live):
     assert low < LIMITS["warn_ratio"] < LIMITS["error_ratio"] < high
     assert (unsure.level, values["NE 107"]) == (ERROR, "F")
     assert unsure.message.startswith("excess friction: ")
-    assert "the latest record does not surely end it: friction has grown: " in unsure.message
+    assert "the latest record does not clear it: friction has grown: " in unsure.message
     live.kill(node)
 
     live.start_identifier(LIMITS)

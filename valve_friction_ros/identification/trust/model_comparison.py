@@ -20,7 +20,7 @@ from valve_friction_ros.wording import evidence_ratio_words
 
 
 class Support(Enum):
-    """How strongly a record speaks for one of two models, after Kass and Raftery (1995)."""
+    """How strongly a record favours one of two models, after Kass and Raftery (1995)."""
 
     HARDLY = 1.0
     POSITIVE = 3.0
