@@ -194,7 +194,7 @@ class Baseline:
 
     @property
     def remark(self) -> str:
-        """Which growth alone is certain to be declared, where that is more than by half; else ''."""
+        """Which growth alone is certain to be declared, where it is more than by half; or ''."""
         shares = [] if self.sliding is None else [self.sliding.share]
         if self.coulomb_friction is not None:
             shares.append(self.half_width / self.coulomb_friction)
