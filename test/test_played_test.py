@@ -141,8 +141,8 @@ def test_it_can_be_started_again_after_each_end_and_not_while_it_plays():
 @pytest.mark.parametrize(
     ("stem", "pressure", "cause"),
     [
-        (None, 1.1e5, "no position of the stem came"),
-        (0.01, None, "no pressure came"),
+        (None, 1.1e5, "no stem position arrived"),
+        (0.01, None, "no pressure arrived"),
         (0.03, 1.1e5, "beyond its limit of 0.02 m"),
         (0.01, 2e5, "beyond its limit of 150000 Pa"),
     ],

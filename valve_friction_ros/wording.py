@@ -302,7 +302,7 @@ def played_test_words(why: str, found: float, limit: float) -> str:
     """Say why a test goes back, with what was found and its limit."""
     if not why.startswith("SILENT"):
         return _ABORTS[why].format(found, limit)
-    time = f"{found:.2g} s" if math.isfinite(found) else "all the time"
+    time = f"{found:.2g} s" if math.isfinite(found) else "the whole time"
     return _ABORTS[why].format(time, limit)
 
 

@@ -117,7 +117,7 @@ class TestOfAResult:
     def test_what_a_wide_one_cannot_show_is_said(self):
         assert Baseline(100.0, 13.0).remark == Baseline(100.0).remark == ""
         assert Baseline(100.0, 13.0, SlidingFriction(200.0, 66.0, 8e-3)).remark == ""
-        words = "it is known to ±33 %: only friction that has grown to 2 times is sure to be"
+        words = "it is known to ±33 %: only friction that has grown to 2 times is certain to be"
         assert Baseline(sliding=SlidingFriction(200.0, 66.0, 8e-3)).remark.startswith(words)
         assert Baseline(100.0, 33.0).remark.startswith(words)
 

@@ -54,7 +54,7 @@ def test_the_level_stays_and_the_signal_is_to_check():
 
 def test_a_force_has_no_diaphragm():
     told = qualified(GROWN, FACTOR, Valve(None, travel=0.03))
-    assert "points to the scale of the drive force sensor: check them" in told.message
+    assert "points to the scale of the drive force sensor: check both" in told.message
 
 
 @pytest.mark.parametrize(

@@ -283,7 +283,7 @@ class TestUnknownFriction:
         assert found.message == (
             "no comparison with the baseline (coulomb friction 128 N): coulomb friction is not "
             "identifiable: the record does not determine it; the baseline has no sliding friction: "
-            "set it anew; sliding friction 205.5 ± 3.0 N"
+            "set it again; sliding friction 205.5 ± 3.0 N"
         )
 
     @pytest.mark.parametrize("baseline", [None, BASELINE])

@@ -118,7 +118,7 @@ def test_only_a_sure_end_ends_it(monitor, sliding, name):
     assert told.own.ratio.value == pytest.approx(value / 150.0)
     stands = told.alarm is not None
     assert stands is (words == "excess friction")
-    assert ("does not surely end it" in told.message) is stands
+    assert ("does not clear it" in told.message) is stands
 
 
 def test_what_is_surely_over_does_not_come_back(monitor, sliding, nothing):

@@ -104,8 +104,8 @@ def test_a_baseline_of_a_friction_alone_says_nothing():
         ({"upper_stop": (TRAVEL - 2e-3, 1e-5)}, WARN, MAINTENANCE, "lost at its upper end"),
         ({"stem_noise": (3e-5, 6e-7)}, WARN, FUNCTION, "noise of the stem position has grown to 3"),
         ({"drive_noise": (300.0, 6.0)}, WARN, FUNCTION, "noise of the pressure has grown to 3"),
-        ({"lag": (0.05, 0.003)}, WARN, FUNCTION, "later against the pressure: +50 ms"),
-        ({"lag": (-0.05, 0.003)}, WARN, FUNCTION, "earlier against the pressure: -50 ms"),
+        ({"lag": (0.05, 0.003)}, WARN, FUNCTION, "later relative to the pressure: +50 ms"),
+        ({"lag": (-0.05, 0.003)}, WARN, FUNCTION, "earlier relative to the pressure: -50 ms"),
     ],
 )
 def test_each_change_is_a_finding_of_its_own(changes, level, signal, words):
