@@ -23,6 +23,7 @@ import pytest
 from pages import PNG, PageReader
 
 import valve_friction_ros
+from valve_friction_ros.commands.identify import _dated
 from valve_friction_ros.identification import TIMING_UNCERTAINTY
 from valve_friction_ros.model import (
     BENCH_VALVE,
@@ -121,6 +122,18 @@ def test_the_page_holds_all_that_was_found(reported, quick_csv):
     assert f"valve_friction_ros {valve_friction_ros.__version__}" in software
     assert {"numpy", "scipy", "Python"} < {each.split()[0] for each in software}
     assert page.table("record")["samples"] == ("1000, sampled every 10 ms",)
+
+
+def test_times_are_those_of_the_stated_zone(reported, write_csv, columns_of, quick_record):
+    columns = columns_of(quick_record)
+    columns["time_s"] = 1_784_282_400.0 + columns["time_s"]  # 2026-07-17 10:00 UTC
+    path = write_csv(columns)
+    os.utime(path, (1_784_286_000, 1_784_286_000))
+    zone = ("--method", "bench", "--time-zone", "Europe/Berlin")
+    page, _ = reported(path, *zone)
+    assert page.table("record")["began"] == ("2026-07-17 12:00:00 Europe/Berlin",)
+    assert _dated(path, "Europe/Berlin").endswith("2026-07-17 13:00 Europe/Berlin")
+    assert _dated(path, "").endswith("2026-07-17 11:00 UTC")
 
 
 def test_the_page_of_the_default_method(reported, write_csv, columns_of, quick_record):

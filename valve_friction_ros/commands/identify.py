@@ -13,9 +13,10 @@ import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime, timezone
+from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
+from zoneinfo import ZoneInfo
 
 from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
@@ -107,10 +108,11 @@ def baseline_from(options: argparse.Namespace) -> Baseline | None:
 
 
 class IdentificationFiles(NamedTuple):
-    """The files to write."""
+    """The files to write; their times are those of `zone`, an IANA name, or UTC."""
 
     plot: Path | None
     report: Path | None
+    zone: str = ""
     healthy: Recording | None = None
 
     def compared_with(
@@ -159,22 +161,23 @@ class IdentificationFiles(NamedTuple):
                 baseline=baseline,
                 notes=recorded.notes,
                 limits=limits,
-                dated=_dated(recorded.path),
+                dated=_dated(recorded.path, self.zone),
+                zone=self.zone,
                 healthy=self.healthy,
             )
             reports.write_report(reports.identification_report(record), self.report)
 
 
-def _dated(path: Path) -> str:
+def _dated(path: Path, zone: str) -> str:
     """Return when a file was last changed, in words; empty where it has no such time."""
     if not path.is_file():
         return ""
-    changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
-    return f"its file was last changed {changed:%Y-%m-%d %H:%M} UTC"
+    changed = datetime.fromtimestamp(path.stat().st_mtime, ZoneInfo(zone or "UTC"))
+    return f"its file was last changed {changed:%Y-%m-%d %H:%M} {zone or 'UTC'}"
 
 
-def identification_files(options: argparse.Namespace) -> IdentificationFiles:
-    """Return the files that were asked for.
+def identification_files(options: argparse.Namespace, zone: str) -> IdentificationFiles:
+    """Return the files that were asked for, with times in a zone.
 
     Raises ValueError, which names the file and the cause, for a file that cannot be written.
     """
@@ -186,7 +189,7 @@ def identification_files(options: argparse.Namespace) -> IdentificationFiles:
         from valve_friction_ros.reports import require_report_file  # noqa: PLC0415 - slow to import
 
         require_report_file(options.report)
-    return IdentificationFiles(options.plot, options.report)
+    return IdentificationFiles(options.plot, options.report, zone)
 
 
 REFUSALS = (RefusalError,)
@@ -268,7 +271,10 @@ def run(options: argparse.Namespace) -> int:
     settings = identification_settings(options, description)
     limits = survey_limits(options, description)
     method = method_named(method_name(options, description.settings))
-    baseline, files = baseline_from(options), identification_files(options)
+    baseline, files = (
+        baseline_from(options),
+        identification_files(options, reading.columns.time_zone),
+    )
     if options.baseline_recording is not None:
         whole = replace(reading, stretch=Stretch())
         healthy = read_one(options.baseline_recording, valve, whole)
