@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.model.checks import require_non_negative, require_positive
 from valve_friction_ros.signals import quantisation_step
 from valve_friction_ros.streams import DAY
@@ -242,8 +243,6 @@ class Breakaways:
 _DIFFERENCE_ORDER = 4
 _GAIN = math.sqrt(math.comb(2 * _DIFFERENCE_ORDER, _DIFFERENCE_ORDER))
 """Deviation of the fourth differences of white noise of deviation 1: √70."""
-_MEDIAN = 0.6744898
-"""Median magnitude of a standard normal number."""
 _MOST_SEEN = 16
 """Blocks whose noise is remembered. Chosen: the stem rests in some of them."""
 _BAND_NOISE = 14.0
@@ -283,7 +282,7 @@ class SensorBand:
             return
         self._follow_step(position)
         differences = np.sort(np.abs(np.diff(position, _DIFFERENCE_ORDER)))
-        self._noises.append(float(differences[differences.size // 2]) / (_MEDIAN * _GAIN))
+        self._noises.append(float(differences[differences.size // 2]) / (MEDIAN_MAGNITUDE * _GAIN))
         noise = sorted(self._noises)[len(self._noises) // 4]
         self._band = max(_BAND_NOISE * noise, _BAND_STEPS * self._step)
 

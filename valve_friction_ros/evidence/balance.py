@@ -21,7 +21,10 @@ import scipy
 from numpy.typing import NDArray
 
 from valve_friction_ros.evidence.moves import Moves
-from valve_friction_ros.identification.trust.uncertainty import student_quantile
+from valve_friction_ros.identification.trust.uncertainty import (
+    MEDIAN_MAGNITUDE,
+    student_quantile,
+)
 
 BLOCK = 600.0
 """Least time, s, of moves whose errors are taken as correlated."""
@@ -260,7 +263,7 @@ def levels_of(moves: Moves) -> Levels:
     if count < 4 * _LEAST_OF_A_SIDE:
         return Levels(number, 0.0)
     left, friction = _without_spring(moves)
-    error = 1.4826 * float(np.median(np.abs(np.diff(left)))) / math.sqrt(2.0)
+    error = float(np.median(np.abs(np.diff(left)))) / (MEDIAN_MAGNITUDE * math.sqrt(2.0))
     sides = np.array([_medians(np.where(way == sign, left, np.nan)) for sign in (1.0, -1.0)])
     median, known = sides[:, 0], sides[:, 1]
     steps = 0.5 * (median[:, 1] - median[:, 0]).sum(axis=0)
@@ -298,7 +301,7 @@ def _without_spring(moves: Moves) -> tuple[NDArray[np.float64], float]:
         normal = (changes * weight[:, None]).T @ changes
         values = solution(normal, changes.T @ (weight * target))
         off = np.abs(target - changes @ values)
-        limit = _HUBER * max(1.4826 * float(np.median(off)), least)
+        limit = _HUBER * max(float(np.median(off)) / MEDIAN_MAGNITUDE, least)
         weight = np.minimum(1.0, limit / np.maximum(off, 1e-300))
     friction = values[0] + values[2] * float(np.mean(moves.speed))
     return moves.force - rows @ values, abs(float(friction))
@@ -388,7 +391,7 @@ def robust(
         weight = design.weight * factor / deviation**2
         values = design.normal(weight, precision).solved(design.right(weight * target))
         left = np.abs(target - design.forces(values)) * np.sqrt(design.weight)
-        deviation = max(1.4826 * float(np.median(left)), _QUIETEST * friction)
+        deviation = max(float(np.median(left)) / MEDIAN_MAGNITUDE, _QUIETEST * friction)
         factor = np.minimum(1.0, _HUBER * deviation / np.maximum(left, 1e-300))
     return values, design.weight * factor / deviation**2
 

@@ -43,6 +43,7 @@ from valve_friction_ros.evidence.balance import (
 from valve_friction_ros.evidence.moves import Move, Moves
 from valve_friction_ros.identification import TIMING_UNCERTAINTY, IdentificationSettings, Parameter
 from valve_friction_ros.identification.trust.calibration import calibrated, calibration_share
+from valve_friction_ros.identification.trust.uncertainty import MEDIAN_MAGNITUDE
 from valve_friction_ros.identification.trust.verdict import (
     WEAK_SHARE,
     Verdict,
@@ -236,7 +237,7 @@ class _Contrasts:
 def _between(friction: NDArray[np.float64]) -> float:
     """Return the standard deviation of one block, N, by the differences of successive ones."""
     steps = np.abs(np.diff(friction))
-    scatter = 1.4826 * float(np.median(steps)) / math.sqrt(2.0)
+    scatter = float(np.median(steps)) / (MEDIAN_MAGNITUDE * math.sqrt(2.0))
     return max(scatter, _SCATTER * float(np.median(friction)))
 
 

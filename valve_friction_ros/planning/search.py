@@ -15,7 +15,7 @@ people who play the test must know.
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -257,15 +257,26 @@ class _Search:
         limits: Limits,
         conditions: Conditions,
         settings: IdentificationSettings,
-        names: Sequence[str],
+        aim: str,
     ) -> None:
+        if aim not in AIMS:
+            raise ValueError(f"there is no aim {aim!r}: choose from {', '.join(AIMS)}")
         self.valve, self.frictions, self.limits = valve, frictions, limits
-        self.conditions, self.settings, self.names = conditions, settings, names
+        self.conditions, self.settings, self.names = conditions, settings, AIMS[aim]
         self.band = pressure_band(valve, frictions, limits)
         self.known: dict[tuple[Pattern, int], float] = {}
 
     def test(self, pattern: Pattern) -> StrokeTest | None:
         return stroke_test(pattern, self.band, self.limits.duration)
+
+    def forecasts(
+        self, test: StrokeTest, progress: Callable[[float], object]
+    ) -> Iterator[Forecast]:
+        """Forecast each friction, and report the last tenth of the work."""
+        count = len(self.frictions.draws)
+        for place in range(count):
+            yield self.forecast(test, place, is_final=True)
+            progress(0.9 + 0.1 * (place + 1) / count)
 
     def forecast(self, test: StrokeTest, place: int, is_final: bool = False) -> Forecast:
         draw = self.frictions.draws[place]
@@ -406,25 +417,18 @@ def plan_test(
     >>> 0.39 < low / valve.travel < high / valve.travel < 0.61
     True
     """
-    if aim not in AIMS:
-        raise ValueError(f"there is no aim {aim!r}: choose from {', '.join(AIMS)}")
     limits, conditions = limits or Limits(), conditions or Conditions()
     settings = settings or IdentificationSettings()
-    found = _Search(valve, frictions, limits, conditions, settings, AIMS[aim])
+    found = _Search(valve, frictions, limits, conditions, settings, aim)
     told = progress or _told_nobody
-    best = found.best(told)
-    test = found.test(best)
+    test = found.test(found.best(told))
     assert test is not None  # noqa: S101 - it was simulated
-    forecasts = []
-    for place in range(len(frictions.draws)):
-        forecasts.append(found.forecast(test, place, is_final=True))
-        told(0.9 + 0.1 * (place + 1) / len(frictions.draws))
     plan = StrokePlan(
         test,
         valve,
         found.band,
         frictions,
-        tuple(forecasts),
+        tuple(found.forecasts(test, told)),
         limits,
         conditions,
         aim,

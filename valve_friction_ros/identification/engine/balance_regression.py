@@ -35,7 +35,11 @@ from valve_friction_ros.identification.engine.sliding_averages import (
 )
 from valve_friction_ros.identification.engine.weights import inflation
 from valve_friction_ros.identification.trust.sliding import SPEED_EXPONENT
-from valve_friction_ros.identification.trust.uncertainty import CONFIDENCE, NORMAL_QUANTILE
+from valve_friction_ros.identification.trust.uncertainty import (
+    CONFIDENCE,
+    MEDIAN_MAGNITUDE,
+    NORMAL_QUANTILE,
+)
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.valve import Valve
 
@@ -143,7 +147,9 @@ class _Solved(NamedTuple):
     @property
     def misfit(self) -> float:
         """Deviation of the residual, N, by its median."""
-        return float(np.median(np.abs(self.residual[0] + self.residual[1]))) / 1.35
+        return float(np.median(np.abs(self.residual[0] + self.residual[1]))) / (
+            2.0 * MEDIAN_MAGNITUDE
+        )
 
 
 class Regression:
@@ -221,16 +227,7 @@ class Regression:
         self.precision = np.array([deviation**-2.0 for _, deviation in terms.values()])
         self.work, self.strokes, self.velocity = work, work.strokes, velocity
         place = 2.0 * (work.position - low) / range_ - 1.0
-        self.kept = {
-            name: float(work.along @ term)
-            for name, term in {
-                "spring_preload": np.ones_like(place),
-                "spring_constant": work.position,
-                "curvature": place**2 - 1.0 / 3.0,
-                "cubic": place**3 - 0.6 * place,
-                "drift": np.interp(work.time, averages.time, age),
-            }.items()
-        }
+        self.kept = _kept_by(work, place, np.interp(work.time, averages.time, age))
         self.sliding_speed = work.speed
         self.independent = max(taken.size / _OVERLAP, 1.0)
         self.slopes = [np.gradient(half, averages.time) for half in averages.force]
@@ -327,7 +324,7 @@ class Regression:
         for _ in range(4):
             solved = self.solve(lag, stribeck, 3.0 * variance, weight)
             total, misfit = np.abs(solved.residual[0] + solved.residual[1]), solved.misfit
-            usual = 1.35 * _OUTLIER * misfit + 1e-9 * self.friction
+            usual = 2.0 * MEDIAN_MAGNITUDE * _OUTLIER * misfit + 1e-9 * self.friction
             weight = (total <= usual).astype(np.float64)
             variance = max(misfit**2, 0.5 * self.noise_variance(solved), self.least_variance)
             lag = self.later(solved)
@@ -481,6 +478,18 @@ class Regression:
             np.array([float(np.mean(friction[part])) for part in parts]),
             np.array([float(np.std(friction[part])) / math.sqrt(part.size) for part in parts]),
         )
+
+
+def _kept_by(work: Work, place: _Array, age: _Array) -> dict[str, float]:
+    """Return the work per distance that each term of a force of unit size keeps, by its name."""
+    terms = {
+        "spring_preload": np.ones_like(place),
+        "spring_constant": work.position,
+        "curvature": place**2 - 1.0 / 3.0,
+        "cubic": place**3 - 0.6 * place,
+        "drift": age,
+    }
+    return {name: float(work.along @ term) for name, term in terms.items()}
 
 
 def _at(signal: "_Array | float", taken: NDArray[np.intp]) -> "_Array | float":

@@ -349,14 +349,10 @@ def _estimated(
         estimate = covariance @ (columns.T @ (rows * found.force) + precision * expected)
         left = np.abs(found.force - columns @ estimate)
     error = np.sqrt(np.diag(covariance))
-    line = (float(estimate[1]) / half, float(error[1]) / half)
-    known = {
-        "spring_constant": line,
-        "spring_preload": (
-            float(estimate[2]) - line[0] * middle,
-            math.hypot(float(error[2]), line[1] * middle),
-        ),
-    }
+    (slope, level), (of_slope, of_level) = estimate[1:3].tolist(), error[1:3].tolist()
+    slope, of_slope = slope / half, of_slope / half
+    of_zero = (float(level - slope * middle), math.hypot(of_level, of_slope * middle))
+    known = {"spring_constant": (float(slope), float(of_slope)), "spring_preload": of_zero}
     value = float(estimate[0])
     if not value > 0:
         return None, known

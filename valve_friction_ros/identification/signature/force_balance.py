@@ -10,14 +10,15 @@
 """Method "signature": the paper's model 2, from the force balances of a valve signature."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from valve_friction_ros.identification.model_to_simulate import identified_model
+from valve_friction_ros.identification.model_to_simulate import IdentifiedModel, identified_model
 from valve_friction_ros.identification.refusal import RefusalError
 from valve_friction_ros.identification.result import Result, StemComparison
 from valve_friction_ros.identification.settings import IdentificationSettings
-from valve_friction_ros.identification.signature.strokes import BreakawayPoint
+from valve_friction_ros.identification.signature.strokes import BreakawayPoint, SignatureStroke
 from valve_friction_ros.identification.signature.valve_signature import (
     TRIANGLE_NEEDED,
     ValveSignature,
@@ -55,7 +56,7 @@ from valve_friction_ros.identification.units import SLIDING, UNITS
 from valve_friction_ros.model.drive import Drive
 from valve_friction_ros.model.recording import Recording
 from valve_friction_ros.model.valve import Valve
-from valve_friction_ros.signals import measured
+from valve_friction_ros.signals import MeasuredRecord, measured
 from valve_friction_ros.wording import percentage
 
 METHOD = "signature"
@@ -135,42 +136,14 @@ def identify_signature(
     settings = settings or IdentificationSettings()
     if settings.fixed.get("spring_constant") == 0:
         raise RefusalError("the force balance needs a spring: use the method plant or bench")
-    record = measured(recording)
-    require_unbroken(record)
-    require_plausible_units(record, valve, settings)
-    require_enough_samples(record, settings.published_window)
-    require_motion(record)
-    require_travel(record, valve)
-    require_related_signals(record)
+    record = _measured(recording, valve, settings)
     signature = valve_signature(record, valve, settings.derivative_window)
-    ways = [[one for one in way if one.breakaway is not None] for way in signature.ways]
-    if min(map(len, ways)) < _FEWEST_EACH_WAY:
-        raise RefusalError(
-            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest each way; the record "
-            f"has {len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
-        )
-    found = jackknife(ways, lambda some: _figures(some, settings))
-    if found.values["static_friction"] <= 0:
-        raise RefusalError(
-            f"the breakaway points give a static friction of "
-            f"{found.values['static_friction']:.4g} N, and friction is above zero: check the "
-            "direction and the clocks of both signals"
-        )
+    ways = _from_rest(signature)
+    found = _balanced(ways, settings)
     parameters = _parameters(found, ways, settings)
     values = {name: one.value for name, one in parameters.items()}
     mass = settings.fixed.get("mass", settings.assumed_mass)
-    try:
-        identified = identified_model({**values, "mass": mass})
-    except ValueError as error:
-        raise RefusalError(
-            f"the force balances give an impossible model: {error}; check both signals"
-        ) from None
-    validation = validate(record, valve, identified.parameters)
-    if validation.fit < _LEAST_FIT:
-        raise RefusalError(
-            f"the model of the force balances does not reproduce the record (fit "
-            f"{100 * validation.fit:.0f} %): check fixed parameters, both signals and their clocks"
-        )
+    identified, validation = _validated(record, valve, {**values, "mass": mass})
     return Result(
         method=METHOD,
         recording=recording,
@@ -189,6 +162,62 @@ def identify_signature(
         stem=StemComparison(recording.sample_period, recording.position, validation.simulated),
         sliding_speed=sliding_speed(ways),
     )
+
+
+def _measured(
+    recording: Recording, valve: Valve, settings: IdentificationSettings
+) -> MeasuredRecord:
+    """Return the signals; raises RefusalError where they cannot be a valve signature."""
+    record = measured(recording)
+    require_unbroken(record)
+    require_plausible_units(record, valve, settings)
+    require_enough_samples(record, settings.published_window)
+    require_motion(record)
+    require_travel(record, valve)
+    require_related_signals(record)
+    return record
+
+
+def _validated(
+    record: MeasuredRecord, valve: Valve, values: Mapping[str, float]
+) -> tuple[IdentifiedModel, Validation]:
+    """Return the model and how it reproduces the record; raises RefusalError if it does not."""
+    try:
+        identified = identified_model(values)
+    except ValueError as error:
+        raise RefusalError(
+            f"the force balances give an impossible model: {error}; check both signals"
+        ) from None
+    validation = validate(record, valve, identified.parameters)
+    if validation.fit < _LEAST_FIT:
+        raise RefusalError(
+            f"the model of the force balances does not reproduce the record (fit "
+            f"{100 * validation.fit:.0f} %): check fixed parameters, both signals and their clocks"
+        )
+    return identified, validation
+
+
+def _from_rest(signature: ValveSignature) -> list[list[SignatureStroke]]:
+    """Return the strokes from rest, each way; raises RefusalError where they are too few."""
+    ways = [[one for one in way if one.breakaway is not None] for way in signature.ways]
+    if min(map(len, ways)) < _FEWEST_EACH_WAY:
+        raise RefusalError(
+            f"the force balance needs {_FEWEST_EACH_WAY} strokes from rest each way; the record "
+            f"has {len(ways[0])} up and {len(ways[1])} down: {TRIANGLE_NEEDED}"
+        )
+    return ways
+
+
+def _balanced(ways: Ways, settings: IdentificationSettings) -> Jackknife:
+    """Return what the force balances give; raises RefusalError for a friction below zero."""
+    found = jackknife(ways, lambda some: _figures(some, settings))
+    if found.values["static_friction"] <= 0:
+        raise RefusalError(
+            f"the breakaway points give a static friction of "
+            f"{found.values['static_friction']:.4g} N, and friction is above zero: check the "
+            "direction and the clocks of both signals"
+        )
+    return found
 
 
 def _evidence(signature: ValveSignature, driven_by: Drive) -> dict[str, object]:

@@ -293,16 +293,7 @@ def step_test(
     2
     """
     period = require_positive("sample_period", sample_period)
-    signal = np.asarray(input_signal, dtype=np.float64)
-    measured = np.asarray(position, dtype=np.float64)
-    if signal.ndim != 1 or signal.shape != measured.shape or signal.size == 0:
-        raise ValueError(
-            f"input and position must be rows of equal length, got shapes {signal.shape} and "
-            f"{measured.shape}"
-        )
-    for name, values in (("input", signal), ("position", measured)):
-        if not np.isfinite(values).all():
-            raise ValueError(f"the {name} is not finite at sample {np.argmin(np.isfinite(values))}")
+    signal, measured = _rows(input_signal, position)
     edges = [*(find_steps(signal) if starts is None else starts), signal.size]
     if len(edges) == 1:
         raise RefusalError(
@@ -322,6 +313,23 @@ def step_test(
         for hold, u, y in zip(holds[1:], pairwise(inputs), pairwise(outputs), strict=True)
     )
     return StepTest(steps, _dead_band(inputs, steps), _resolution(steps), least)
+
+
+def _rows(
+    input_signal: ArrayLike, position: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return both signals as rows of equal length; raises ValueError where they are none."""
+    signal = np.asarray(input_signal, dtype=np.float64)
+    measured = np.asarray(position, dtype=np.float64)
+    if signal.ndim != 1 or signal.shape != measured.shape or signal.size == 0:
+        raise ValueError(
+            f"input and position must be rows of equal length, got shapes {signal.shape} and "
+            f"{measured.shape}"
+        )
+    for name, values in (("input", signal), ("position", measured)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"the {name} is not finite at sample {np.argmin(np.isfinite(values))}")
+    return signal, measured
 
 
 def _smoothed(position: NDArray[np.float64], period: float) -> tuple[NDArray[np.float64], float]:
