@@ -49,7 +49,7 @@ _FAILED = 100.0
 times the noise."""
 
 _UNTRIED = "the search ended before it had tried other lags: bring a shorter record"
-_FURTHER, _BELOW_TOP = 0.35, 0.9
+_FURTHER, _BELOW_TOP = 0.35, 0.95
 """Half width over F_c of what it may fall further beyond the speeds of a slow record: of packings
 that slip, F_s is up to twice F_c, and half of all packings slip. And the share of its way that the
 stem goes more slowly than its top speed: a short peak tells no friction."""
@@ -222,7 +222,7 @@ def curve_verdicts(
 
 
 def _top_speed(fit: PosteriorFit) -> float:
-    """Return the speed above which the stem goes a tenth of its way, m/s."""
+    """Return the speed above which the stem goes a twentieth of its way, m/s."""
     speed = np.sort(fit.model.record.slow.speed)
     distance = np.cumsum(speed)
     return float(speed[np.searchsorted(distance, _BELOW_TOP * distance[-1])])
