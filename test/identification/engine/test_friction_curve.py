@@ -453,6 +453,27 @@ class TestCheckOfASimulation:
         assert not checked_by_curve({SLIDING: ours}, {SLIDING: theirs}, True)[SLIDING].has_rival
         assert checked_by_curve({SLIDING: ours}, {SLIDING: theirs}, False)[SLIDING].has_rival
 
+    @pytest.mark.parametrize(
+        ("viscous", "follows", "expected"),
+        [
+            (number(1000.0, 900.0), True, (100.0, 10.0)),
+            (number(1000.0, 9900.0), True, (190.0, 6.0)),
+            (number(1000.0, 900.0), False, (190.0, 6.0)),
+        ],
+        ids=["the signal is late", "unknown", "no such stem"],
+    )
+    def test_a_simulation_that_excludes_the_viscous_friction_knows_a_signal_late(
+        self, viscous, follows, expected
+    ):
+        """190 N where the stem is delayed, 100 N where the signal is; the simulation has 92 N."""
+        ours = {SLIDING: number(92.0, 107.0), "viscous_friction": viscous}
+        theirs = {
+            SLIDING: replace(number(190.0, 6.0), rival=100.0),
+            "viscous_friction": number(10_000.0, 500.0),
+        }
+        found = checked_by_curve(ours, theirs, follows)[SLIDING]
+        assert (found.value, found.half_width) == pytest.approx(expected)
+
     def test_an_impossible_friction_checks_nothing(self):
         ours = {SLIDING: number(100.0, 9.0)}
         impossible = {SLIDING: number(-5.0, 200.0)}

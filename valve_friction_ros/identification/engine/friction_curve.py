@@ -307,6 +307,8 @@ def checked_by_curve(
         ours, theirs = simulated.get(name), balanced.get(name)
         if ours is None or theirs is None or not (theirs.value > 0 or name == "spring_preload"):
             continue
+        if name == SLIDING and follows:
+            theirs = _as_late(theirs, ours, viscous, balanced.get("viscous_friction"))
         apart = abs(ours.value - theirs.value)
         agree = _agree(ours, theirs)
         if not follows:
@@ -317,6 +319,27 @@ def checked_by_curve(
         elif name != SLIDING:
             result[name] = replace(ours, half_width=math.hypot(ours.half_width, _PULL * apart))
     return result
+
+
+def _as_late(
+    theirs: Estimated,
+    ours: Estimated,
+    viscous: Estimated | None,
+    their_viscous: Estimated | None,
+) -> Estimated:
+    """Return the sliding friction of a force balance as that of a late signal, if it is.
+
+    A delay may be one of the stem by viscous friction, or one of a signal; the force balance holds
+    the friction of both (`Estimated.rival`). The simulation decides where its viscous friction
+    excludes the one of the balance.
+    """
+    if viscous is None or their_viscous is None or _agree(viscous, their_viscous):
+        return theirs
+    apart = abs(ours.value - theirs.rival)
+    if not (viscous.value < their_viscous.value and apart < abs(ours.value - theirs.value)):
+        return theirs
+    width = math.hypot(theirs.half_width, apart)
+    return replace(theirs, value=theirs.rival, half_width=width, rival=math.nan)
 
 
 def curve_evidence(curves: Sequence[FrictionCurve]) -> dict[str, list[float] | float]:
