@@ -474,6 +474,14 @@ class TestCheckOfASimulation:
         found = checked_by_curve(ours, theirs, follows)[SLIDING]
         assert (found.value, found.half_width) == pytest.approx(expected)
 
+    @pytest.mark.parametrize(("width", "expected"), [(99.0, 395.0), (101.0, 385.0)])
+    def test_a_simulation_that_knows_no_friction_knows_no_spring(self, width, expected):
+        ours = {SLIDING: number(100.0, width), "spring_constant": number(395.0, 3.0)}
+        theirs = {SLIDING: number(100.0, 90.0), "spring_constant": number(385.0, 25.0)}
+        found = checked_by_curve(ours, theirs, follows=True)["spring_constant"]
+        widths = {395.0: math.hypot(3.0, friction_curve._PULL * 10.0), 385.0: 25.0}
+        assert (found.value, found.half_width) == (expected, pytest.approx(widths[expected]))
+
     def test_an_impossible_friction_checks_nothing(self):
         ours = {SLIDING: number(100.0, 9.0)}
         impossible = {SLIDING: number(-5.0, 200.0)}

@@ -285,8 +285,10 @@ def checked_by_curve(
     each other, as reversals and rests tell it a lag from a viscous friction; a part of their
     difference then widens the intervals of spring and preload, and those of F_c and F_v where the
     simulation does not determine F_v. Where the stem does not follow, they come from the force
-    balance. What both divide between dry and viscous friction is uncertain by what they differ, and
-    F_c also by a `slip_force`, N, of which no one knows at which speed it is gone.
+    balance, and so do spring and preload where the simulation does not determine any friction: one
+    that has a lag for it has another spring, too. What both divide between dry and viscous friction
+    is uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at
+    which speed it is gone.
     """
     result = dict(simulated)
     viscous = simulated.get("viscous_friction")
@@ -303,6 +305,8 @@ def checked_by_curve(
             result[name] = replace(ours, half_width=math.hypot(ours.half_width, pull))
         else:
             result[name] = replace(theirs, half_width=width, rival=ours.rival)
+    slides = simulated.get(SLIDING)
+    is_blind = slides is not None and slides.half_width > abs(slides.value)
     for name in (SLIDING, "spring_constant", "spring_preload"):
         ours, theirs = simulated.get(name), balanced.get(name)
         if ours is None or theirs is None or not (theirs.value > 0 or name == "spring_preload"):
@@ -311,7 +315,7 @@ def checked_by_curve(
             theirs = _as_late(theirs, ours, viscous, balanced.get("viscous_friction"))
         apart = abs(ours.value - theirs.value)
         agree = _agree(ours, theirs)
-        if not follows:
+        if not follows or (is_blind and name != SLIDING):
             wider = theirs.half_width if agree else max(theirs.half_width, apart)
             result[name] = replace(theirs, half_width=wider)
         elif agree and theirs.half_width < ours.half_width:
