@@ -17,7 +17,7 @@ import math
 import string
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timezone
+from datetime import datetime, timezone, tzinfo
 from enum import Enum, auto
 from typing import Any
 
@@ -255,6 +255,16 @@ def percentage(share: float) -> str:
 def utc(stamp: float) -> datetime:
     """Return the date of a stamp, ns since 1970 (UTC)."""
     return datetime.fromtimestamp(stamp / 1e9, timezone.utc)
+
+
+def in_zone(moment: datetime, zone: str, form: str = "%Y-%m-%d %H:%M") -> str:
+    """Write a moment in a zone, an IANA name, or UTC for none: 2026-07-17 12:00 Europe/Berlin."""
+    there: tzinfo = timezone.utc
+    if zone:
+        from zoneinfo import ZoneInfo  # noqa: PLC0415 - the start of a node needs none
+
+        there = ZoneInfo(zone)
+    return f"{moment.astimezone(there):{form}} {zone or 'UTC'}"
 
 
 def utc_day(stamp: float) -> str:

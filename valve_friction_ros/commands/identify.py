@@ -13,10 +13,9 @@ import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
-from zoneinfo import ZoneInfo
 
 from valve_friction_ros.commands.arguments.fail_on import has_failed
 from valve_friction_ros.commands.arguments.identification import (
@@ -53,6 +52,7 @@ from valve_friction_ros.outside_text import printable
 from valve_friction_ros.records.recorded_valve import RecordedValve
 from valve_friction_ros.records.recordings import read_recordings
 from valve_friction_ros.records.stretch import Stretch
+from valve_friction_ros.wording import in_zone
 
 
 def as_json(
@@ -172,8 +172,8 @@ def _dated(path: Path, zone: str) -> str:
     """Return when a file was last changed, in words; empty where it has no such time."""
     if not path.is_file():
         return ""
-    changed = datetime.fromtimestamp(path.stat().st_mtime, ZoneInfo(zone or "UTC"))
-    return f"its file was last changed {changed:%Y-%m-%d %H:%M} {zone or 'UTC'}"
+    changed = datetime.fromtimestamp(path.stat().st_mtime, timezone.utc)
+    return f"its file was last changed {in_zone(changed, zone)}"
 
 
 def identification_files(options: argparse.Namespace, zone: str) -> IdentificationFiles:
@@ -271,10 +271,8 @@ def run(options: argparse.Namespace) -> int:
     settings = identification_settings(options, description)
     limits = survey_limits(options, description)
     method = method_named(method_name(options, description.settings))
-    baseline, files = (
-        baseline_from(options),
-        identification_files(options, reading.columns.time_zone),
-    )
+    baseline = baseline_from(options)
+    files = identification_files(options, reading.columns.time_zone)
     if options.baseline_recording is not None:
         whole = replace(reading, stretch=Stretch())
         healthy = read_one(options.baseline_recording, valve, whole)

@@ -26,7 +26,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 from urllib.parse import quote
-from zoneinfo import ZoneInfo
 
 from valve_friction_ros import __version__
 from valve_friction_ros.fleet.rows import (
@@ -42,7 +41,7 @@ from valve_friction_ros.fleet.rows import (
 from valve_friction_ros.outside_text import harmless
 from valve_friction_ros.page_template import page_environment
 from valve_friction_ros.records.whole_file import write_whole
-from valve_friction_ros.wording import number_and_width, percentage
+from valve_friction_ros.wording import in_zone, number_and_width, percentage
 
 _Row = Mapping[str, Cell]
 _KEPT = (*COLUMNS, PICTURE)
@@ -338,11 +337,7 @@ def _dead_band(row: _Row) -> _Number:
 
 def _began(text: str, zone: str) -> str:
     """Return when a record began, in words, in a zone."""
-    if not text:
-        return ""
-    time = datetime.fromisoformat(text.replace("Z", "+00:00"))
-    local = time.astimezone(ZoneInfo(zone) if zone else timezone.utc)
-    return f"{local:%Y-%m-%d %H:%M} {zone or 'UTC'}"
+    return in_zone(datetime.fromisoformat(text.replace("Z", "+00:00")), zone) if text else ""
 
 
 def _line(row: _Row, zone: str) -> _Line:
@@ -380,7 +375,7 @@ def page_text(rows: Iterable[_Row], name: str, zone: str = "") -> str:
             lines=lines,
             counts=Counter(line.status for line in lines),
             size=(WIDTH, HEIGHT),
-            made=_began(datetime.now(timezone.utc).isoformat(), zone),
+            made=in_zone(datetime.now(timezone.utc), zone),
             version=__version__,
         )
     )

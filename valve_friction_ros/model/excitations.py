@@ -13,12 +13,12 @@ Sources: section 4 and Table 1 ("model 1") for the valve and its Teflon packing,
 strongly tightened; the bias of 1.13 mm follows (16). The graphite set shows a slip jump.
 
 The excitations are those before the lag of the V/P converter. An excitation is a frozen
-description; `sample` evaluates it at any times, so that a node can
-publish it block by block and a script in one call. Levels are pressures in Pa.
+description; `sample` evaluates it at any times, so that a node can publish it block by block and a
+script in one call. Levels are pressures in Pa.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,13 +65,7 @@ HIGH_FRICTION = KarnoppParameters(
 )
 """Packing strongly tightened: Table 1, model 1."""
 
-GRAPHITE_VALVE = Valve(
-    diaphragm_area=BENCH_VALVE.diaphragm_area,
-    pressure_reference=0.0,
-    travel=BENCH_VALVE.travel,
-    pressure_minimum=BENCH_VALVE.pressure_minimum,
-    pressure_maximum=BENCH_VALVE.pressure_maximum,
-)
+GRAPHITE_VALVE = replace(BENCH_VALVE, pressure_reference=0.0)
 """The same body with a gauge pressure sensor, for the graphite packing."""
 
 GRAPHITE_PACKING = KarnoppParameters(
@@ -83,7 +77,6 @@ GRAPHITE_PACKING = KarnoppParameters(
     spring_preload=2571.0,
 )
 """Graphite packing: static above Coulomb friction, so the stem jumps as it breaks away."""
-
 
 ISA_STEP_SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 """Steps of the ISA test (section 5) as shares of the input range."""

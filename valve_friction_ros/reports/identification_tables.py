@@ -41,7 +41,7 @@ from valve_friction_ros.identification import (
 )
 from valve_friction_ros.reports.identified_record import IdentifiedRecord, began
 from valve_friction_ros.reports.page import Column, PageTable, Verbatim
-from valve_friction_ros.wording import percentage, with_width
+from valve_friction_ros.wording import in_zone, percentage, with_width
 
 _WORDS = {
     "mass": "moving mass m",
@@ -198,7 +198,7 @@ def record_table(record: IdentifiedRecord) -> PageTable:
     shown, position = recording.drive / drive.size, recording.position * 1e3
     rows: list[tuple[str, str]] = [("source", Verbatim(record.source))]
     if begin := began(record):
-        rows.append(("began", f"{begin:%Y-%m-%d %H:%M:%S} {record.zone or 'UTC'}"))
+        rows.append(("began", in_zone(begin, record.zone, "%Y-%m-%d %H:%M:%S")))
     rows += [
         ("duration", f"{recording.duration:.4g} s"),
         ("samples", f"{len(recording)}, sampled every {recording.sample_period * 1e3:.4g} ms"),

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from functools import cached_property
 from typing import NamedTuple
-from zoneinfo import ZoneInfo
 
 from valve_friction_ros.health import (
     Baseline,
@@ -43,7 +42,7 @@ from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.reports.page import Colour, Conclusion
 from valve_friction_ros.response import ResponseSummary
 from valve_friction_ros.usage import LimitState, ValveUsage
-from valve_friction_ros.wording import percentage, with_width
+from valve_friction_ros.wording import in_zone, percentage, with_width
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,18 +197,18 @@ def _why_unknown(record: IdentifiedRecord) -> str:
 
 
 def began(record: IdentifiedRecord) -> datetime | None:
-    """Return when a record began, in its zone; None where its time does not count from 1970."""
+    """Return when a record began; None where its time does not count from 1970."""
     start = record.recording.start_time
     if not _DATED[0] < start < _DATED[1]:
         return None
-    return datetime.fromtimestamp(start, ZoneInfo(record.zone) if record.zone else timezone.utc)
+    return datetime.fromtimestamp(start, timezone.utc)
 
 
 def date_line(record: IdentifiedRecord) -> str:
     """Return the date of the record in one sentence."""
     known, begin = "The record has no date", began(record)
     if begin is not None:
-        known = f"Recorded {begin:%Y-%m-%d %H:%M} {record.zone or 'UTC'}"
+        known = f"Recorded {in_zone(begin, record.zone)}"
     return "; ".join(filter(None, (known, record.dated))) + "."
 
 

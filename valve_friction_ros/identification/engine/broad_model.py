@@ -44,9 +44,9 @@ ABSENT = dict.fromkeys(IMPERFECTIONS, 0.0)
 _LARGEST_COARSENESS = 10.0
 """Of the imperfections but the timing, whose changes are wide already."""
 
-_STEPPED, _STEPPED_BY_CHORDS = 30, 90
-"""Time of a step with an event over that of one that takes a short cut; where friction falls with
-speed, chords follow it through such a step."""
+_CONSTANT, _FALLING = (1, 30), (4, 360)
+"""Times of a step that takes a short cut and of one with an event, over that of a short cut under
+constant friction; where friction falls with speed, chords follow it."""
 
 SWINGING = 2e-3
 _OVER_SWING = 1e-3
@@ -151,7 +151,8 @@ class BroadModel:
             np.empty_like(force),
             np.empty_like(force),
         )
-        return force.size + (_STEPPED_BY_CHORDS if at["stribeck_velocity"] else _STEPPED) * stepped
+        short_cut, event = _FALLING if at["stribeck_velocity"] else _CONSTANT
+        return short_cut * force.size + event * stepped
 
     def readings(self, at: Coordinates) -> NDArray[np.float64]:
         """Return what the stem's sensor would read, m, a value a cell, by each half: (2, c)."""

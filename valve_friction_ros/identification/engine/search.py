@@ -152,9 +152,8 @@ them: a second of a processor or so, and a third of one.
 
 A count and not a time, so that the answer does not depend on the machine."""
 
-_OF_TANGENT, _OF_FALLING = 5, 4
-"""Simulations that take as long as one that carries all derivatives along; steps of a stem that
-slides under constant friction that take as long as one under friction that falls with speed."""
+_OF_TANGENT = 5
+"""Simulations that take as long as one that carries all derivatives along."""
 
 _COARSENESS = 100.0
 """Of the derivatives until a fit is near its end."""
@@ -259,8 +258,6 @@ class _Search:
         start, model = {**start, **self.known}, model or self.model
         derivatives = len(names) if model.coarseness > 1.0 else _OF_TANGENT
         a_step = 2 * derivatives * model.effort(start)
-        if start["stribeck_velocity"] > 0:
-            a_step *= _OF_FALLING
         allowed = (self.most_work - self.work) // a_step
         found = fit(
             model,

@@ -202,9 +202,8 @@ class Averages(NamedTuple):
     """What the regression takes of a record at one averaging time; two halves where there are two.
 
     `taken` are the indices of the averages of a stem that surely slides; `is_free` says where it is
-    away from the stops and from both ends of the record. `path` is that of the stem itself there,
-    and `calm_speed`, m/s, the mean one over the distance where noise lasts, by averages so long
-    that it makes none; nan elsewhere, as they may lose fast moves.
+    away from the stops and from both ends of the record. `path` is that of the averages there, and
+    `finest` that of averages as short as noise allows.
     """
 
     time: _Array
@@ -218,12 +217,30 @@ class Averages(NamedTuple):
     noise: Mapping[str, float]
     is_sure: bool
     path: _Path
-    calm_speed: float
+    finest: _Path
 
     @property
     def mean_velocity(self) -> _Array:
         """Mean of both halves, m/s."""
         return 0.5 * (self.velocity[0] + self.velocity[1])
+
+    def distance_with_work(self, noise: float) -> tuple[_Path, float]:
+        """Return the path that the work confirms, and the mean speed over it where noise lasts.
+
+        That speed, m/s, is by averages so long that noise makes none; nan elsewhere, as they may
+        lose fast moves. `noise`, m, is that of the stem.
+        """
+        length, free = _SLOWER * self.length, self.is_free
+        calm = [averaged_twice(half[free], length) for half in self.position]
+        slower = _path(calm, averaged_twice(self.force[0][free], length), noise)
+        whole = max(self.path, self.finest)
+        if not slower.distance > _KEPT * self.finest.distance:
+            return whole.beside(self.path), math.nan
+        path = whole.beside(slower)
+        if not path.distance < (1.0 - _LASTS) * whole.distance:
+            return path, math.nan
+        squares = float(np.gradient(calm[0]) @ np.gradient(calm[1]))
+        return path, squares / (float(self.time[1] - self.time[0]) * slower.distance)
 
 
 def averages_of(
@@ -271,14 +288,6 @@ def averages_of(
     finer = _finest_path(force, stem, time, free, averaging_time)
     if path.distance < _COVERED * finer.distance:
         return None
-    calm = [averaged_twice(half[free], _SLOWER * length) for half in position]
-    slower = _path(calm, averaged_twice(averaged[0][free], _SLOWER * length), stem.noise)
-    is_calm = slower.distance > _KEPT * finer.distance
-    whole = max(path, finer)
-    path = whole.beside(slower if is_calm else path)
-    noise_lasts = is_calm and path.distance < (1.0 - _LASTS) * whole.distance
-    squares = float(np.gradient(calm[0]) @ np.gradient(calm[1]))
-    calm_speed = squares / (step * slower.distance) if noise_lasts else math.nan
     return Averages(
         time,
         averaged,
@@ -291,7 +300,7 @@ def averages_of(
         noise,
         margin >= SURE_MARGIN,
         path,
-        calm_speed,
+        finer,
     )
 
 
@@ -384,12 +393,11 @@ class Work(NamedTuple):
         time = np.arange(averages.time[0], averages.time[-1], step)
         after = np.minimum(np.searchsorted(averages.time, time), averages.time.size - 1)
         is_free = averages.is_free[after]
-        path = averages.path
+        path, speed = averages.distance_with_work(stem.noise)
         longest = averages.length * float(averages.time[1] - averages.time[0]) / step
         length = 2 * max(round(max(force.period, stem.period) / step), 1)
 
         whole = [np.interp(time, one.time, one.value) for one in (force, stem)]
-        speed = averages.calm_speed
         if math.isnan(speed):
             speed = _squares(stem, time, is_free, longest) / (step * path.distance)
 

@@ -121,13 +121,14 @@ def fit_verdicts(
             "the Karnopp model does not describe this valve: "
             f"{misfit.systematic * 1e6:.3g} µm of misfit are not noise"
         )
-    slow, split = _slow_doubt(fit), _split_doubt(fits, misfit, profile)
+    top = _top_speed(fit)
+    slow, split = _slow_doubt(top), _split_doubt(fits, misfit, profile)
     unseen = _unseen(fit, numbers, settings, split)
     verdicts = {}
     for name, one in numbers.items():
         width = one.half_width
         if slow and name == "coulomb_friction":
-            width = math.hypot(width, _FURTHER * _slowness(fit) * abs(one.value))
+            width = math.hypot(width, _FURTHER * (1.0 - top / FALL_SPEED) * abs(one.value))
         reason = doubt or (slow if name in _BY_SPEED else "")
         if split:
             reason = "" if name in _OF_THE_BALANCE else reason or split
@@ -228,14 +229,9 @@ def _top_speed(fit: PosteriorFit) -> float:
     return float(speed[np.searchsorted(distance, _BELOW_TOP * distance[-1])])
 
 
-def _slowness(fit: PosteriorFit) -> float:
-    """Return by which share the top speed misses the one at which no friction falls more."""
-    return max(1.0 - _top_speed(fit) / FALL_SPEED, 0.0)
-
-
-def _slow_doubt(fit: PosteriorFit) -> str:
+def _slow_doubt(top: float) -> str:
     """Return that the record is too slow to separate F_c from friction at low speed, or nothing."""
-    if (top := _top_speed(fit)) >= FALL_SPEED:
+    if top >= FALL_SPEED:
         return ""
     return (
         f"holds up to {top * 1e3:.2g} mm/s, as little of the way is faster: "
