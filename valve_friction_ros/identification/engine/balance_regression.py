@@ -9,6 +9,7 @@
 
 """The force balance of the sliding stem: regressed, with all that the lag leaves open."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -64,8 +65,20 @@ _STRIBECK_OPEN = 1.08
 """Stribeck speeds over twice the mean speed; by how much one must lower the residual to be taken;
 and up to which residual others stay open."""
 
+_OF_NO_LAW = (SLIDING, "spring_constant", "spring_preload", "mass")
+"""Numbers that no law of friction over speed takes part in."""
+
 _CONSERVATIVE = ("spring_constant", "spring_preload", "curvature", "cubic", "drift", "mass")
 """Terms of the force that are not friction."""
+
+_RARE = ("along_travel", "in_record", "viscous_asymmetry", "curvature", "cubic", "drift")
+_HOW_RARE, _ABSENT = 0.25, 0.1
+_LEAST_PROBABLE = 1e-2
+"""Imperfections that most plants do not have: the share of plants that have each; the deviation of
+its prior in the others over that in these; and the least probability of a choice of them that is
+kept, over the likeliest. Two that make up for each other are then less probable than none.
+
+Chosen: most plants have one or two of the six."""
 
 _OUTLIER = 5.0
 _LEAST_MISFIT, _LEAST_WITHOUT_SPRING = 5e-3, 3e-4
@@ -79,6 +92,9 @@ common; averages that tell as much as one that does not overlap with others; a s
 
 _BINS = 12
 """Bins of the friction curve in each direction."""
+
+_NEGLIGIBLE, _HALVINGS = 1e-6, 24
+"""Probability of a lag that no interval notices; halvings by which an interval is found."""
 
 _BLOCKS = (6, 60)
 _LARGEST_SCATTER = 25.0
@@ -143,6 +159,8 @@ class _Solved(NamedTuple):
     precision: _Array
     expected: _Array
     scale: _Array
+    information: _Array
+    right: _Array
 
     @property
     def misfit(self) -> float:
@@ -150,6 +168,21 @@ class _Solved(NamedTuple):
         return float(np.median(np.abs(self.residual[0] + self.residual[1]))) / (
             2.0 * MEDIAN_MAGNITUDE
         )
+
+
+class _Choice(NamedTuple):
+    """Probability of a choice of imperfections, and the solution with these alone."""
+
+    probability: float
+    estimate: _Array
+    covariance: _Array
+
+
+def _inverse(information: _Array) -> _Array:
+    """Invert the information about coefficients of very different sizes, of one or more fits."""
+    unit = 1.0 / np.sqrt(np.diagonal(information, axis1=-2, axis2=-1))
+    units = unit[..., :, None] * unit[..., None, :]
+    return np.asarray(np.linalg.pinv(information * units, rcond=1e-13, hermitian=True) * units)
 
 
 class Regression:
@@ -278,15 +311,22 @@ class Regression:
         own = 0.5 * (even.T @ (even * weight[:, None]) + odd.T @ (odd * weight[:, None]))
         right = 0.5 * (even.T @ (weight * forces[1]) + odd.T @ (weight * forces[0]))
         shared, right = _shared(own, 0.5 * (cross + cross.T), right, self.independent)
-        information = shared / variance + np.diag(precision)
-        unit = 1.0 / np.sqrt(np.diag(information))
-        covariance = np.linalg.pinv(
-            information * np.outer(unit, unit), rcond=1e-13, hermitian=True
-        ) * np.outer(unit, unit)
-        estimate = covariance @ (right / variance + precision * expected)
+        information, right = shared / variance, right / variance
+        covariance = _inverse(information + np.diag(precision))
+        estimate = covariance @ (right + precision * expected)
         residual = [force - one @ estimate for force, one in zip(forces, columns, strict=True)]
         return _Solved(
-            lag, estimate, covariance, residual, weight, columns, precision, expected, scale
+            lag,
+            estimate,
+            covariance,
+            residual,
+            weight,
+            columns,
+            precision,
+            expected,
+            scale,
+            information,
+            right,
         )
 
     @property
@@ -368,6 +408,28 @@ class Regression:
             )
             solved = self.solve(self.later(solved), stribeck, variance * inflated, solved.weight)
         return Posterior(self, solved, variance * inflated, inflated, stribeck, near)
+
+    def choices(self, solved: _Solved) -> list[_Choice]:
+        """Return the solution for each probable choice of the imperfections that the plant has.
+
+        Those of `_RARE` that it does not have keep a prior so narrow that they hardly matter.
+        """
+        rare = [index for index, name in enumerate(self.names) if name in _RARE]
+        chosen = np.array(list(itertools.product((0.0, 1.0), repeat=len(rare))))
+        precision = np.tile(solved.precision, (len(chosen), 1))
+        precision[:, rare] *= np.where(chosen > 0.0, 1.0, _ABSENT**-2.0)
+        whole = solved.information + np.eye(precision.shape[1]) * precision[:, None, :]
+        covariance = _inverse(whole)
+        drawn = solved.right + precision * solved.expected
+        estimate = np.einsum("sij,sj->si", covariance, drawn)
+        log_evidence = np.sum(drawn * estimate, axis=1) - np.linalg.slogdet(whole)[1]
+        log_evidence += np.sum(np.log(precision[:, rare]), axis=1)
+        log_odds = math.log(_HOW_RARE / (1.0 - _HOW_RARE)) * np.sum(chosen, axis=1)
+        log = 0.5 * log_evidence + log_odds
+        probability = np.exp(log - np.max(log))
+        kept = np.flatnonzero(probability > _LEAST_PROBABLE)
+        probability /= np.sum(probability[kept])
+        return [_Choice(float(probability[at]), estimate[at], covariance[at]) for at in kept]
 
     def definition(self, name: str, solved: _Solved) -> float:
         """Deviation of a number by what it means where it is not one, as in `reported_numbers`.
@@ -546,9 +608,10 @@ class Posterior:
                 for block in blocks
             ]
         )
-        self.scatter = (
-            covariance @ (scores.T @ scores) @ covariance * len(blocks) / (len(blocks) - 1)
-        )
+        self.scores = (scores.T @ scores) * len(blocks) / (len(blocks) - 1)
+        self.scatter = covariance @ self.scores @ covariance
+        self.all = [_Choice(1.0, solved.estimate, covariance)]
+        self.choices = regression.choices(solved)
         velocity = regression.averages.mean_velocity[regression.averages.taken]
         left = velocity * (solved.residual[0] + solved.residual[1]) / 2.0
         of_blocks = np.array([np.sum(left[block]) for block in blocks]) / np.sum(np.abs(velocity))
@@ -578,7 +641,7 @@ class Posterior:
         for name in ("coulomb_friction", "viscous_friction"):
             if name in self.regression.names:
                 gradient = np.eye(solved.scale.size)[self.regression.names.index(name)]
-                centre, slope, width = self._given_lag(gradient)
+                centre, slope, width = self._given_lag(gradient, self.all[0])
                 value = centre + slope * (self.changes - solved.estimate[index])
                 log = log + np.log(np.maximum(_normal(value / width), 1e-10))
                 if name == "viscous_friction":
@@ -616,53 +679,67 @@ class Posterior:
         self.exchanged = 1.0 / (1.0 + math.exp(min(float(both[0] - both[1]), 700.0)))
         self.less_viscous = viscous - spring * max(lag, 0.0)
 
-    def _given_lag(self, gradient: _Array) -> tuple[float, float, float]:
+    def _given_lag(self, gradient: _Array, choice: _Choice) -> tuple[float, float, float]:
         """Return a number, its slope over the lag's coefficient, and its deviation at that lag."""
-        solved, index = self.solved, len(self.regression.names)
-        value = float(gradient @ solved.estimate)
-        variance = float(gradient @ solved.covariance @ gradient)
-        widened = float(gradient @ self.scatter @ gradient) / max(variance, np.finfo(float).tiny)
+        index, along = len(self.regression.names), choice.covariance @ gradient
+        value, variance = float(gradient @ choice.estimate), float(gradient @ along)
+        widened = float(along @ self.scores @ along) / max(variance, np.finfo(float).tiny)
         factor = float(np.clip(widened, 1.0, _LARGEST_SCATTER))
         if self.regression.lag.is_known:
             return value, 0.0, math.sqrt(max(factor * variance, np.finfo(float).tiny))
-        own = float(solved.covariance[index, index])
-        slope = float(gradient @ solved.covariance[:, index]) / own
+        own = float(choice.covariance[index, index])
+        slope = float(along[index]) / own
         rest = max(variance - slope**2 * own, 1e-9 * variance)
         return value, slope, math.sqrt(max(factor * rest, np.finfo(float).tiny))
 
     def number(self, name: str, gradient: _Array, spread: float) -> Estimated:
-        """Return a number with its interval; `spread` is what no lag makes, but noise."""
+        """Return a number with its interval; `spread` is what no lag makes, but noise.
+
+        The law of friction over speed is never quite that of the model, and rare imperfections make
+        up for the rest: dry and viscous friction leave all of them open.
+        """
         rounding = self.regression.rounding(name)
-        centre, slope, width = self._given_lag(gradient)
         beside = self.regression.beside(name, self.lags)
-        values, weights = centre + beside, self.of_record if name == SLIDING else self.probability
-        record, rival = math.hypot(width, math.hypot(spread, rounding)), math.nan
-        if self.lags.size > 1:
-            index = len(self.regression.names)
-            values = values + slope * (self.changes - self.solved.estimate[index])
+        over_lags = self.of_record if name == SLIDING else self.probability
+        choices = self.choices if name in _OF_NO_LAW else self.all
+        weights = np.outer([one.probability for one in choices], over_lags)
+        values, record = np.empty_like(weights), np.empty_like(weights)
+        for row, choice in enumerate(choices):
+            centre, slope, width = self._given_lag(gradient, choice)
+            values[row] = centre + beside
+            if self.lags.size > 1:
+                later = self.changes - choice.estimate[len(self.regression.names)]
+                values[row] += slope * later
+            record[row] = math.hypot(width, spread, rounding)
+        rival = math.nan
         if self.exchanged > 0:
             viscous = self.regression.names.index("viscous_friction")
             less = gradient[viscous] * self.solved.scale[viscous] * self.less_viscous
             later = self.less_viscous / self.regression.values(self.solved)["spring_constant"]
             changed = np.interp(self.lags + later, self.lags, beside) - beside
             if later < LARGEST_LAG:
-                rival = float(weights @ (values - less + changed))
-            values = np.concatenate([values, values - less + changed])
-            weights = np.concatenate([(1.0 - self.exchanged) * weights, self.exchanged * weights])
-        mean = float(weights @ values)
-        timing = math.sqrt(float(weights @ (values - mean) ** 2))
-        low, high = 0.0, 20.0 * math.hypot(record, timing)
-        for _ in range(30):
+                rival = float(np.sum(weights * (values - less + changed)))
+            values = np.hstack([values, values - less + changed])
+            weights = np.hstack([(1.0 - self.exchanged) * weights, self.exchanged * weights])
+            record = np.hstack([record, record])
+        mean = float(np.sum(weights * values))
+        shares = np.sum(weights, axis=1)
+        means = np.sum(weights * values, axis=1) / shares
+        timing = math.sqrt(float(np.sum(weights * (values - means[:, None]) ** 2)))
+        open_ = float(np.sum(weights * record**2) + shares @ (means - mean) ** 2)
+        low, high = 0.0, 20.0 * math.sqrt(open_ + timing**2)
+        some = weights > _NEGLIGIBLE
+        weight, away, deviation = weights[some], mean - values[some], record[some]
+        for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            inside = _normal((mean + middle - values) / record)
-            inside = inside - _normal((mean - middle - values) / record)
-            low, high = (middle, high) if weights @ inside < CONFIDENCE else (low, middle)
+            inside = _normal((away + middle) / deviation) - _normal((away - middle) / deviation)
+            low, high = (middle, high) if weight @ inside < CONFIDENCE else (low, middle)
         # The tails of the lag are heavier than normal ones: its share is that of the interval.
         whole = high / NORMAL_QUANTILE
-        timing = min(timing, math.sqrt(max(whole**2 - record**2, 0.0)))
+        timing = min(timing, math.sqrt(max(whole**2 - open_, 0.0)))
         sources = {ROUNDING: rounding} if rounding > 0.0 else {}
         return Estimated(
-            mean, high, Budget(record, timing, sources, timing * self._unsaid()), rival
+            mean, high, Budget(math.sqrt(open_), timing, sources, timing * self._unsaid()), rival
         )
 
     def _unsaid(self) -> float:
