@@ -36,13 +36,12 @@ from valve_friction_ros.identification.engine.balance_regression import (
 )
 from valve_friction_ros.identification.engine.intervals import Estimated
 from valve_friction_ros.identification.engine.sliding_averages import (
-    CLOSE,
     LARGEST_LAG,
-    SURE_MARGIN,
     Work,
     averages_of,
     force_and_stem,
 )
+from valve_friction_ros.identification.engine.stroke_forces import StrokeForces, stroke_forces
 from valve_friction_ros.identification.trust.uncertainty import Correlation, correlation_of
 from valve_friction_ros.identification.units import SLIDING
 from valve_friction_ros.model.recording import StampedRecord
@@ -111,8 +110,6 @@ class FrictionCurve:
         Most probable time by which the stem is seen late, s.
     inflation : float
         Of the residual over what noise explains.
-    is_sure : bool
-        Whether each average is of a stem that surely slides all the time.
     fit, misfit : float
         Share of the force that the balance reproduces, and deviation of what it leaves, N.
     correlation : Correlation or None
@@ -128,7 +125,6 @@ class FrictionCurve:
     stribeck_velocity: float
     lag: float
     inflation: float
-    is_sure: bool
     fit: float
     misfit: float
     correlation: Correlation | None = field(default=None, repr=False)
@@ -156,7 +152,8 @@ def friction_curves(
     Returns
     -------
     list of FrictionCurve
-        The shortest averaging time first; empty where the stem nowhere surely slides both ways.
+        The shortest averaging time first. Where the stem nowhere surely slides both ways, that of
+        whole strokes alone, with the sliding friction (`stroke_forces`); empty with too few.
     """
     lag, fixed = lag or LagPrior(), fixed or {}
     force, stem = force_and_stem(record, valve)
@@ -164,17 +161,17 @@ def friction_curves(
     longer = [time for time in _AVERAGING_TIMES if time >= least] or [least, 2.0 * least]
     shorter = [time for time in _SHORT_AVERAGING_TIMES if time >= least]
     found: list[Posterior] = []
-    attempts = [(SURE_MARGIN, longer, _MOST_CURVES), (SURE_MARGIN, shorter, 1)]
-    attempts.append((CLOSE, [*reversed(shorter), *longer], 2))
-    for margin, times, most in attempts:
+    for times, most in ((longer, _MOST_CURVES), (shorter, 1)):
         for time in times:
-            if len(found) < most:
-                averages = averages_of(force, stem, valve, time, margin)
-                if averages is not None:
-                    work = found[0].regression.work if found else Work.of(force, stem, averages)
-                    found.append(Regression(averages, work, valve, lag, fixed).posterior())
+            averages = averages_of(force, stem, valve, time) if len(found) < most else None
+            if averages is not None:
+                work = found[0].regression.work if found else Work.of(force, stem, averages)
+                found.append(Regression(averages, work, valve, lag, fixed).posterior())
         if found:
             break
+    else:
+        strokes = stroke_forces(force, stem, valve, lag)
+        return [] if strokes is None else [_curve_of_strokes(strokes)]
     # A lag at the end of what is possible makes up for something else.
     found = [one for one in found if abs(one.regression.later(one.solved)) < LARGEST_LAG]
     likelihoods = [one.log_likelihood for one in found if one.log_likelihood is not None]
@@ -212,10 +209,26 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
         posterior.stribeck,
         regression.later(solved),
         posterior.inflation,
-        averages.is_sure,
         1.0 - solved.misfit / max(float(np.std(averages.force[0][averages.taken])), _TINY),
         solved.misfit,
         correlation_of(gradients, solved.covariance),
+    )
+
+
+def _curve_of_strokes(strokes: StrokeForces) -> FrictionCurve:
+    """Say what whole strokes tell: no law of friction."""
+    return FrictionCurve(
+        strokes.averaging_time,
+        strokes.speed,
+        strokes.friction,
+        np.full_like(strokes.speed, strokes.scatter),
+        {SLIDING: strokes.sliding},
+        strokes.mean_speed,
+        stribeck_velocity=0.0,
+        lag=0.0,
+        inflation=1.0,
+        fit=1.0 - strokes.scatter / max(strokes.deviation, _TINY),
+        misfit=strokes.scatter,
     )
 
 
@@ -241,27 +254,22 @@ def curve_numbers(curves: Sequence[FrictionCurve]) -> dict[str, Estimated]:
     """Return each number from the shortest averaging time that knows it as well as any.
 
     The interval holds the scatter of those averaging times that know it nearly as well, and at
-    least `_LEAST_HALF_WIDTH`; where no stem surely slides, also what any of them contradicts it by.
+    least `_LEAST_HALF_WIDTH`.
     """
     result: dict[str, Estimated] = {}
     has_spring = any("spring_constant" in curve.numbers for curve in curves)
     least = _LEAST_HALF_WIDTH if has_spring else _LEAST_OF_MACHINE
-    if len(curves) < _CONFIRMED or not curves[0].is_sure:
+    if len(curves) < _CONFIRMED:
         least = _LEAST_ALONE
-    sure = [curve for curve in curves if curve.is_sure]
-    for name in {SLIDING, *(name for curve in sure for name in curve.numbers)}:
-        known = [curve.numbers[name] for curve in sure or curves if name in curve.numbers]
-        if not known:
-            continue
+    for name in {name for curve in curves for name in curve.numbers}:
+        known = [curve.numbers[name] for curve in curves if name in curve.numbers]
         least_width = min(one.half_width for one in known)
         best = next(one for one in known if one.half_width <= _AS_WELL * least_width)
         near = [one.value for one in known if one.half_width < _NEARLY * best.half_width]
-        apart = [abs(one.value - best.value) for one in known if not (sure or _agree(one, best))]
         half_width = math.hypot(
             best.half_width,
             _SCATTERS * float(np.std(near)),
             least * best.value,
-            max(apart, default=0.0),
         )
         result[name] = replace(best, half_width=half_width)
     return result

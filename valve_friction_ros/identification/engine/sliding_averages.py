@@ -10,7 +10,7 @@
 """Force and stem of a record averaged alike, and the work of the force over the distance."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,10 +39,9 @@ _OF_STOPS = 3e-3
 _FEW_PAUSES, _PAUSE = 0.05, 3.0
 """A signal is sent on change if more than that share of its pauses are so many times the usual."""
 
-SURE_MARGIN, CLOSE = 2.0, 0.5
-"""Distance of an average from a rest or a reversal, in its own lengths: that at which it surely is
-of a sliding stem, and that at which it is taken where there is no other, for the sliding friction
-alone."""
+_MARGIN = 2.0
+"""Distance of an average from a rest or a reversal, in its own lengths, at which it surely is of a
+sliding stem."""
 
 _TINY = float(np.finfo(float).tiny)
 LARGEST_LAG = 0.15
@@ -68,7 +67,7 @@ _END_NOISE = 3e-3
 Noise that lasts is alike in both halves of the samples, and lengthens each stroke by some
 deviations."""
 
-_FINEST_STEP, _SHARED = 4e-3, 4
+FINEST_STEP, _SHARED = 4e-3, 4
 """Time, s, over which the stem is averaged at least for that; and samples that share what they
 average."""
 
@@ -96,7 +95,7 @@ def averaged_twice(signal: _Array, length: int) -> _Array:
     return signal
 
 
-def _turns(seen: _Array, least: float) -> NDArray[np.intp]:
+def turns_of(seen: _Array, least: float) -> NDArray[np.intp]:
     """Return the places where a stem ends strokes of at least that length, m, first and last too.
 
     One that nowhere moves so far has a single stroke.
@@ -175,7 +174,7 @@ def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal,
     )
 
 
-class _Path(NamedTuple):
+class Path(NamedTuple):
     """Distance of all strokes, m, its deviation, their number, and the work of friction, J."""
 
     distance: float
@@ -183,7 +182,7 @@ class _Path(NamedTuple):
     strokes: int
     work: float
 
-    def beside(self, slower: "_Path") -> "_Path":
+    def beside(self, slower: "Path") -> "Path":
         """Return the distance that the work confirms; `slower` is averaged over a longer time.
 
         Noise that such averages share lengthens every stroke at its ends, and the force does no
@@ -215,16 +214,15 @@ class Averages(NamedTuple):
     taken: NDArray[np.intp]
     speed: float
     noise: Mapping[str, float]
-    is_sure: bool
-    path: _Path
-    finest: _Path
+    path: Path
+    finest: Path
 
     @property
     def mean_velocity(self) -> _Array:
         """Mean of both halves, m/s."""
         return 0.5 * (self.velocity[0] + self.velocity[1])
 
-    def distance_with_work(self, noise: float) -> tuple[_Path, float]:
+    def distance_with_work(self, noise: float) -> tuple[Path, float]:
         """Return the path that the work confirms, and the mean speed over it where noise lasts.
 
         That speed, m/s, is by averages so long that noise makes none; nan elsewhere, as they may
@@ -232,7 +230,7 @@ class Averages(NamedTuple):
         """
         length, free = _SLOWER * self.length, self.is_free
         calm = [averaged_twice(half[free], length) for half in self.position]
-        slower = _path(calm, averaged_twice(self.force[0][free], length), noise)
+        slower = path_of(calm, averaged_twice(self.force[0][free], length), noise)
         whole = max(self.path, self.finest)
         if not slower.distance > _KEPT * self.finest.distance:
             return whole.beside(self.path), math.nan
@@ -244,12 +242,9 @@ class Averages(NamedTuple):
 
 
 def averages_of(
-    force: MeasuredSignal, stem: MeasuredSignal, valve: Valve, averaging_time: float, margin: float
+    force: MeasuredSignal, stem: MeasuredSignal, valve: Valve, averaging_time: float
 ) -> Averages | None:
-    """Average a record; None where it leaves too little of a stem that surely slides.
-
-    `margin` is how far from a stop, a rest or a reversal an average must be, in its own lengths.
-    """
+    """Average a record; None where it leaves too little of a stem that surely slides."""
     begin, end = max(force.time[0], stem.time[0]), min(force.time[-1], stem.time[-1])
     step = max(min(force.period, stem.period), averaging_time / 24.0)
     time = np.arange(begin, end, step)
@@ -269,7 +264,7 @@ def averages_of(
         "velocity": stem.noise * math.sqrt(2.0 / per_average[1]) / averaging_time,
     }
     side = np.sign(mean) * (size > max(_SLIDES * speed, _SURELY * noise["velocity"]))
-    reach = int(margin * length)
+    reach = int(_MARGIN * length)
     slides = _all_around(side > 0, reach) | _all_around(side < 0, reach)
     free = away_from_stops(0.5 * (position[0] + position[1]), valve)
     free[:lost] = free[-lost:] = False
@@ -284,7 +279,7 @@ def averages_of(
     ):
         return None
     averaged = [averaged_twice(half, length) for half in force.halves(time)]
-    path = _path([half[free] for half in position], averaged[0][free], stem.noise)
+    path = path_of([half[free] for half in position], averaged[0][free], stem.noise)
     finer = _finest_path(force, stem, time, free, averaging_time)
     if path.distance < _COVERED * finer.distance:
         return None
@@ -298,7 +293,6 @@ def averages_of(
         taken,
         speed,
         noise,
-        margin >= SURE_MARGIN,
         path,
         finer,
     )
@@ -310,35 +304,56 @@ def _finest_path(
     time: _Array,
     free: NDArray[np.bool_],
     longest: float,
-) -> _Path:
+) -> Path:
     """Return the distance where the stem is free, averaged until the ends of strokes are sure.
 
     That is over the time `longest`, s, at most.
     """
-    period = max(stem.period, _FINEST_STEP)
+
+    def is_free(grid: _Array) -> NDArray[np.bool_]:
+        return np.asarray(free[np.minimum(np.searchsorted(time, grid), time.size - 1)])
+
+    grid, halves = quiet_grid(stem, (float(time[0]), float(time[-1])), longest, is_free)
+    where = is_free(grid)
+    return path_of([half[where] for half in halves], force.halves(grid)[0][where], stem.noise)
+
+
+def quiet_grid(
+    stem: MeasuredSignal,
+    between: tuple[float, float],
+    longest: float,
+    is_free: Callable[[_Array], NDArray[np.bool_]] | None = None,
+) -> tuple[_Array, list[_Array]]:
+    """Return the finest grid on which the noise of the stem leaves the ends of strokes sure.
+
+    Beside it even and odd samples of the stem, m, averaged from one point to the next. The grid
+    lies `between` two times, s, its period is below `longest`, s, and the noise is that where the
+    stem `is_free`.
+    """
+    period = max(stem.period, FINEST_STEP)
     while True:
-        grid = np.arange(time[0], time[-1], period)
-        where = free[np.minimum(np.searchsorted(time, grid), time.size - 1)]
-        halves = [half[where] for half in stem.halves(grid)]
-        noise = max(_lasting_noise(half) for half in halves)
-        if noise <= _END_NOISE * float(np.ptp(halves[0])) or 2.0 * period > longest:
-            return _path(halves, force.halves(grid)[0][where], stem.noise)
+        grid: _Array = np.arange(*between, period, dtype=np.float64)
+        halves = stem.halves(grid)
+        seen = halves if is_free is None else [half[is_free(grid)] for half in halves]
+        noise = max(_lasting_noise(half) for half in seen)
+        if noise <= _END_NOISE * float(np.ptp(seen[0])) or 2.0 * period > longest:
+            return grid, halves
         period *= 2.0
 
 
-def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
+def path_of(halves: Sequence[_Array], force: _Array, noise: float) -> Path:
     """Return the distance of all strokes.
 
     Short ones may be of a sensor that wanders: in these the force does no work.
     """
     even, odd = halves
-    least = max(_STROKE_NOISE * noise, _STROKE * float(np.ptp(even)))
-    turns = _turns(even, least)
+    least = least_stroke(even, noise)
+    turns = turns_of(even, least)
     lengths = _lengths(even, odd, turns)
-    whole = 0.5 * float(np.sum(lengths) + np.sum(_lengths(odd, even, _turns(odd, least))))
+    whole = 0.5 * float(np.sum(lengths) + np.sum(_lengths(odd, even, turns_of(odd, least))))
     position = 0.5 * (even + odd)
     moved = np.diff(position, prepend=position[0])
-    work = np.diff(np.cumsum(_off_line(force, position) * moved)[turns])
+    work = np.diff(np.cumsum(off_line(force, position) * moved)[turns])
     is_short = lengths < _SURE_STROKE * least
     short, long = float(np.sum(lengths[is_short])), float(np.sum(lengths[~is_short]))
     real, of_long = 1.0, float(np.sum(work[~is_short]))
@@ -346,10 +361,15 @@ def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
         real = min(max(float(np.sum(work[is_short])) / short * long / of_long, 0.0), 1.0)
     distance = max(whole - (1.0 - real) * short, _TINY)
     deviation = math.sqrt(real * (1.0 - real)) * short
-    return _Path(distance, deviation, max(lengths.size, 1), float(np.sum(work)))
+    return Path(distance, deviation, max(lengths.size, 1), float(np.sum(work)))
 
 
-def _off_line(force: _Array, position: _Array) -> _Array:
+def least_stroke(position: _Array, noise: float) -> float:
+    """Return the least length of a stroke, m, of a stem whose sensor has that noise, m."""
+    return max(_STROKE_NOISE * noise, _STROKE * float(np.ptp(position)))
+
+
+def off_line(force: _Array, position: _Array) -> _Array:
     """Return a force less its straight line along the travel."""
     away, force = position - np.mean(position), force - np.mean(force)
     square = max(float(away @ away), _TINY)
@@ -415,14 +435,14 @@ class Work(NamedTuple):
         hidden = work.of_friction - by(2 * length).of_friction
         of_path = path.deviation / path.distance * work.of_friction
         noise = math.hypot(work.noise, 0.5 * hidden, of_path)
-        rounding = _rounding(force, time, work.along)
+        rounding = work_of_rounding(force, time, work.along)
         return work._replace(noise=noise, rounding=rounding).seen_late()
 
     @property
     def of_friction(self) -> float:
         """The work over the distance, N, but for a straight line of the force along the travel."""
         moving = self.along != 0.0
-        return float(self.along[moving] @ _off_line(self.force[moving], self.position[moving]))
+        return float(self.along[moving] @ off_line(self.force[moving], self.position[moving]))
 
     def seen_late(self) -> "Work":
         """Compute the work over the distance, N, if the stem is seen late by each of the lags."""
@@ -433,7 +453,7 @@ class Work(NamedTuple):
         return self._replace(by_lag=np.array(seen))
 
 
-def _rounding(force: MeasuredSignal, time: _Array, along: _Array) -> float:
+def work_of_rounding(force: MeasuredSignal, time: _Array, along: _Array) -> float:
     """Return the deviation, N, that the converter of the force makes of its work over the distance.
 
     A force that stays within one step of the converter is off by the same part of the step
