@@ -258,7 +258,7 @@ class TestRareImperfections:
     RAMP = np.interp(TIME, [2, 20, 38], [0.1, 0.9, 0.1])
 
     def of(self, seed, drift=0.0):
-        """Return the sliding friction of a drawn valve, and the truth; `drift`: a share a minute."""
+        """Return the sliding friction of a drawn valve, and the truth; drift: a share a minute."""
         valve, packing = drawn(seed)
         record = moved(valve, packing, self.RAMP, 2e-4, seed=seed)
         span = valve.diaphragm_area * np.max(record.drive.value - valve.pressure_reference)
@@ -479,6 +479,24 @@ class TestCheckOfASimulation:
         )["coulomb_friction"]
         assert (found.value, found.half_width) == (expected[0], pytest.approx(expected[1]))
 
+    @pytest.mark.parametrize(
+        ("balanced", "is_exact", "half_width"),
+        [(112.0, True, 3.0), (112.0, False, math.hypot(3.0, 12.0)), (103.0, False, 3.0)],
+        ids=["noise alone", "contradicted", "agreed with"],
+    )
+    def test_a_fit_that_is_not_quite_noise_yields_to_a_force_balance(
+        self, balanced, is_exact, half_width
+    ):
+        """The simulation knows F_v, yet something else is in its residual."""
+        viscous = {"viscous_friction": number(1000.0, 100.0)}
+        found = checked_by_curve(
+            {"coulomb_friction": number(100.0, 3.0), **viscous},
+            {"coulomb_friction": number(balanced, 2.0), **viscous},
+            follows=True,
+            is_exact=is_exact,
+        )["coulomb_friction"]
+        assert (found.value, found.half_width) == (100.0, pytest.approx(half_width))
+
     def test_a_slow_sensor_that_the_simulation_excludes_is_no_rival(self):
         ours = replace(number(100.0, 9.0), rival=100.0)
         theirs = replace(number(104.0, 3.0), rival=60.0)
@@ -512,8 +530,8 @@ class TestCheckOfASimulation:
         ours = {SLIDING: number(100.0, width), "spring_constant": number(395.0, 3.0)}
         theirs = {SLIDING: number(100.0, 90.0), "spring_constant": number(385.0, 25.0)}
         found = checked_by_curve(ours, theirs, follows=True)["spring_constant"]
-        widths = {395.0: math.hypot(3.0, friction_curve._PULL * 10.0), 385.0: 25.0}
-        assert (found.value, found.half_width) == (expected, pytest.approx(widths[expected]))
+        half_width = math.hypot({395.0: 3.0, 385.0: 25.0}[expected], friction_curve._PULL * 10.0)
+        assert (found.value, found.half_width) == (expected, pytest.approx(half_width))
 
     def test_an_impossible_friction_checks_nothing(self):
         ours = {SLIDING: number(100.0, 9.0)}

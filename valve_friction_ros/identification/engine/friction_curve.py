@@ -285,6 +285,7 @@ def checked_by_curve(
     balanced: Mapping[str, Estimated],
     follows: bool,
     slip_force: float = 0.0,
+    is_exact: bool = True,
 ) -> dict[str, Estimated]:
     """Return the numbers of a simulation, checked and sharpened by those of the force balance.
 
@@ -292,7 +293,8 @@ def checked_by_curve(
     knows it better; spring, preload and sliding friction from the simulation where both exclude
     each other, as reversals and rests tell it a lag from a viscous friction; a part of their
     difference then widens the intervals of spring and preload, and those of F_c and F_v where the
-    simulation does not determine F_v. Where the stem does not follow, they come from the force
+    simulation does not determine F_v; all of it where the residual is not quite noise (`is_exact`)
+    and both exclude each other. Where the stem does not follow, they come from the force
     balance, and so do spring and preload where the simulation does not determine any friction: one
     that has a lag for it has another spring, too. What both divide between dry and viscous friction
     is uncertain by what they differ, and F_c also by a `slip_force`, N, of which no one knows at
@@ -308,11 +310,21 @@ def checked_by_curve(
         open_ = _OPEN_SLIP * slip_force if name == "coulomb_friction" else 0.0
         apart = abs(ours.value - theirs.value)
         width = math.hypot(theirs.half_width, apart, open_)
-        if follows and ours.half_width < width:
-            pull = 0.0 if is_split else _PULL * apart
-            result[name] = replace(ours, half_width=math.hypot(ours.half_width, pull))
-        else:
+        if not (follows and ours.half_width < width):
             result[name] = replace(theirs, half_width=width, rival=ours.rival)
+            continue
+        is_contradicted = not (is_exact or _agree(ours, theirs))
+        share = 1.0 if is_contradicted else 0.0 if is_split else _PULL
+        result[name] = replace(ours, half_width=math.hypot(ours.half_width, share * apart))
+    return result | _of_no_law(simulated, balanced, follows)
+
+
+def _of_no_law(
+    simulated: Mapping[str, Estimated], balanced: Mapping[str, Estimated], follows: bool
+) -> dict[str, Estimated]:
+    """Return sliding friction, spring and preload as `checked_by_curve` does."""
+    result: dict[str, Estimated] = {}
+    viscous = simulated.get("viscous_friction")
     slides = simulated.get(SLIDING)
     is_blind = slides is not None and slides.half_width > abs(slides.value)
     for name in (SLIDING, "spring_constant", "spring_preload"):
@@ -325,6 +337,7 @@ def checked_by_curve(
         agree = _agree(ours, theirs)
         if not follows or (is_blind and name != SLIDING):
             wider = theirs.half_width if agree else max(theirs.half_width, apart)
+            wider = wider if name == SLIDING else math.hypot(wider, _PULL * apart)
             result[name] = replace(theirs, half_width=wider)
         elif agree and theirs.half_width < ours.half_width:
             result[name] = replace(theirs, rival=ours.rival)

@@ -38,7 +38,7 @@ NumbersAt = Callable[[BroadModel, Coordinates], Mapping[str, ReportedNumber]]
 NOISE_LIKE = 4.0
 """Inflation of the residual up to which it may be noise of a sensor that is not quite white."""
 
-_NOT_QUITE = 1.5
+NOT_QUITE = 1.5
 """Inflation from which on the motion is not quite that of the model.
 
 What the model lacks may then be taken for a lag, which the work of the measured signals does not
@@ -287,7 +287,7 @@ def estimated(
             width = math.hypot(width, _LOST * lost * abs(first.value))
             loop = loop_friction(fit.model, places[0][1].at)
             apart = abs(loop - first.value)
-            unlike = fit.inflation > _NOT_QUITE or fit.stages[-1].penalty > UNLIKELY
+            unlike = fit.inflation > NOT_QUITE or fit.stages[-1].penalty > UNLIKELY
             unlike &= any(timing in fit.names for timing in TIMING)
             if unlike or apart > _FAR * abs(loop):
                 width = math.hypot(width, apart + _LOOP * abs(first.value))

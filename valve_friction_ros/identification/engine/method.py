@@ -31,6 +31,7 @@ from valve_friction_ros.identification.engine.friction_curve import (
 from valve_friction_ros.identification.engine.imperfections import Profile
 from valve_friction_ros.identification.engine.intervals import (
     NOISE_LIKE,
+    NOT_QUITE,
     Estimated,
     NumbersAt,
     estimated,
@@ -331,7 +332,8 @@ def _of_simulation(
         )
     follows = fit.inflation <= NOISE_LIKE and has_tried_lags(fits)
     if profile.has_imperfections:
-        numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"])
+        is_exact = fit.inflation <= NOT_QUITE
+        numbers = checked_by_curve(numbers, balanced, follows, fit.at["slip_force"], is_exact)
         if "mass" in numbers and prior.timing_uncertainty > 0:
             numbers["mass"] = _beside_lags(numbers["mass"], fit.at["spring_constant"])
         misfit = fit_misfit(fit, numbers)
