@@ -132,6 +132,7 @@ def test_times_are_those_of_the_stated_zone(reported, write_csv, columns_of, qui
     zone = ("--method", "bench", "--time-zone", "Europe/Berlin")
     page, _ = reported(path, *zone)
     assert page.table("record")["began"] == ("2026-07-17 12:00:00 Europe/Berlin",)
+    assert page.table("setting")["report written"][0].endswith(" Europe/Berlin")
     assert _dated(path, "Europe/Berlin").endswith("2026-07-17 13:00 Europe/Berlin")
     assert _dated(path, "").endswith("2026-07-17 11:00 UTC")
 

@@ -99,6 +99,14 @@ def test_an_event_holds_who_and_what_and_the_sentence_stays():
     assert event.before is AlarmState.UNACKNOWLEDGED
 
 
+def test_nobody_answers_an_alarm_before_it_was_raised():
+    """The clock of the valve is an hour ahead of the one that asks."""
+    early = NOW - 3_600_000_000_000
+    event = requested(after(WARN), request(AlarmAction.SHELVE, duration=60.0), early)
+    assert (event.time, event.alarm.until) == (NOW, NOW + 60_000_000_000)
+    assert requested(after(WARN), request(AlarmAction.ACKNOWLEDGE), NOW + 1).time == NOW + 1
+
+
 @pytest.mark.parametrize(
     ("action", "who", "text", "hours", "says"),
     [

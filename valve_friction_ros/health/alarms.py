@@ -365,6 +365,9 @@ def followed_by(alarm: Alarm, condition: Condition, time: int) -> tuple[AlarmEve
 def requested(alarm: Alarm, request: AlarmRequest, time: int) -> AlarmEvent:
     """Return the event of what a person asks of an alarm at a time, ns since 1970 (UTC).
 
+    A person cannot answer an alarm before it was raised: where the clock of the valve is ahead of
+    the one that asks, the answer is of the time at which it was raised.
+
     Raises AlarmError if the alarm is in a state in which that cannot be done.
     """
     action = request.action
@@ -376,6 +379,7 @@ def requested(alarm: Alarm, request: AlarmRequest, time: int) -> AlarmEvent:
             if one.is_of_person and (alarm.state, one) in TRANSITIONS
         )
         raise AlarmError(f"{alarm} and cannot be {verb} now: it can be {possible}")
+    time = max(time, alarm.raised or time)
     state = TRANSITIONS[alarm.state, action]
     if state is None:
         state = AlarmState.UNACKNOWLEDGED if alarm.is_active else AlarmState.NORMAL

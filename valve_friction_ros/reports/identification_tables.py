@@ -248,7 +248,7 @@ def settings_table(record: IdentifiedRecord) -> PageTable:
             f"{valve.travel * 1e3:g} mm" if math.isfinite(valve.travel) else "without stops",
         ),
         ("software", _versions()),
-        ("report written", f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC"),
+        ("report written", in_zone(datetime.now(timezone.utc), record.zone)),
     ]
     return _pairs(rows, "setting", "value")
 
