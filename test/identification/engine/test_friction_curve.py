@@ -37,6 +37,9 @@ from valve_friction_ros.identification.engine.sliding_averages import (
     path_of,
     turns_of,
 )
+from valve_friction_ros.identification.engine.verdicts import curve_verdicts
+from valve_friction_ros.identification.settings import IdentificationSettings
+from valve_friction_ros.identification.trust.verdict import Verdict
 from valve_friction_ros.model import Drive, KarnoppParameters, StemState, Valve, advance, simulate
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
@@ -427,6 +430,19 @@ class TestNumbersOfSeveralAveragingTimes:
         assert self.of((100.0, 1e-9)).half_width == pytest.approx(6.0)
         machine = curve_numbers([curve(friction=number(100.0, 1e-9))] * 2)["friction"]
         assert machine.half_width == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("spring", "verdict"), [(2.0, Verdict.IDENTIFIED), (30.0, Verdict.WEAK), (999.0, Verdict.WEAK)]
+)
+def test_a_preload_is_no_surer_than_the_spring_that_it_lies_along(spring, verdict):
+    """A loop that hunts over 2 mm says little of what the spring does without its compression."""
+    numbers = {"spring_constant": number(100.0, spring), "spring_preload": number(1e3, 20.0)}
+    found = curve_verdicts(numbers, IdentificationSettings(), 0.0)["spring_preload"]
+    assert (found.verdict, bool(found.reason)) == (verdict, verdict is Verdict.WEAK)
+    given = IdentificationSettings(fixed={"spring_constant": 100.0})
+    known = curve_verdicts({"spring_preload": numbers["spring_preload"]}, given, 0.0)
+    assert known["spring_preload"].verdict is Verdict.IDENTIFIED
 
 
 class TestCheckOfASimulation:

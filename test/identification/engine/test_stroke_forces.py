@@ -78,6 +78,17 @@ def test_a_lag_that_nobody_stated_widens_it():
     assert open_.budget.shared == open_.budget.timing > 0.0
 
 
+def test_a_force_that_jumps_with_the_stem_leaves_open_what_it_was_between():
+    """It changes by 160 N between two samples, before the stem moves or after it."""
+    force, stem = jumping(12)
+    held = np.flatnonzero(np.diff(stem) != 0.0)
+    force = np.concatenate([np.repeat(force[held], np.diff(held, prepend=-1)),
+                            np.full(TIME.size - held[-1] - 1, force[held[-1]])])  # fmt: skip
+    assert np.max(np.abs(np.diff(force))) > 1.9 * FRICTION
+    found = forces(force, stem).sliding
+    assert found.half_width > 0.5 * FRICTION
+
+
 def test_a_force_that_knows_nothing_of_the_stem_is_no_friction():
     """In 20 walks the interval is wider than a third of what it holds, or holds no friction."""
     _, stem = jumping(12, uneven=0.3)

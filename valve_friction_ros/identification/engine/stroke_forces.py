@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from valve_friction_ros.identification.engine.balance_regression import LagPrior
 from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import ROUNDING, Budget, Estimated
+from valve_friction_ros.identification.engine.numbers import RECTANGLE
 from valve_friction_ros.identification.engine.sliding_averages import (
     FINEST_STEP,
     LAGS,
@@ -57,6 +58,10 @@ kinetic energy between two pieces of a stroke is part of their scatter."""
 
 _ROUNDS = 5
 """Rounds in which regression and scatter come to agree."""
+
+_JUMP, _NEAR = 0.1, np.arange(-1, 3)
+"""Share of a stroke that the stem jumps from one point of the grid to the next; and the points
+around it over which averaging spreads a jump."""
 
 _LEAST_SCATTER = 1e-3
 """Deviation of a stroke's force, as a share of the range of the force, that is always assumed."""
@@ -155,8 +160,7 @@ def stroke_forces(
     noise = force.noise * math.sqrt(step / force.period * float(along @ along))
     of_record = math.hypot(
         half_width(math.sqrt(float(covariance[0, 0])), freedom),
-        NORMAL_QUANTILE * noise,
-        NORMAL_QUANTILE * rounding,
+        NORMAL_QUANTILE * math.hypot(noise, rounding, _unseen_between(pressed, position, way)),
     )
     timing = of_lag / NORMAL_QUANTILE
     sources = {ROUNDING: rounding} if rounding > 0.0 else {}
@@ -174,6 +178,19 @@ def stroke_forces(
         float(np.sum(squares[is_free])) / (step * distance),
         step,
     )
+
+
+def _unseen_between(force: _Array, position: _Array, way: _Array) -> float:
+    """Return the deviation of the friction by what happens between two points of the grid, N.
+
+    Where the stem jumps from one point to the next, the force may change before it or after it: in
+    all jumps likewise. `way` is that of each stroke, m.
+    """
+    moves = np.abs(np.diff(position))
+    jumps = np.flatnonzero(moves > _JUMP * np.mean(np.abs(way)))
+    around = force[np.clip(jumps[:, None] + _NEAR, 0, force.size - 1)]
+    change = np.ptp(around, axis=1) if jumps.size else np.zeros(0)
+    return RECTANGLE * 0.5 * float(moves[jumps] @ change) / float(np.sum(np.abs(way)))
 
 
 def _cut(position: _Array, turns: NDArray[np.intp], pieces: int) -> NDArray[np.intp]:

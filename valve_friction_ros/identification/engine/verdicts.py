@@ -11,6 +11,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from valve_friction_ros.identification.trust.verdict import (
     PRELOAD_SCALE,
     WEAK_SHARE,
     Parameter,
+    Verdict,
     fixed,
     interval_share,
     not_identifiable,
@@ -56,6 +58,8 @@ stem goes more slowly than its top speed: a short peak tells no friction."""
 
 _BY_SPEED = ("coulomb_friction", "viscous_friction", "static_friction", "stribeck_velocity")
 """What a friction that falls with speed has in other proportions at higher speeds."""
+
+_EXTRAPOLATED = "it lies outside the moves of the record, along a spring that is not identified"
 
 _UNCONFIRMED = "it follows from the forces alone: no simulated stem confirms it"
 _OF_THE_BALANCE = (SLIDING, "spring_constant", "spring_preload")
@@ -144,7 +148,22 @@ def fit_verdicts(
             verdicts[name] = not_identifiable(name, unseen[name])
         else:
             verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason, scale)
-    return verdicts
+    return _no_surer_than_its_spring(verdicts)
+
+
+def _no_surer_than_its_spring(verdicts: dict[str, Parameter]) -> dict[str, Parameter]:
+    """Return the verdicts, with a preload that is identified only where the spring is known.
+
+    In three draws 832 of 836 preloads whose spring was identified too lay inside their intervals;
+    of 52 others 48, and two were far off.
+    """
+    preload, spring = verdicts.get("spring_preload"), verdicts.get("spring_constant")
+    if preload is None or spring is None or preload.verdict is not Verdict.IDENTIFIED:
+        return verdicts
+    if spring.verdict in (Verdict.IDENTIFIED, Verdict.FIXED):
+        return verdicts
+    weak = replace(preload, verdict=Verdict.WEAK, reason=_EXTRAPOLATED)
+    return {**verdicts, "spring_preload": weak}
 
 
 def _split_doubt(fits: Sequence[PosteriorFit], misfit: Misfit, profile: Profile) -> str:
@@ -219,7 +238,7 @@ def curve_verdicts(
             if not reason and one.has_rival:
                 reason = late_sensor(name, one.rival)
             verdicts[name] = with_verdict(name, one.value, width / _TWO, width, reason, scale)
-    return verdicts
+    return _no_surer_than_its_spring(verdicts)
 
 
 def _top_speed(fit: PosteriorFit) -> float:
