@@ -9,11 +9,14 @@
 
 """Friction by whole strokes: a stem that jumps between two samples."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from valve_friction_ros.identification.engine import friction_curve
 from valve_friction_ros.identification.engine.balance_regression import LagPrior
 from valve_friction_ros.identification.engine.friction_curve import curve_numbers, friction_curves
 from valve_friction_ros.identification.engine.sliding_averages import MeasuredSignal
@@ -131,3 +134,14 @@ def test_where_no_stem_slides_the_sliding_friction_is_that_of_the_strokes():
     assert curve.numbers.keys() == {"sliding_friction"}
     one = curve_numbers([curve])["sliding_friction"]
     assert abs(one.value - FRICTION) <= one.half_width <= 0.1 * FRICTION
+
+
+@pytest.mark.parametrize(("value", "is_kept"), [(FRICTION, True), (0.5 * FRICTION, False)])
+def test_whole_strokes_check_what_no_second_averaging_time_confirms(value, is_kept):
+    strokes = forces(*jumping(12))
+    one = replace(strokes.sliding, value=value, half_width=0.05 * FRICTION)
+    curve = replace(friction_curve._curve_of_strokes(strokes), numbers={"sliding_friction": one})
+    (found,) = friction_curve._checked_by_strokes([curve], strokes)
+    assert (found is curve) is is_kept
+    assert found.numbers["sliding_friction"] is (one if is_kept else strokes.sliding)
+    assert friction_curve._checked_by_strokes([curve], None) == [curve]

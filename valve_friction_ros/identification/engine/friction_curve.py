@@ -152,8 +152,9 @@ def friction_curves(
     Returns
     -------
     list of FrictionCurve
-        The shortest averaging time first. Where the stem nowhere surely slides both ways, that of
-        whole strokes alone, with the sliding friction (`stroke_forces`); empty with too few.
+        The shortest averaging time first. Where the stem nowhere surely slides both ways, or whole
+        strokes exclude what a single averaging time says, that of these alone, with the sliding
+        friction (`stroke_forces`); empty with too few.
     """
     lag, fixed = lag or LagPrior(), fixed or {}
     force, stem = force_and_stem(record, valve)
@@ -169,9 +170,6 @@ def friction_curves(
                 found.append(Regression(averages, work, valve, lag, fixed).posterior())
         if found:
             break
-    else:
-        strokes = stroke_forces(force, stem, valve, lag)
-        return [] if strokes is None else [_curve_of_strokes(strokes)]
     # A lag at the end of what is possible makes up for something else.
     found = [one for one in found if abs(one.regression.later(one.solved)) < LARGEST_LAG]
     likelihoods = [one.log_likelihood for one in found if one.log_likelihood is not None]
@@ -179,7 +177,10 @@ def friction_curves(
     for one in found:
         if likelihoods:
             one.of_record = one.weighed(_of_any(likelihoods))
-    return [_curve_of(one) for one in found]
+    curves = [_curve_of(one) for one in found]
+    if len(curves) >= _CONFIRMED:
+        return curves
+    return _checked_by_strokes(curves, stroke_forces(force, stem, valve, lag))
 
 
 def _curve_of(posterior: Posterior) -> FrictionCurve:
@@ -213,6 +214,15 @@ def _curve_of(posterior: Posterior) -> FrictionCurve:
         solved.misfit,
         correlation_of(gradients, solved.covariance),
     )
+
+
+def _checked_by_strokes(
+    curves: list[FrictionCurve], strokes: StrokeForces | None
+) -> list[FrictionCurve]:
+    """Return what an averaging time says that no other confirms, or whole strokes against it."""
+    if strokes is None or (curves and _agree(curves[0].numbers[SLIDING], strokes.sliding)):
+        return curves
+    return [_curve_of_strokes(strokes)]
 
 
 def _curve_of_strokes(strokes: StrokeForces) -> FrictionCurve:

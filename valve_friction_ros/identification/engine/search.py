@@ -166,8 +166,8 @@ _IMPROBABLE = 25.0
 rise of the sum of squares after which the valley is left."""
 
 _DEMANDED = 30.0
-"""Fall of the sum of squares, in inflated variances (5.5 standard errors), below which the record
-of a bench does not demand a further coordinate."""
+"""Fall of the sum of squares, in inflated variances (5.5 standard errors), below which no record
+demands a slip, nor that of a bench a further coordinate."""
 
 _FEW_STEPS = 6
 _MORE_STEPS = 12
@@ -355,10 +355,7 @@ class _Search:
             falling = self.curved()
             if falling and best.objective - falling.objective > _DEMANDED * falling.inflation:
                 best = falling
-        if not best.at["stribeck_velocity"] and "slip_force" in best.names:
-            plain = self.full({**best.at, "slip_force": 0.0}, (*self.main, *self.timing))
-            if plain.objective - best.objective < _DEMANDED * best.inflation:
-                best = plain
+        best = self.without_slip(best)
         if "mass" in self.known:
             return best
         end = self.fit(best.at, (*best.names, "mass"), 0, self.exact)
@@ -372,6 +369,18 @@ class _Search:
             remaining=np.append(best.remaining, 0.0),
             kept=("mass",),
         )
+
+    def without_slip(self, best: PosteriorFit) -> PosteriorFit:
+        """Take a slip only where the record demands it, or friction falls with speed besides.
+
+        A stem that is sampled slowly, behind a volume or a filter, is late as if it had stuck.
+        """
+        if best.at["stribeck_velocity"] or not best.at["slip_force"] > 0.0:
+            return best
+        names = tuple(name for name in best.names if name != "slip_force")
+        plain = self.full({**best.at, "slip_force": 0.0}, names)
+        demanded = plain.objective - best.objective > _DEMANDED * best.inflation
+        return best if demanded else plain
 
     def traded(self, best: PosteriorFit) -> list[PosteriorFit]:
         """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
@@ -421,6 +430,8 @@ class _Search:
         best = self.best()
         if not self.prior.profile.has_imperfections:
             best = self.demanded(best)
+        elif self.may_go_on:
+            best = self.without_slip(best)
         others = self.traded(best)
         lowest = min(others, key=lambda one: one.objective, default=best)
         if lowest.objective < best.objective - 1.0:

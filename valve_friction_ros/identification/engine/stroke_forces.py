@@ -59,9 +59,9 @@ kinetic energy between two pieces of a stroke is part of their scatter."""
 _ROUNDS = 5
 """Rounds in which regression and scatter come to agree."""
 
-_JUMP, _NEAR = 0.1, np.arange(-1, 3)
-"""Share of a stroke that the stem jumps from one point of the grid to the next; and the points
-around it over which averaging spreads a jump."""
+_JUMP, _NEAR = 0.1, np.array([[-4], [-1], [2], [5]])
+"""Share of a stroke that the stem jumps from one point of the grid to the next; and the points at
+equal distances between which it does, as averaging spreads a jump over three of them."""
 
 _LEAST_SCATTER = 1e-3
 """Deviation of a stroke's force, as a share of the range of the force, that is always assumed."""
@@ -183,13 +183,14 @@ def stroke_forces(
 def _unseen_between(force: _Array, position: _Array, way: _Array) -> float:
     """Return the deviation of the friction by what happens between two points of the grid, N.
 
-    Where the stem jumps from one point to the next, the force may change before it or after it: in
-    all jumps likewise. `way` is that of each stroke, m.
+    Where the stem jumps from one point to the next, a force that jumps too may do so before it or
+    after it: in all jumps likewise. One that goes on as before and after leaves nothing open. `way`
+    is that of each stroke, m.
     """
     moves = np.abs(np.diff(position))
     jumps = np.flatnonzero(moves > _JUMP * np.mean(np.abs(way)))
-    around = force[np.clip(jumps[:, None] + _NEAR, 0, force.size - 1)]
-    change = np.ptp(around, axis=1) if jumps.size else np.zeros(0)
+    before, begin, end, after = force[np.clip(jumps + _NEAR, 0, force.size - 1)]
+    change = np.abs((end - begin) - 0.5 * ((begin - before) + (after - end)))
     return RECTANGLE * 0.5 * float(moves[jumps] @ change) / float(np.sum(np.abs(way)))
 
 
