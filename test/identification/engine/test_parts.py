@@ -81,6 +81,20 @@ def test_lasting_residuals_are_inflated_by_their_length():
     assert inflation(scaled, 64) == pytest.approx(64.0, rel=0.1)
 
 
+@pytest.mark.parametrize("rise", [-5.0, 59.0, 61.0])
+def test_a_slip_is_taken_where_the_record_demands_it(rise):
+    """Inflated twice, 30 variances are 60 of the sum of squares."""
+    at = {"stribeck_velocity": 0.0, "slip_force": 5.0}
+    best = SimpleNamespace(at=at, names=("mass", "slip_force"), objective=100.0, inflation=2.0)
+    plain = SimpleNamespace(objective=100.0 + rise)
+    fits = {(0.0, ("mass",)): plain}
+    searched = SimpleNamespace(full=lambda start, names: fits[start["slip_force"], names])
+    assert _Search.without_slip(searched, best) is (best if rise > 60.0 else plain)
+    for change in ({"stribeck_velocity": 1e-3}, {"slip_force": 0.0}):
+        best.at = {**at, **change}
+        assert _Search.without_slip(searched, best) is best
+
+
 def test_starts_with_a_lag_keep_the_whole_delay():
     """A sliding stem follows the force by F_v/k and the lags together."""
     at = {"spring_constant": 2e5, "viscous_friction": 1.2e4, **ABSENT}
