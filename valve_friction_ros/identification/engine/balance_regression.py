@@ -725,7 +725,9 @@ class Posterior:
         mean = float(np.sum(weights * values))
         shares = np.sum(weights, axis=1)
         means = np.sum(weights * values, axis=1) / shares
-        timing = math.sqrt(float(np.sum(weights * (values - means[:, None]) ** 2)))
+        timing = 0.0
+        if self.lags.size > 1:
+            timing = math.sqrt(float(np.sum(weights * (values - means[:, None]) ** 2)))
         open_ = float(np.sum(weights * record**2) + shares @ (means - mean) ** 2)
         low, high = 0.0, 20.0 * math.sqrt(open_ + timing**2)
         some = weights > _NEGLIGIBLE
