@@ -64,7 +64,7 @@ def _usage_rows(
     for opened, name in (
         ([], "no page open"),
         (visits[:1], "the plant open"),
-        (visits, "four pages open"),
+        (visits, f"{len(visits)} pages open"),
     ):
         with browser.new_context() as context:
             for one in opened:

@@ -20,6 +20,8 @@ from playwright.sync_api import Browser, BrowserContext, Error, Page, sync_playw
 __all__ = ["Visit", "launched", "pages_of", "visit", "wait_on_page"]
 
 _PATIENCE = 60.0
+_FIRST_SCREEN = 40
+"""Rows that a tall screen shows at once."""
 _LOOK = """
 (() => {
   const look = () => {
@@ -47,9 +49,11 @@ def pages_of(valves: int, identifier: str) -> tuple[Visit, ...]:
         "document.querySelector('.vf-parameters') "
         "&& document.querySelector('.vf-chart-trend canvas')"
     )
+    first_screen = f"document.querySelectorAll('.vf-row').length >= {min(valves, _FIRST_SCREEN)}"
     return (
         Visit("plant, table", "/", all_drawn),
         Visit("plant, tiles", "/?view=tiles", all_drawn),
+        Visit("plant, first screen", "/", first_screen),
         Visit("valve", f"/valve?node={node}", valve),
         Visit(
             "compare", f"/compare?a={node}&b={node}", "document.querySelector('.vf-compared tbody')"

@@ -134,6 +134,17 @@ def test_a_browser_is_sent_what_has_changed(plant):
     assert news(plant, feed, 111.0, 1010.4) == {"now": 1010.4}
 
 
+def test_a_page_is_sent_with_its_first_rows_and_the_others_follow(plant):
+    feed = RowFeed(lambda node: f"/valve?node={node}")
+    first = feed.news(plant.valves(101.0), lambda _: None, 1000.0, 4)
+    assert [row["i"] for row in first["rows"]] == list(range(4))
+    assert first["order"] == list(range(9))
+    then = news(plant, feed, 101.0)
+    assert [row["i"] for row in then["rows"]] == list(range(4, 9))
+    assert "order" not in then
+    assert news(plant, feed, 101.0) == {"now": 1000.0}
+
+
 def test_a_table_reads_a_status_again_only_where_its_mark_has_changed():
     name, level, tag, message, values = values_of_valve(0)
     plant, reads = Plant(5.0), []

@@ -349,15 +349,23 @@ class RowFeed:
         self._order: list[int] = []
 
     def news(
-        self, shown: Iterable[Heard], sparks: Callable[[str], Sparkline | None], wall: float
+        self,
+        shown: Iterable[Heard],
+        sparks: Callable[[str], Sparkline | None],
+        wall: float,
+        most: int | None = None,
     ) -> Row:
-        """Return the clock, the rows that have changed, and the order if it has."""
-        rows, order = [], []
+        """Return the clock, the rows that have changed, and the order if it has.
+
+        With `most` no more rows than that; the others come next time.
+        """
+        rows: list[Row] = []
+        order: list[int] = []
         for valve in shown:
             order.append(valve.number)
             spark = sparks(valve.view.node)
             cause = (valve.revision, valve.is_silent, spark)
-            if self._sent.get(valve.number) == cause:
+            if self._sent.get(valve.number) == cause or len(rows) == most:
                 continue
             self._sent[valve.number] = cause
             rows.append(row_of(valve, spark, wall, self._href(valve.view.node)))

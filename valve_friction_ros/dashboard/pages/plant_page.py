@@ -43,6 +43,9 @@ _PERIOD = 1.0
 _FIRST_PERIOD, _FIRST_TIME = 0.25, 10.0
 """Period, s, in which a page looks at first, and for how long: after a restart of the dashboard the
 valves are heard then."""
+_FIRST_ROWS = 100
+"""Rows that a page is sent with, more than a screen shows; the others follow once it is connected,
+while a person already reads."""
 _KEPT_STATES = tuple(one for one in STATES if one not in ("silent", "unheard"))
 _COLUMNS = [
     {"key": key, "title": title, "unit": unit, "sort": sort, "css": f"vf-c-{key}"}
@@ -104,7 +107,8 @@ class _PlantPage:
                     self._view(words, tiled)
         heard = self._heard()
         shown = selected(heard, self._selection)
-        first = self._feed.news(shown, self._context.history.spark, time.time())
+        spark = self._context.history.spark
+        first = self._feed.news(shown, spark, time.time(), _FIRST_ROWS)
         live = self._context.is_live
         columns = [one for one in _COLUMNS if live or one["key"] != "heard"]
         self._table = PlantTable({**first, **self._arrangement(), "live": live}, columns)
