@@ -56,6 +56,7 @@ from valve_friction_ros.model import (
     Valve,
     simulate,
 )
+from valve_friction_ros.wording import with_width
 
 NAN = math.nan
 LABELS = {"pressure", "stem", "coulomb", "sigma", "signature"}
@@ -192,11 +193,22 @@ class TestVerdict:
 
     def test_each_number_has_its_verdict(self, known):
         """2·152.7 N over 2.05e5 N/m and 28.575 mm is 5.2 %."""
-        known = dataclasses.replace(known, warnings=())
-        assert title_of(identification_figure(known)) == (
-            "$F_c$ 152.7 N (identified); $F_v$ 4865 N·s/m (weak); $k$ 205000 N/m (fixed); "
-            f"dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
+        sliding, told = title_of(identification_figure(known)).split("; ", 1)
+        assert sliding == "sliding friction 218.0 ± 0.65 N (identified)"
+        assert told == (
+            "$F_c$ 152.7 ± 1.0 N (identified); $F_v$ 4865 ± 400 N·s/m (weak); $k$ 205000 N/m "
+            f"(fixed); dead band 5.2 % of travel; fit {100 * known.misfit.fit:.2f} %"
         )
+
+    def test_the_sliding_friction_comes_first_and_needs_no_split(self, with_parameters):
+        found = with_parameters(
+            sliding_friction=(53.71, 5.2, Verdict.WEAK),
+            coulomb_friction=(NAN, NAN, Verdict.NOT_IDENTIFIABLE),
+            viscous_friction=(NAN, NAN, Verdict.NOT_IDENTIFIABLE),
+            spring_constant=(2.05e5, 0.0, Verdict.FIXED),
+        )
+        told = title_of(identification_figure(found)).split("; ")
+        assert told[:2] == ["sliding friction 53.7 ± 5.2 N (weak)", "$k$ 205000 N/m (fixed)"]
 
     def test_a_number_without_a_verdict_is_never_shown(self, nothing_known):
         """What is withheld leaves no number in the title, and no line, band or note of it."""
@@ -579,7 +591,8 @@ class TestSignature:
 
     def test_words(self, figure, found):
         title = " ".join(figure._suptitle.get_text().split())
-        assert f"$F_c$ {found.values['coulomb_friction']:.4g} N (weak)" in title
+        one = found.parameters["coulomb_friction"]
+        assert f"$F_c$ {with_width(one.value, one.half_width)} N (weak)" in title
         assert f"fit {100 * found.fit:.2f} %" in title
         assert "dead zone 29.6" in signature_and_validation_panels(figure)["signature"].get_title()
         assert signature_and_validation_panels(figure)["signature"].get_xlabel() == "pressure [kPa]"

@@ -28,16 +28,21 @@ from valve_friction_ros.figures.panels import (
     dress,
     labelled_in,
     legend_above,
-    number,
     thinned,
     titled_figure,
 )
 from valve_friction_ros.health import dead_band
-from valve_friction_ros.identification import Drawing, Result, StemComparison, Validation
+from valve_friction_ros.identification import (
+    SLIDING,
+    Drawing,
+    Result,
+    StemComparison,
+    Validation,
+)
 from valve_friction_ros.model import Recording, Valve
 from valve_friction_ros.planning import StrokePlan
 from valve_friction_ros.planning.search import moved
-from valve_friction_ros.wording import percentage
+from valve_friction_ros.wording import percentage, with_width
 
 
 def friction_figure(cases: Sequence[Case], title: str, notes: Sequence[str] = ()) -> Figure:
@@ -93,8 +98,16 @@ def identification_figure(result: Result) -> Figure:
 
 
 def _identification_title(result: Result) -> str:
+    """Name the sliding friction first, where it is known, and what of it is."""
     shown = result.to_dict()
-    parts = [_with_verdict(symbol, shown["parameters"][name]) for name, symbol in SYMBOLS.items()]
+    found, sliding = shown["parameters"], shown["parameters"].get(SLIDING)
+    is_known = sliding is not None and sliding["value"] is not None
+    parts = [] if not is_known else [_with_verdict("sliding friction", sliding)]
+    parts += [
+        _with_verdict(f"${symbol}$", found[name])
+        for name, symbol in SYMBOLS.items()
+        if not (is_known and found[name]["value"] is None)
+    ]
     share = dead_band(result, result.valve)
     if math.isfinite(share):
         parts.append(f"dead band {percentage(share)} of travel")
@@ -103,11 +116,12 @@ def _identification_title(result: Result) -> str:
     return "; ".join(parts)
 
 
-def _with_verdict(symbol: str, parameter: Mapping[str, Any]) -> str:
+def _with_verdict(words: str, parameter: Mapping[str, Any]) -> str:
     value, verdict = parameter["value"], parameter["verdict"]
     if value is None:
-        return f"${symbol}$ {verdict}"
-    return f"${symbol}$ {number(value)} {parameter['unit']} ({verdict})"
+        return f"{words} {verdict}"
+    width = parameter["half_width"] or 0.0
+    return f"{words} {with_width(value, width)} {parameter['unit']} ({verdict})"
 
 
 def validation_figure(validation: Validation, valve: Valve) -> Figure:

@@ -420,16 +420,15 @@ def _of_force_balance(
     numbers[SLIDING] = numbers[SLIDING].with_rival
     best = next(one for one in curves if one.numbers[SLIDING].value == numbers[SLIDING].value)
     misfit = curve_misfit(best, numbers[SLIDING])
+    reproduced = f"the force balance reproduces {100 * misfit.fit:.2f} % of the force"
+    beyond = f"; {misfit.words} of the rest are not noise" if misfit.systematic > 0.0 else ""
     return _Outcome(
         parameters=curve_verdicts(numbers, settings, best.stribeck_velocity, force_range),
         numbers=numbers,
         misfit=misfit,
         sliding_speed=best.sliding_speed,
         correlation=best.correlation,
-        findings=(
-            f"the force balance of the sliding stem reproduces {100 * misfit.fit:.2f} % of the "
-            f"force; {misfit.words} of the rest are not noise",
-        ),
+        findings=(reproduced + beyond,),
         warnings=() if settings.fixed.get("spring_constant") == 0.0 else (f"simulation: {why}",),
         model=_balanced_model(numbers, settings),
     )
