@@ -86,9 +86,13 @@ def test_a_slip_is_taken_where_the_record_demands_it(rise):
     """Inflated twice, 30 variances are 60 of the sum of squares."""
     at = {"stribeck_velocity": 0.0, "slip_force": 5.0}
     best = SimpleNamespace(at=at, names=("mass", "slip_force"), objective=100.0, inflation=2.0)
-    plain = SimpleNamespace(objective=100.0 + rise)
+    plain = SimpleNamespace(at={**at, "slip_force": 0.0}, objective=100.0 + rise)
     fits = {(0.0, ("mass",)): plain}
-    searched = SimpleNamespace(full=lambda start, names: fits[start["slip_force"], names])
+    searched = SimpleNamespace(
+        full=lambda start, names: fits[start["slip_force"], names],
+        fit=lambda start, names, steps, _: plain if (names, steps) == (best.names, 0) else start,
+        exact=None,
+    )
     assert _Search.without_slip(searched, best) is (best if rise > 60.0 else plain)
     for change in ({"stribeck_velocity": 1e-3}, {"slip_force": 0.0}):
         best.at = {**at, **change}
