@@ -18,7 +18,7 @@ import pytest
 
 from valve_friction_ros.identification.engine.broad_model import ABSENT, BroadModel
 from valve_friction_ros.identification.engine.fitted_record import fitted_record
-from valve_friction_ros.identification.engine.imperfections import TIMING
+from valve_friction_ros.identification.engine.imperfections import TIMING, Profile
 from valve_friction_ros.identification.engine.intervals import Budget
 from valve_friction_ros.identification.engine.posterior_fit import bounded_minimum, fit
 from valve_friction_ros.identification.engine.remarks import sampling_remarks
@@ -81,8 +81,9 @@ def test_lasting_residuals_are_inflated_by_their_length():
     assert inflation(scaled, 64) == pytest.approx(64.0, rel=0.1)
 
 
+@pytest.mark.parametrize("profile", Profile)
 @pytest.mark.parametrize("rise", [-5.0, 59.0, 61.0])
-def test_a_slip_is_taken_where_the_record_demands_it(rise):
+def test_a_slip_is_taken_where_the_record_demands_it(rise, profile):
     """Inflated twice, 30 variances are 60 of the sum of squares."""
     at = {"stribeck_velocity": 0.0, "slip_force": 5.0}
     best = SimpleNamespace(at=at, names=("mass", "slip_force"), objective=100.0, inflation=2.0)
@@ -92,6 +93,7 @@ def test_a_slip_is_taken_where_the_record_demands_it(rise):
         full=lambda start, names: fits[start["slip_force"], names],
         fit=lambda start, names, steps, _: plain if (names, steps) == (best.names, 0) else start,
         exact=None,
+        prior=SimpleNamespace(profile=profile),
     )
     assert _Search.without_slip(searched, best) is (best if rise > 60.0 else plain)
     for change in ({"stribeck_velocity": 1e-3}, {"slip_force": 0.0}):

@@ -374,14 +374,17 @@ class _Search:
         """Take a slip only where the record demands it, or friction falls with speed besides.
 
         A stem that is sampled slowly, behind a volume or a filter, is late as if it had stuck. A
-        slip of none is as uncertain as the record leaves it.
+        slip of none is as uncertain as the record of a plant leaves it; that of a bench has none.
         """
         if best.at["stribeck_velocity"] or not best.at["slip_force"] > 0.0:
             return best
         names = tuple(name for name in best.names if name != "slip_force")
         plain = self.full({**best.at, "slip_force": 0.0}, names)
-        demanded = plain.objective - best.objective > _DEMANDED * best.inflation
-        return best if demanded else self.fit(plain.at, best.names, 0, self.exact)
+        if plain.objective - best.objective > _DEMANDED * best.inflation:
+            return best
+        if not self.prior.profile.has_imperfections:
+            return plain
+        return self.fit(plain.at, best.names, 0, self.exact)
 
     def traded(self, best: PosteriorFit) -> list[PosteriorFit]:
         """Fit with other viscous frictions: F_v/k delays a sliding stem much as a lag does.
