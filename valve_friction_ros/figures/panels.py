@@ -173,8 +173,6 @@ def save_picture(figure: Figure, path: Path) -> None:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Colours of Okabe and Ito: colour-blind readers can distinguish them."""
 
-_WHOLE, _HUGE = 1e4, 1e6
-"""Sizes between which numbers are written without decimals."""
 
 SYMBOLS = {"coulomb_friction": "F_c", "viscous_friction": "F_v", "spring_constant": "k"}
 """The parameters that figures name, by their symbols."""
@@ -274,12 +272,6 @@ def _told(parameter: Parameter) -> str:
         return f"${symbol}$ {parameter.verdict.value}"
     value = f"{with_width(parameter.value, parameter.half_width)} {parameter.unit}"
     return f"${symbol}$ = {value}: {parameter.verdict.value}"
-
-
-def number(value: float) -> str:
-    """Write a number with four digits, a true minus sign, and no exponent up to a million."""
-    digits = f"{value:.0f}" if _WHOLE <= abs(value) < _HUGE else f"{value:.4g}"
-    return digits.replace("-", "−")
 
 
 def _draw_level(axes: Axes, level: Parameter, colour: str) -> list[float]:

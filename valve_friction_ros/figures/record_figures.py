@@ -11,7 +11,7 @@
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ from valve_friction_ros.health import dead_band
 from valve_friction_ros.identification import (
     SLIDING,
     Drawing,
+    Parameter,
     Result,
     StemComparison,
     Validation,
@@ -98,30 +99,27 @@ def identification_figure(result: Result) -> Figure:
 
 
 def _identification_title(result: Result) -> str:
-    """Name the sliding friction first, where it is known, and what of it is."""
-    shown = result.to_dict()
-    found, sliding = shown["parameters"], shown["parameters"].get(SLIDING)
-    is_known = sliding is not None and sliding["value"] is not None
-    parts = [] if not is_known else [_with_verdict("sliding friction", sliding)]
+    """Name the sliding friction first; beside it, what is not known is left out."""
+    found, sliding = result.parameters, result.parameters.get(SLIDING)
+    is_known = sliding is not None and math.isfinite(sliding.value)
+    parts = [_with_verdict("sliding friction", sliding)] if sliding and is_known else []
     parts += [
         _with_verdict(f"${symbol}$", found[name])
         for name, symbol in SYMBOLS.items()
-        if not (is_known and found[name]["value"] is None)
+        if not (is_known and math.isnan(found[name].value))
     ]
     share = dead_band(result, result.valve)
     if math.isfinite(share):
         parts.append(f"dead band {percentage(share)} of travel")
-    if shown["rms"] is not None:
-        parts.append(f"fit {100 * shown['fit']:.2f} %")
+    if math.isfinite(result.rms):
+        parts.append(f"fit {100 * result.fit:.2f} %")
     return "; ".join(parts)
 
 
-def _with_verdict(words: str, parameter: Mapping[str, Any]) -> str:
-    value, verdict = parameter["value"], parameter["verdict"]
-    if value is None:
-        return f"{words} {verdict}"
-    width = parameter["half_width"] or 0.0
-    return f"{words} {with_width(value, width)} {parameter['unit']} ({verdict})"
+def _with_verdict(words: str, one: Parameter) -> str:
+    if math.isnan(one.value):
+        return f"{words} {one.verdict.value}"
+    return f"{words} {with_width(one.value, one.half_width)} {one.unit} ({one.verdict.value})"
 
 
 def validation_figure(validation: Validation, valve: Valve) -> Figure:

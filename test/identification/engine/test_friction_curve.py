@@ -31,10 +31,10 @@ from valve_friction_ros.identification.engine.friction_curve import (
 from valve_friction_ros.identification.engine.imperfections import sensor_span, zero_drift
 from valve_friction_ros.identification.engine.intervals import Budget, Estimated
 from valve_friction_ros.identification.engine.sliding_averages import (
-    Path,
     _lengths,
+    _Path,
+    _path,
     averaged_twice,
-    path_of,
     turns_of,
 )
 from valve_friction_ros.identification.engine.verdicts import curve_verdicts
@@ -198,7 +198,7 @@ class TestDistance:
         pressed = np.where(self.FRICTION == 0.0, np.nan, self.FRICTION)
         held = np.flatnonzero(np.isfinite(pressed))
         last = held[np.maximum(np.searchsorted(held, np.arange(pressed.size), "right") - 1, 0)]
-        path = path_of([self.STEM + wander] * 2, pressed[last], 0.0)
+        path = _path([self.STEM + wander] * 2, pressed[last], 0.0)
         assert path.distance == pytest.approx(12e-3, rel=0.05)
         lengths = _lengths(
             self.STEM + wander, self.STEM + wander, turns_of(self.STEM + wander, 6e-5)
@@ -211,7 +211,7 @@ class TestDistance:
         places = [0.0, 1.0, *[1.0 - share, 1.0] * count, 0.0]
         stem = 1e-2 * np.interp(np.linspace(0, len(places) - 1, 2000 * len(places)),
                                 np.arange(len(places)), places)  # fmt: skip
-        path = path_of([stem, stem], 50.0 * np.sign(np.gradient(stem)), 0.0)
+        path = _path([stem, stem], 50.0 * np.sign(np.gradient(stem)), 0.0)
         assert path.distance == pytest.approx(1e-2 * (2.0 + 2.0 * share * count), rel=0.03)
 
     @pytest.mark.parametrize("seed", range(4))
@@ -563,7 +563,7 @@ class TestDistanceUnderNoiseThatLasts:
         [(100.0, 10.0, 0.5), (103.0, 10.3, 0.2), (105.0, 10.5, 0)],
     )
     def test_what_is_longer_is_believed_as_far_as_it_does_work(self, work, distance, deviation):
-        found = Path(10.5, 0.0, 4, work).beside(Path(10.0, 0.0, 4, 100.0))
+        found = _Path(10.5, 0.0, 4, work).beside(_Path(10.0, 0.0, 4, 100.0))
         assert found[:3] == pytest.approx((distance, deviation, 4))
 
     @pytest.mark.parametrize("seed", range(6))

@@ -18,15 +18,20 @@ from hypothesis import strategies as st
 
 from valve_friction_ros.identification.engine import friction_curve
 from valve_friction_ros.identification.engine.balance_regression import LagPrior
-from valve_friction_ros.identification.engine.friction_curve import curve_numbers, friction_curves
+from valve_friction_ros.identification.engine.friction_curve import (
+    _by_strokes,
+    _cut,
+    curve_numbers,
+    friction_curves,
+)
 from valve_friction_ros.identification.engine.sliding_averages import MeasuredSignal
-from valve_friction_ros.identification.engine.stroke_forces import _cut, stroke_forces
 from valve_friction_ros.model import Valve
 from valve_friction_ros.model.recording import StampedRecord, StampedSignal
 
 PERIOD = 0.01
 TIME = np.arange(6000) * PERIOD
 NO_LAG = LagPrior(0.0)
+SLIDING = "sliding_friction"
 VALVE = Valve(0.04, 40e3, 0.03)
 FRICTION, SPRING, PRELOAD = 80.0, 1e5, 400.0
 
@@ -50,7 +55,7 @@ def jumping(jumps=8, rest=2.0, size=0.3e-3, uneven=0.0, noise=(0.0, 0.0), seed=0
 
 def forces(force, stem, lag=NO_LAG, noise=(0.0, 0.0)):
     """Regress both."""
-    return stroke_forces(
+    return _by_strokes(
         MeasuredSignal(TIME, force, noise[0], PERIOD),
         MeasuredSignal(TIME, stem, noise[1], PERIOD),
         VALVE,
@@ -61,7 +66,7 @@ def forces(force, stem, lag=NO_LAG, noise=(0.0, 0.0)):
 @pytest.mark.parametrize("uneven", [0.0, 0.4])
 def test_what_each_jump_takes(uneven):
     found = forces(*jumping(12, uneven=uneven))
-    assert found.sliding.value == pytest.approx(FRICTION, rel=0.02)
+    assert found.numbers[SLIDING].value == pytest.approx(FRICTION, rel=0.02)
     assert np.all(np.sign(found.friction) == np.sign(found.speed))
     assert found.friction == pytest.approx(FRICTION * np.sign(found.speed), rel=0.1)
 
@@ -69,13 +74,13 @@ def test_what_each_jump_takes(uneven):
 @pytest.mark.parametrize("seed", range(8))
 def test_the_interval_holds_the_truth(seed):
     noise = (10.0, 8e-6)
-    one = forces(*jumping(10, uneven=0.3, noise=noise, seed=seed), noise=noise).sliding
+    one = forces(*jumping(10, uneven=0.3, noise=noise, seed=seed), noise=noise).numbers[SLIDING]
     assert abs(one.value - FRICTION) <= one.half_width < 0.5 * FRICTION
 
 
 def test_a_lag_that_nobody_stated_widens_it():
-    known = forces(*jumping(12)).sliding
-    open_ = forces(*jumping(12), lag=LagPrior()).sliding
+    known = forces(*jumping(12)).numbers[SLIDING]
+    open_ = forces(*jumping(12), lag=LagPrior()).numbers[SLIDING]
     assert known.budget.timing == 0.0
     assert open_.half_width > known.half_width
     assert open_.budget.shared == open_.budget.timing > 0.0
@@ -88,7 +93,7 @@ def test_a_force_that_jumps_with_the_stem_leaves_open_what_it_was_between():
     force = np.concatenate([np.repeat(force[held], np.diff(held, prepend=-1)),
                             np.full(TIME.size - held[-1] - 1, force[held[-1]])])  # fmt: skip
     assert np.max(np.abs(np.diff(force))) > 1.9 * FRICTION
-    found = forces(force, stem).sliding
+    found = forces(force, stem).numbers[SLIDING]
     assert found.half_width > 0.5 * FRICTION
 
 
@@ -97,7 +102,7 @@ def test_a_force_that_knows_nothing_of_the_stem_is_no_friction():
     _, stem = jumping(12, uneven=0.3)
     for seed in range(20):
         walk = np.cumsum(np.random.default_rng(seed).standard_normal(TIME.size))
-        one = forces(1e3 * walk / np.ptp(walk), stem).sliding
+        one = forces(1e3 * walk / np.ptp(walk), stem).numbers[SLIDING]
         assert one.value < 3.0 * one.half_width, seed
 
 
@@ -112,7 +117,7 @@ def test_few_strokes_are_cut_into_pieces():
     side = np.where(TIME < 25.0, 1.0, -1.0)
     found = forces(PRELOAD + SPRING * place + FRICTION * side, place)
     assert found.speed.size == 8
-    assert found.sliding.value == pytest.approx(FRICTION, rel=0.02)
+    assert found.numbers[SLIDING].value == pytest.approx(FRICTION, rel=0.02)
 
 
 @given(st.lists(st.floats(0.1, 1.0), min_size=1, max_size=6), st.integers(1, 9))
@@ -131,17 +136,17 @@ def test_where_no_stem_slides_the_sliding_friction_is_that_of_the_strokes():
     pressure = VALVE.pressure_reference + force / VALVE.diaphragm_area
     record = StampedRecord(StampedSignal(TIME, pressure), StampedSignal(TIME, stem))
     (curve,) = friction_curves(record, VALVE)
-    assert curve.numbers.keys() == {"sliding_friction"}
-    one = curve_numbers([curve])["sliding_friction"]
+    assert curve.numbers.keys() == {SLIDING}
+    one = curve_numbers([curve])[SLIDING]
     assert abs(one.value - FRICTION) <= one.half_width <= 0.1 * FRICTION
 
 
 @pytest.mark.parametrize(("value", "is_kept"), [(FRICTION, True), (0.5 * FRICTION, False)])
 def test_whole_strokes_check_what_no_second_averaging_time_confirms(value, is_kept):
     strokes = forces(*jumping(12))
-    one = replace(strokes.sliding, value=value, half_width=0.05 * FRICTION)
-    curve = replace(friction_curve._curve_of_strokes(strokes), numbers={"sliding_friction": one})
+    one = replace(strokes.numbers[SLIDING], value=value, half_width=0.05 * FRICTION)
+    curve = replace(strokes, numbers={SLIDING: one})
     (found,) = friction_curve._checked_by_strokes([curve], strokes)
     assert (found is curve) is is_kept
-    assert found.numbers["sliding_friction"] is (one if is_kept else strokes.sliding)
+    assert found.numbers[SLIDING] is (one if is_kept else strokes.numbers[SLIDING])
     assert friction_curve._checked_by_strokes([curve], None) == [curve]

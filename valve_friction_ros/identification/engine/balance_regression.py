@@ -132,6 +132,12 @@ class LagPrior:
             return np.asarray(-0.5 * (lags / max(self.deviation, 1e-9)) ** 2)
         return _heavy_tailed(lags / _USUAL_LAG)
 
+    def probability(self, log_likelihood: _Array) -> _Array:
+        """Return the probability of each of `LAGS`, by this prior and a likelihood."""
+        log = self.log_density(LAGS) + log_likelihood
+        probability = np.exp(log - log.max())
+        return np.asarray(probability / np.sum(probability))
+
 
 def _heavy_tailed(deviations: _Array) -> _Array:
     """Return the logarithm of Student's t density of two degrees of freedom, but for a constant."""
@@ -622,7 +628,7 @@ class Posterior:
         self.exchanged, self.less_viscous = 0.0, 0.0
         self.log_likelihood = None if regression.lag.is_known else self._of_lags()
         if self.log_likelihood is not None:
-            self.lags, self.probability = LAGS, self.weighed(self.log_likelihood)
+            self.lags, self.probability = LAGS, regression.lag.probability(self.log_likelihood)
             self._exchange()
         self.of_record = self.probability
 
@@ -655,12 +661,6 @@ class Posterior:
             return np.zeros_like(viscous)
         share = np.maximum(viscous, 0.0) * self.regression.sliding_speed / dry
         return _heavy_tailed(share / _USUAL_VISCOUS)
-
-    def weighed(self, log_likelihood: _Array) -> _Array:
-        """Return the probability of each lag, by its prior and a likelihood."""
-        log = self.regression.lag.log_density(LAGS) + log_likelihood
-        probability = np.exp(log - log.max())
-        return np.asarray(probability / np.sum(probability))
 
     def _exchange(self) -> None:
         """Weigh the other order of two lags.

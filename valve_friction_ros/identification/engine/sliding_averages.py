@@ -174,7 +174,7 @@ def force_and_stem(record: StampedRecord, valve: Valve) -> tuple[MeasuredSignal,
     )
 
 
-class Path(NamedTuple):
+class _Path(NamedTuple):
     """Distance of all strokes, m, its deviation, their number, and the work of friction, J."""
 
     distance: float
@@ -182,7 +182,7 @@ class Path(NamedTuple):
     strokes: int
     work: float
 
-    def beside(self, slower: "Path") -> "Path":
+    def beside(self, slower: "_Path") -> "_Path":
         """Return the distance that the work confirms; `slower` is averaged over a longer time.
 
         Noise that such averages share lengthens every stroke at its ends, and the force does no
@@ -214,15 +214,15 @@ class Averages(NamedTuple):
     taken: NDArray[np.intp]
     speed: float
     noise: Mapping[str, float]
-    path: Path
-    finest: Path
+    path: _Path
+    finest: _Path
 
     @property
     def mean_velocity(self) -> _Array:
         """Mean of both halves, m/s."""
         return 0.5 * (self.velocity[0] + self.velocity[1])
 
-    def distance_with_work(self, noise: float) -> tuple[Path, float]:
+    def distance_with_work(self, noise: float) -> tuple[_Path, float]:
         """Return the path that the work confirms, and the mean speed over it where noise lasts.
 
         That speed, m/s, is by averages so long that noise makes none; nan elsewhere, as they may
@@ -230,7 +230,7 @@ class Averages(NamedTuple):
         """
         length, free = _SLOWER * self.length, self.is_free
         calm = [averaged_twice(half[free], length) for half in self.position]
-        slower = path_of(calm, averaged_twice(self.force[0][free], length), noise)
+        slower = _path(calm, averaged_twice(self.force[0][free], length), noise)
         whole = max(self.path, self.finest)
         if not slower.distance > _KEPT * self.finest.distance:
             return whole.beside(self.path), math.nan
@@ -279,7 +279,7 @@ def averages_of(
     ):
         return None
     averaged = [averaged_twice(half, length) for half in force.halves(time)]
-    path = path_of([half[free] for half in position], averaged[0][free], stem.noise)
+    path = _path([half[free] for half in position], averaged[0][free], stem.noise)
     finer = _finest_path(force, stem, time, free, averaging_time)
     if path.distance < _COVERED * finer.distance:
         return None
@@ -304,7 +304,7 @@ def _finest_path(
     time: _Array,
     free: NDArray[np.bool_],
     longest: float,
-) -> Path:
+) -> _Path:
     """Return the distance where the stem is free, averaged until the ends of strokes are sure.
 
     That is over the time `longest`, s, at most.
@@ -315,7 +315,7 @@ def _finest_path(
 
     grid, halves = quiet_grid(stem, (float(time[0]), float(time[-1])), longest, is_free)
     where = is_free(grid)
-    return path_of([half[where] for half in halves], force.halves(grid)[0][where], stem.noise)
+    return _path([half[where] for half in halves], force.halves(grid)[0][where], stem.noise)
 
 
 def quiet_grid(
@@ -334,14 +334,15 @@ def quiet_grid(
     while True:
         grid: _Array = np.arange(*between, period, dtype=np.float64)
         halves = stem.halves(grid)
-        seen = halves if is_free is None else [half[is_free(grid)] for half in halves]
+        where = slice(None) if is_free is None else is_free(grid)
+        seen = [half[where] for half in halves]
         noise = max(_lasting_noise(half) for half in seen)
         if noise <= _END_NOISE * float(np.ptp(seen[0])) or 2.0 * period > longest:
             return grid, halves
         period *= 2.0
 
 
-def path_of(halves: Sequence[_Array], force: _Array, noise: float) -> Path:
+def _path(halves: Sequence[_Array], force: _Array, noise: float) -> _Path:
     """Return the distance of all strokes.
 
     Short ones may be of a sensor that wanders: in these the force does no work.
@@ -353,7 +354,7 @@ def path_of(halves: Sequence[_Array], force: _Array, noise: float) -> Path:
     whole = 0.5 * float(np.sum(lengths) + np.sum(_lengths(odd, even, turns_of(odd, least))))
     position = 0.5 * (even + odd)
     moved = np.diff(position, prepend=position[0])
-    work = np.diff(np.cumsum(off_line(force, position) * moved)[turns])
+    work = np.diff(np.cumsum(_off_line(force, position) * moved)[turns])
     is_short = lengths < _SURE_STROKE * least
     short, long = float(np.sum(lengths[is_short])), float(np.sum(lengths[~is_short]))
     real, of_long = 1.0, float(np.sum(work[~is_short]))
@@ -361,7 +362,7 @@ def path_of(halves: Sequence[_Array], force: _Array, noise: float) -> Path:
         real = min(max(float(np.sum(work[is_short])) / short * long / of_long, 0.0), 1.0)
     distance = max(whole - (1.0 - real) * short, _TINY)
     deviation = math.sqrt(real * (1.0 - real)) * short
-    return Path(distance, deviation, max(lengths.size, 1), float(np.sum(work)))
+    return _Path(distance, deviation, max(lengths.size, 1), float(np.sum(work)))
 
 
 def least_stroke(position: _Array, noise: float) -> float:
@@ -369,7 +370,7 @@ def least_stroke(position: _Array, noise: float) -> float:
     return max(_STROKE_NOISE * noise, _STROKE * float(np.ptp(position)))
 
 
-def off_line(force: _Array, position: _Array) -> _Array:
+def _off_line(force: _Array, position: _Array) -> _Array:
     """Return a force less its straight line along the travel."""
     away, force = position - np.mean(position), force - np.mean(force)
     square = max(float(away @ away), _TINY)
@@ -442,7 +443,7 @@ class Work(NamedTuple):
     def of_friction(self) -> float:
         """The work over the distance, N, but for a straight line of the force along the travel."""
         moving = self.along != 0.0
-        return float(self.along[moving] @ off_line(self.force[moving], self.position[moving]))
+        return float(self.along[moving] @ _off_line(self.force[moving], self.position[moving]))
 
     def seen_late(self) -> "Work":
         """Compute the work over the distance, N, if the stem is seen late by each of the lags."""
