@@ -15,10 +15,10 @@ All functions raise HistoryError if the history cannot be read or written.
 import contextlib
 import json
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import astuple, fields
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, RowMapping
@@ -39,7 +39,39 @@ from valve_friction_ros.model.valve import Valve
 from valve_friction_ros.response import StepAnswer, summarised
 from valve_friction_ros.usage import Usage, UsedDay, ValveUsage, total
 
-# What is kept, and for how long
+_T = TypeVar("_T")
+
+# A value is a row by the names of its fields; some columns have another name.
+
+_COLUMNS: dict[type, dict[str, str]] = {
+    AlarmRecording: {"time": "time_ns"},
+    Move: {"begin": "begin_ns", "end": "end_ns"},
+    FrictionChange: {"earliest": "earliest_ns", "latest": "latest_ns"},
+    SlidingFriction: {"value": "sliding_friction"},
+    Usage: {"histogram": "histogram_ns"},
+}
+_WRITERS: dict[Any, Callable[[Any], Any]] = {Level: int, Path: str, tuple[int, ...]: json.dumps}
+_READERS: dict[Any, Callable[[Any], Any]] = {
+    float: lambda one: math.nan if one is None else float(one),  # SQLite stores nan as NULL
+    tuple[int, ...]: lambda one: tuple(json.loads(one)),
+}
+
+
+def _stored(kind: Any) -> list[tuple[str, str, Any]]:
+    """Return field, column and type of what is kept of a type."""
+    names = _COLUMNS.get(kind, {})
+    return [(one.name, names.get(one.name, one.name), one.type) for one in fields(kind)]
+
+
+def _columns(one: Any) -> dict[str, Any]:
+    return {
+        column: _WRITERS.get(kind, lambda value: value)(getattr(one, name))
+        for name, column, kind in _stored(type(one))
+    }
+
+
+def _value(kind: Callable[..., _T], row: RowMapping) -> _T:
+    return kind(**{n: _READERS.get(of, of)(row[column]) for n, column, of in _stored(kind)})
 
 
 def _of_valve(table: sa.Table, valve: str, *order: Any) -> Any:
@@ -48,21 +80,40 @@ def _of_valve(table: sa.Table, valve: str, *order: Any) -> Any:
     return query.where(tables.valve.c.name == valve).order_by(*order)
 
 
-def _forget_older(
-    connection: Connection, column: sa.Column[Any], row: int, newest: int, days: float
-) -> None:
-    """Delete the rows of a valve whose stamps are `days` older than one, ns; none for 0."""
-    if days > 0:
-        table = column.table
-        old = column < oldest_kept(newest, days)
-        connection.execute(sa.delete(table).where(table.c.valve_id == row, old))
+def _all_of(kind: Callable[..., _T], file: History, query: Any) -> tuple[_T, ...]:
+    with reading(file.place) as connection:
+        return tuple(_value(kind, row) for row in connection.execute(query).mappings())
 
 
-def _forget_beyond(connection: Connection, column: sa.Column[Any], row: int, most: int) -> None:
-    """Delete all rows of a valve but the `most` with the largest values of a column."""
-    of_valve = column.table.c.valve_id == row
-    last = sa.select(column).where(of_valve).order_by(column.desc()).limit(1).offset(most)
-    connection.execute(sa.delete(column.table).where(of_valve, column <= last.scalar_subquery()))
+class _Rows(NamedTuple):
+    """The rows of a valve within one transaction."""
+
+    connection: Connection
+    valve: int
+
+    def put(self, table: sa.Table, *rows: dict[str, Any], is_kept: bool = False) -> None:
+        put(self.connection, table, [{"valve_id": self.valve} | r for r in rows], is_kept=is_kept)
+
+    def drop(self, table: sa.Table, *which: Any) -> None:
+        of_valve = table.c.valve_id == self.valve
+        self.connection.execute(sa.delete(table).where(of_valve, *which))
+
+    def drop_older(self, stamp: sa.Column[Any], newest: int, days: float) -> None:
+        """Drop the rows whose stamps are `days` older than one, ns; none for 0."""
+        if days > 0:
+            self.drop(stamp.table, stamp < oldest_kept(newest, days))
+
+    def drop_beyond(self, column: sa.Column[Any], most: int) -> None:
+        """Drop all rows but the `most` with the largest values of a column."""
+        of_valve = column.table.c.valve_id == self.valve
+        last = sa.select(column).where(of_valve).order_by(column.desc()).limit(1).offset(most)
+        self.drop(column.table, column <= last.scalar_subquery())
+
+
+@contextlib.contextmanager
+def _rows_of(file: HistoryFile, valve: KeptValve) -> Iterator[_Rows]:
+    with writing(file.path) as connection:
+        yield _Rows(connection, valve_id(connection, valve))
 
 
 # Recordings of alarms, and the level that was notified last
@@ -73,31 +124,22 @@ def keep_alarm_recording(
 ) -> None:
     """Keep that an alarm was recorded; delete those of its valve `days` older, none for 0."""
     table = tables.alarm_recording
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        same_time = (table.c.valve_id == row, table.c.time_ns == one.time)
-        connection.execute(sa.delete(table).where(*same_time))
-        values = {"level": int(one.level), "path": str(one.path), "message": one.message}
-        put(connection, table, [{"valve_id": row, "time_ns": one.time, **values}])
-        _forget_older(connection, table.c.time_ns, row, one.time, days)
+    with _rows_of(file, valve) as rows:
+        rows.drop(table, table.c.time_ns == one.time)
+        rows.put(table, _columns(one))
+        rows.drop_older(table.c.time_ns, one.time, days)
 
 
 def alarm_recordings(file: History, valve: str) -> tuple[AlarmRecording, ...]:
     """Return the recordings of the valve of this name, oldest first."""
     table = tables.alarm_recording
-    with reading(file.place) as connection:
-        rows = connection.execute(_of_valve(table, valve, table.c.time_ns, table.c.path))
-        return tuple(
-            AlarmRecording(row.time_ns, Level(row.level), Path(row.path), row.message)
-            for row in rows
-        )
+    return _all_of(AlarmRecording, file, _of_valve(table, valve, table.c.time_ns, table.c.path))
 
 
 def keep_told_level(file: HistoryFile, valve: KeptValve, level: Level) -> None:
     """Keep the level that was told last."""
-    with writing(file.path) as connection:
-        row = {"valve_id": valve_id(connection, valve), "level": int(level)}
-        put(connection, tables.told_level, [row])
+    with _rows_of(file, valve) as rows:
+        rows.put(tables.told_level, {"level": int(level)})
 
 
 def read_told_level(file: History, valve: str) -> Level | None:
@@ -111,9 +153,6 @@ def read_told_level(file: History, valve: str) -> Level | None:
 
 _MOST_ANSWERS = 2000
 """Answers of a valve that are kept, the latest."""
-
-_OF_ANSWER = tuple(field.name for field in fields(StepAnswer))
-_FLAGS = frozenset(field.name for field in fields(StepAnswer) if field.type in (bool, "bool"))
 
 
 def keep_answers(
@@ -131,12 +170,10 @@ def keep_answers(
     if not moves:
         return
     table = tables.answer
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        values = ({name: getattr(one, name) for name in _OF_ANSWER} for one in moves)
-        put(connection, table, [{"valve_id": row, "travel": travel, **one} for one in values])
-        _forget_older(connection, table.c.stamp, row, moves[-1].stamp, days)
-        _forget_beyond(connection, table.c.id, row, _MOST_ANSWERS)
+    with _rows_of(file, valve) as rows:
+        rows.put(table, *({"travel": travel, **_columns(one)} for one in moves))
+        rows.drop_older(table.c.stamp, moves[-1].stamp, days)
+        rows.drop_beyond(table.c.id, _MOST_ANSWERS)
 
 
 def read_answers(file: History, valve: str, travel: float | None = None) -> tuple[StepAnswer, ...]:
@@ -148,31 +185,10 @@ def read_answers(file: History, valve: str, travel: float | None = None) -> tupl
         query = _of_valve(tables.answer, valve, tables.answer.c.id)
         rows = connection.execute(query).mappings().all()
         wanted = rows[-1]["travel"] if rows and travel is None else travel
-        return tuple(_answer(row) for row in rows if row["travel"] == wanted)
-
-
-def _answer(row: RowMapping) -> StepAnswer:
-    """Build an answer of its columns; SQLite stores nan as NULL."""
-    known: dict[str, Any] = {
-        name: bool(row[name]) if name in _FLAGS else math.nan if row[name] is None else row[name]
-        for name in _OF_ANSWER
-    }
-    numbers = {name: float(value) for name, value in known.items() if name not in _FLAGS}
-    return StepAnswer(**known | numbers | {"stamp": int(row["stamp"])})
+        return tuple(_value(StepAnswer, row) for row in rows if row["travel"] == wanted)
 
 
 # Moves in service, and what they say together
-
-_NUMBERS_OF_MOVE = (
-    "start",
-    "stop",
-    "force",
-    "force_rate",
-    "speed",
-    "onset_force",
-    "onset_position",
-    "onset_rate",
-)
 
 
 def _actuator(table: sa.Table, built: Valve) -> Any:
@@ -181,20 +197,13 @@ def _actuator(table: sa.Table, built: Valve) -> Any:
     return sa.and_(area, table.c.pressure_reference == built.pressure_reference)
 
 
-def _built(row: int, built: Valve) -> dict[str, Any]:
-    return {
-        "valve_id": row,
-        "diaphragm_area": built.diaphragm_area,
-        "pressure_reference": built.pressure_reference,
-    }
+def _with(built: Valve, one: Any) -> dict[str, Any]:
+    names = ("diaphragm_area", "pressure_reference")
+    return {**{name: getattr(built, name) for name in names}, **_columns(one)}
 
 
 def keep_moves(
-    file: HistoryFile,
-    valve: KeptValve,
-    built: Valve,
-    moves: Sequence[Move],
-    days: float = 0.0,
+    file: HistoryFile, valve: KeptValve, built: Valve, moves: Sequence[Move], days: float = 0.0
 ) -> None:
     """Add moves of a valve, oldest first; keeping them twice changes nothing.
 
@@ -204,28 +213,16 @@ def keep_moves(
     if not moves:
         return
     table = tables.move
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        rows = [
-            {
-                **_built(row, built),
-                "begin_ns": one.begin,
-                "end_ns": one.end,
-                **{name: getattr(one, name) for name in _NUMBERS_OF_MOVE},
-            }
-            for one in moves
-        ]
-        put(connection, table, rows)
-        _forget_older(connection, table.c.end_ns, row, moves[-1].end, days)
-        _forget_beyond(connection, table.c.end_ns, row, MOST_MOVES)
+    with _rows_of(file, valve) as rows:
+        rows.put(table, *(_with(built, one) for one in moves))
+        rows.drop_older(table.c.end_ns, moves[-1].end, days)
+        rows.drop_beyond(table.c.end_ns, MOST_MOVES)
 
 
 def forget_moves_after(file: HistoryFile, valve: KeptValve, time: int) -> None:
     """Drop the moves of a valve that end after a time, ns since 1970 (UTC)."""
-    table = tables.move
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        connection.execute(sa.delete(table).where(table.c.valve_id == row, table.c.end_ns > time))
+    with _rows_of(file, valve) as rows:
+        rows.drop(tables.move, tables.move.c.end_ns > time)
 
 
 def read_moves(file: History, valve: str, built: Valve) -> tuple[Move, ...]:
@@ -235,60 +232,39 @@ def read_moves(file: History, valve: str, built: Valve) -> tuple[Move, ...]:
     force.
     """
     table = tables.move
-    with reading(file.place) as connection:
-        query = _of_valve(table, valve, table.c.end_ns).where(_actuator(table, built))
-        return tuple(
-            Move(
-                int(row["begin_ns"]),
-                int(row["end_ns"]),
-                *(math.nan if row[name] is None else row[name] for name in _NUMBERS_OF_MOVE),
-            )
-            for row in connection.execute(query).mappings()
-        )
+    query = _of_valve(table, valve, table.c.end_ns).where(_actuator(table, built))
+    return _all_of(Move, file, query)
 
 
 def keep_reference(file: HistoryFile, valve: KeptValve, built: Valve, reference: Reference) -> None:
     """Keep the first friction by the moves of a valve; a later one with its actuator is none."""
-    table, one = tables.evidence_reference, reference.sliding
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        another = sa.not_(_actuator(table, built))
-        connection.execute(sa.delete(table).where(table.c.valve_id == row, another))
-        values = {"sliding_friction": one.value, "half_width": one.half_width, "speed": one.speed}
-        kept = {**_built(row, built), "time_ns": reference.time, **values}
-        put(connection, table, [kept], is_kept=True)
+    table = tables.evidence_reference
+    with _rows_of(file, valve) as rows:
+        rows.drop(table, sa.not_(_actuator(table, built)))
+        kept = {"time_ns": reference.time, **_with(built, reference.sliding)}
+        rows.put(table, kept, is_kept=True)
 
 
 def read_reference(file: History, valve: str, built: Valve) -> Reference | None:
     """Return the first friction by the moves of the valve of this name, with this actuator."""
     table = tables.evidence_reference
     with reading(file.place) as connection:
-        row = connection.execute(_of_valve(table, valve).where(_actuator(table, built))).first()
-        if row is None:
-            return None
-        return Reference(
-            SlidingFriction(row.sliding_friction, row.half_width, row.speed), row.time_ns
-        )
+        query = _of_valve(table, valve).where(_actuator(table, built))
+        row = connection.execute(query).mappings().first()
+        return None if row is None else Reference(_value(SlidingFriction, row), row["time_ns"])
 
 
 def keep_change(file: HistoryFile, valve: KeptValve, built: Valve, change: FrictionChange) -> None:
     """Keep the last change of friction that the moves of a valve show, in place of another."""
-    with writing(file.path) as connection:
-        values = dict(zip(_OF_CHANGE, astuple(change), strict=True))
-        kept = {**_built(valve_id(connection, valve), built), **values}
-        put(connection, tables.evidence_change, [kept])
-
-
-_OF_CHANGE = ("earliest_ns", "latest_ns", "ratio", "low", "high")
+    with _rows_of(file, valve) as rows:
+        rows.put(tables.evidence_change, _with(built, change))
 
 
 def read_change(file: History, valve: str, built: Valve) -> FrictionChange | None:
     """Return the last change that the moves of the valve, with this actuator, have shown."""
     table = tables.evidence_change
-    with reading(file.place) as connection:
-        query = _of_valve(table, valve).where(_actuator(table, built))
-        row = connection.execute(query).mappings().first()
-        return None if row is None else FrictionChange(*(row[name] for name in _OF_CHANGE))
+    query = _of_valve(table, valve).where(_actuator(table, built))
+    return next(iter(_all_of(FrictionChange, file, query)), None)
 
 
 # Usage
@@ -307,46 +283,35 @@ def keep_usage(file: HistoryFile, valve: KeptValve, run: str, days: Iterable[Use
     day before, so that keeping it twice changes nothing. What other runs have kept of days
     before the newest two becomes one row a day: of a valve one run writes at a time.
     """
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        put(connection, tables.usage, [_used(row, run, one) for one in days])
-        _merge(connection, row, run)
+    with _rows_of(file, valve) as rows:
+        rows.put(tables.usage, *(_used(run, one) for one in days))
+        _merge(rows, run)
 
 
-def _used(row: int, run: str, one: UsedDay) -> dict[str, Any]:
-    day, renewal, usage = one
-    return {
-        "valve_id": row,
-        "renewal_ns": renewal,
-        "day": day,
-        "run": run,
-        "distance": usage.distance,
-        "reversals": usage.reversals,
-        "breakaways": usage.breakaways,
-        "time_watched_ns": usage.time_watched,
-        "histogram_ns": json.dumps(usage.histogram),
-    }
+def _used(run: str, one: UsedDay) -> dict[str, Any]:
+    own = {"renewal_ns": one.renewal, "day": one.day, "run": run}
+    return {**own, "time_watched_ns": one.usage.time_watched, **_columns(one.usage)}
 
 
-def _merge(connection: Connection, row: int, run: str) -> None:
+def _merge(rows: _Rows, run: str) -> None:
     """Add up, for each finished day, the rows of all runs but this one."""
-    table = tables.usage
-    last = sa.select(sa.func.max(table.c.day)).where(table.c.valve_id == row).scalar_subquery()
-    others = (table.c.valve_id == row, table.c.run != run)
+    table, connection = tables.usage, rows.connection
+    of_valve, another = table.c.valve_id == rows.valve, table.c.run != run
+    last = sa.select(sa.func.max(table.c.day)).where(of_valve).scalar_subquery()
     which = (table.c.renewal_ns, table.c.day)
     several = (
         sa.select(*which)
-        .where(*others, table.c.day < last - _OPEN_DAYS)
+        .where(of_valve, another, table.c.day < last - _OPEN_DAYS)
         .group_by(*which)
         .having(sa.func.count() > 1)
     )
     for renewal, day in connection.execute(several).all():
-        chosen = (*others, table.c.renewal_ns == renewal, table.c.day == day)
-        rows = connection.execute(sa.select(table).where(*chosen)).mappings().all()
+        chosen = (another, table.c.renewal_ns == renewal, table.c.day == day)
+        found = connection.execute(sa.select(table).where(of_valve, *chosen)).mappings().all()
         with contextlib.suppress(TypeError, ValueError):  # rows that hold no usage: reading says so
-            merged = UsedDay(day, renewal, total(_day(each).usage for each in rows))
-            connection.execute(sa.delete(table).where(*chosen))
-            put(connection, table, [_used(row, _EARLIER_RUNS, merged)])
+            merged = UsedDay(day, renewal, total(_value(Usage, each) for each in found))
+            rows.drop(table, *chosen)
+            rows.put(table, _used(_EARLIER_RUNS, merged))
 
 
 def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
@@ -355,18 +320,12 @@ def keep_renewal(file: HistoryFile, valve: KeptValve, time: int) -> None:
     The moves of the packing before go, their reference, and the answers to the command: they say
     nothing of the new one.
     """
-    of_packing = (
-        tables.move,
-        tables.evidence_reference,
-        tables.evidence_change,
-        tables.answer,
-    )
-    with writing(file.path) as connection:
-        row = valve_id(connection, valve)
-        renewal = {"valve_id": row, "time_ns": time}
-        put(connection, tables.packing_renewal, [renewal], is_kept=True)
-        for table in of_packing:
-            connection.execute(sa.delete(table).where(table.c.valve_id == row))
+    with _rows_of(file, valve) as rows:
+        rows.put(tables.packing_renewal, {"time_ns": time}, is_kept=True)
+        rows.drop(tables.move)
+        rows.drop(tables.evidence_reference)
+        rows.drop(tables.evidence_change)
+        rows.drop(tables.answer)
 
 
 def read_usage(file: History, valve: str) -> ValveUsage:
@@ -375,17 +334,8 @@ def read_usage(file: History, valve: str) -> ValveUsage:
         rows = connection.execute(_of_valve(tables.usage, valve)).mappings().all()
         renewals = connection.execute(_of_valve(tables.packing_renewal, valve))
         renewed = max((row.time_ns for row in renewals), default=0)
-        return ValveUsage.of(map(_day, rows), renewed)
-
-
-def _day(row: RowMapping) -> UsedDay:
-    usage = Usage(
-        row["distance"],
-        row["reversals"],
-        row["breakaways"],
-        tuple(json.loads(row["histogram_ns"])),
-    )
-    return UsedDay(row["day"], row["renewal_ns"], usage)
+        days = (UsedDay(row["day"], row["renewal_ns"], _value(Usage, row)) for row in rows)
+        return ValveUsage.of(days, renewed)
 
 
 # All that is kept of a valve
